@@ -1,0 +1,1 @@
+"""A sampled path on a machine: loads, reach, stiffness, statistics."""

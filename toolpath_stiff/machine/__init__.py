@@ -1,0 +1,1 @@
+"""Machine files, kinematics and limits of six-strut platforms."""

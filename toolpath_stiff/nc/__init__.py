@@ -1,0 +1,1 @@
+"""NC program text to moves; knows no machine."""

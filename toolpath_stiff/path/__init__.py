@@ -1,0 +1,1 @@
+"""Moves to sampled poses: arc length, time, tangents, weights; rigid turns of the work."""

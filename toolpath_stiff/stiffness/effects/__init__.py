@@ -1,0 +1,1 @@
+"""Physical effects along the load path, one flat file each."""
