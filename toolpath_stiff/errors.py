@@ -53,8 +53,8 @@ class InputError(TpsError):
         return text
 
 
-class InputErrors(TpsError):
-    """Several input errors, reported together (bad rows of a table, say)."""
+class InputErrors(TpsError):  # noqa: N818 - several InputError
+        """Several input errors, reported together (bad rows of a table, say)."""
 
     def __init__(self, errors: Iterable[InputError]) -> None:
         self.errors = tuple(errors)

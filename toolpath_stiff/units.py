@@ -7,9 +7,13 @@ needs no imports and costs nothing at start-up.
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+T = TypeVar("T", float, "NDArray[np.float64]")
 
 MM_PER_INCH = 25.4  # exact: international inch, 1959
 PI = 3.141592653589793
@@ -18,54 +22,54 @@ RAD_PER_DEG = PI / 180.0
 
 def m_from_mm(mm: T) -> T:
     """Metres from millimetres."""
-    return mm / 1e3  # type: ignore[operator, no-any-return]
+    return mm / 1e3
 
 
 def mm_from_m(m: T) -> T:
     """Millimetres from metres."""
-    return m * 1e3  # type: ignore[operator, no-any-return]
+    return m * 1e3
 
 
 def um_from_m(m: T) -> T:
     """Micrometres from metres."""
-    return m * 1e6  # type: ignore[operator, no-any-return]
+    return m * 1e6
 
 
 def m_from_um(um: T) -> T:
     """Metres from micrometres."""
-    return um / 1e6  # type: ignore[operator, no-any-return]
+    return um / 1e6
 
 
 def mm_from_inch(inch: T) -> T:
     """Millimetres from inches."""
-    return inch * MM_PER_INCH  # type: ignore[operator, no-any-return]
+    return inch * MM_PER_INCH
 
 
 def rad_from_deg(deg: T) -> T:
     """Radians from degrees."""
-    return deg * RAD_PER_DEG  # type: ignore[operator, no-any-return]
+    return deg * RAD_PER_DEG
 
 
 def deg_from_rad(rad: T) -> T:
     """Degrees from radians."""
-    return rad / RAD_PER_DEG  # type: ignore[operator, no-any-return]
+    return rad / RAD_PER_DEG
 
 
 def n_per_m_from_n_per_mm(k: T) -> T:
     """N/m from N/mm."""
-    return k * 1e3  # type: ignore[operator, no-any-return]
+    return k * 1e3
 
 
 def n_per_mm_from_n_per_m(k: T) -> T:
     """N/mm from N/m."""
-    return k / 1e3  # type: ignore[operator, no-any-return]
+    return k / 1e3
 
 
 def m_per_s_from_mm_per_min(feed: T) -> T:
     """m/s from mm/min."""
-    return feed / 60e3  # type: ignore[operator, no-any-return]
+    return feed / 60e3
 
 
 def mm_per_min_from_m_per_s(feed: T) -> T:
     """mm/min from m/s."""
-    return feed * 60e3  # type: ignore[operator, no-any-return]
+    return feed * 60e3
