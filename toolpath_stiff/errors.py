@@ -54,7 +54,7 @@ class InputError(TpsError):
 
 
 class InputErrors(TpsError):  # noqa: N818 - several InputError
-        """Several input errors, reported together (bad rows of a table, say)."""
+    """Several input errors, reported together (bad rows of a table, say)."""
 
     def __init__(self, errors: Iterable[InputError]) -> None:
         self.errors = tuple(errors)
