@@ -53,7 +53,7 @@ class InputError(TpsError):
         return text
 
 
-class InputErrors(TpsError):  # noqa: N818 - several InputError
+class InputErrors(TpsError):
     """Several input errors, reported together (bad rows of a table, say)."""
 
     def __init__(self, errors: Iterable[InputError]) -> None:

@@ -1,1 +1,24 @@
 """Machine files, kinematics and limits of six-strut platforms."""
+
+from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
+from toolpath_stiff.machine.kinematics import Struts, joint_angles, singularity_index, solve_struts
+from toolpath_stiff.machine.limits import Limit, Reach, machine_limits, reach
+from toolpath_stiff.machine.model import EffectEntry, Limits, Machine, StrutLaw
+
+__all__ = [
+    "EffectEntry",
+    "Limit",
+    "Limits",
+    "Machine",
+    "Reach",
+    "StrutLaw",
+    "Struts",
+    "joint_angles",
+    "load_machine",
+    "machine_limits",
+    "packaged_machines",
+    "parse_machine",
+    "reach",
+    "singularity_index",
+    "solve_struts",
+]

@@ -1,0 +1,387 @@
+"""Machine files: TOML in shop units to `Machine` in SI, checked key by key, and back.
+
+Each section names the origin of its figures ("published", "recovered", "assumed"). A key that is not known
+is an error, so that a typing mistake cannot fall back to a default; the message has section, key, value and
+bound.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, Pose, StrutLaw
+from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, rad_from_deg
+
+DEFAULT_MACHINE = "nist"
+INFINITY = math.inf
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a key of a machine file may hold.
+
+    `shape` () for a number, (3,) or (6, 3) for lists; a tuple of two lengths in `lengths` admits either.
+    Bounds are inclusive unless `open_low`.
+    """
+
+    unit: str = ""
+    shape: tuple[int, ...] = ()
+    low: float = -1e5
+    high: float = 1e5
+    required: bool = True
+    text: bool = False
+    infinite: bool = False
+    open_low: bool = False
+    also_length: int | None = None
+
+
+JOINTS_MM = Key(unit="mm", shape=(6, 3), required=False)
+# Rows of radius, angle about Z, height: keeps the symmetry of a machine exact, and reads better.
+JOINTS_CYLINDRICAL = Key(unit="mm, deg, mm", shape=(6, 3), required=False)
+SECTIONS: dict[str, dict[str, Key]] = {
+    "": {
+        "name": Key(text=True),
+        "title": Key(text=True, required=False),
+        "source": Key(text=True, required=False),
+    },
+    "frame_joints": {"mm": JOINTS_MM, "cylindrical_mm_deg": JOINTS_CYLINDRICAL},
+    "platform_joints": {"mm": JOINTS_MM, "cylindrical_mm_deg": JOINTS_CYLINDRICAL},
+    "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
+    "strut_law": {
+        "length_mm": Key(unit="mm", shape=(2,), low=0.0, open_low=True),
+        "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=0.0, high=1e5, open_low=True),
+    },
+    "platform": {
+        "bar_stiffness_N_per_m": Key(unit="N/m", low=1e5, high=INFINITY, infinite=True, open_low=True)
+    },
+    "limits.strut_length": {
+        "min_mm": Key(unit="mm", low=0.0),
+        "max_mm": Key(unit="mm", low=0.0, open_low=True),
+    },
+    "limits.joint_angle": {
+        "frame_max_deg": Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True),
+        "platform_max_deg": Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True),
+        "neutral_pose_mm_deg": Key(unit="mm, deg", shape=(6,)),
+    },
+    "limits.workspace": {"min_mm": Key(unit="mm", shape=(3,)), "max_mm": Key(unit="mm", shape=(3,))},
+    "limits.singularity": {"min_index": Key(low=0.0, high=1.0)},
+    "setup": {
+        "default_origin_mm": Key(unit="mm[, deg]", shape=(3,), also_length=6),
+        "rapid_mm_per_min": Key(unit="mm/min", low=0.0, high=1e6, open_low=True),
+    },
+}
+OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "setup")
+
+
+def packaged_machines() -> dict[str, Path]:
+    """Name -> file of the machines that ship with the package."""
+    folder = Path(str(resources.files("toolpath_stiff"))) / "data" / "machines"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load_machine(name_or_file: str | Path = DEFAULT_MACHINE) -> Machine:
+    """Load a machine by the name of a packaged one or from a machine file.
+
+    Parameters
+    ----------
+    name_or_file
+        A name that `packaged_machines` lists, or a path to a TOML file.
+
+    Raises
+    ------
+    InputError
+        There is no such machine or file, or the file is wrong; the message has section, key, value, bound.
+    """
+    known = packaged_machines()
+    if str(name_or_file) in known:
+        path = known[str(name_or_file)]
+        return parse_machine(path.read_text(encoding="utf-8"), file=f"{name_or_file}.toml")
+    path = Path(name_or_file)
+    if not path.is_file():
+        raise InputError(
+            f"machine {str(name_or_file)!r} is neither a packaged machine nor a file",
+            expected=f"one of {', '.join(known)}, or a machine file",
+            hint="`tps machine list` lists the machines, `tps machine new FILE` writes a commented template",
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"not a text file (byte {error.start})", expected="a machine file (TOML, UTF-8)", file=str(path)
+        ) from None
+    return parse_machine(text, file=str(path))
+
+
+def parse_machine(text: str, file: str = "machine.toml") -> Machine:
+    """Parse the text of a machine file; `file` is only used in messages. Raises `InputError`."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
+        line, column = (int(place[1]), int(place[2])) if place else (None, None)
+        reason = str(error).split(" (at ")[0]
+        raise InputError(f"not valid TOML: {reason}", file=file, line=line, column=column) from None
+    reader = _Reader(text, file)
+    return reader.machine(table)
+
+
+class _Reader:
+    """Reads one machine file; holds its text so that messages can name lines."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self.lines = text.splitlines()
+        self.file = file
+
+    def fail(self, section: str, key: str, found: str, expected: str = "", hint: str = "") -> InputError:
+        label = f"[{section}] {key}".strip() if section else key
+        return InputError(
+            f"{label}{found}", expected=expected, hint=hint, file=self.file, line=self.line_of(section, key)
+        )
+
+    def line_of(self, section: str, key: str) -> int | None:
+        """Line on which a key of a section stands, None if it is not found."""
+        inside = section == ""
+        for number, line in enumerate(self.lines, 1):
+            header = re.match(r"\s*\[\[?\s*([\w.]+)\s*\]", line)
+            if header:
+                inside = header[1] == section
+                if inside and not key:
+                    return number
+            elif inside and key and re.match(rf"\s*{re.escape(key)}\s*=", line):
+                return number
+        return None
+
+    def machine(self, table: dict[str, Any]) -> Machine:
+        sections = self.sections(table)
+        values = {name: self.section(name, content) for name, content in sections.items()}
+        top = values[""]
+        return Machine(
+            name=top["name"],
+            title=top.get("title", top["name"]),
+            source=top.get("source", ""),
+            frame_joints=self.joints("frame_joints", values),
+            platform_joints=self.joints("platform_joints", values),
+            reference_tool_length=m_from_mm(values["reference_tool"]["length_mm"]),
+            strut_law=self.strut_law(values["strut_law"]),
+            platform_bar_stiffness=values.get("platform", {}).get("bar_stiffness_N_per_m", INFINITY),
+            limits=self.limits(values),
+            default_origin=_pose(values.get("setup", {}).get("default_origin_mm", np.zeros(3))),
+            rapid_feed=m_per_s_from_mm_per_min(values.get("setup", {}).get("rapid_mm_per_min", 10000.0)),
+            origins={name: v["origin"] for name, v in values.items() if name and "origin" in v},
+            remarks={name: v["remark"] for name, v in values.items() if name and "remark" in v},
+            effects=self.entries(table, "effect"),
+            instruments=self.entries(table, "instrument"),
+        )
+
+    def sections(self, table: dict[str, Any]) -> dict[str, dict[str, Any]]:
+        """Split the file into the sections of the schema; unknown and missing ones are errors."""
+        found: dict[str, dict[str, Any]] = {"": {}}
+        for name, content in table.items():
+            if name in ("effect", "instrument"):
+                continue
+            if name == "limits" and isinstance(content, dict):
+                for sub, inner in content.items():
+                    if f"limits.{sub}" not in SECTIONS:
+                        raise self.unknown(f"limits.{sub}", list(SECTIONS))
+                    found[f"limits.{sub}"] = self.table("limits." + sub, inner)
+            elif name in SECTIONS:
+                found[name] = self.table(name, content)
+            elif isinstance(content, dict):
+                raise self.unknown(name, list(SECTIONS))
+            else:
+                found[""][name] = content
+        for name in SECTIONS:
+            if name not in found and name not in OPTIONAL_SECTIONS:
+                raise InputError(
+                    f"section [{name}] is missing",
+                    hint="`tps machine new FILE` writes a template with every section",
+                    file=self.file,
+                )
+        return found
+
+    def table(self, name: str, content: Any) -> dict[str, Any]:
+        if not isinstance(content, dict):
+            raise self.fail("", name, f" = {content!r}", expected=f"a section [{name}]")
+        return content
+
+    def unknown(self, name: str, known: list[str]) -> InputError:
+        sections = ", ".join(f"[{n}]" for n in known if n)
+        return InputError(
+            f"unknown section [{name}]",
+            expected=f"one of {sections}, [[effect]], [[instrument]]",
+            file=self.file,
+            line=self.line_of(name, ""),
+        )
+
+    def section(self, name: str, content: dict[str, Any]) -> dict[str, Any]:
+        keys = SECTIONS[name]
+        allowed = [*keys, *(("origin", "remark") if name else ())]
+        for key in content:
+            if key not in allowed:
+                raise self.fail(name, key, ": unknown key", expected=f"one of {', '.join(allowed)}")
+        for key, rule in keys.items():
+            if rule.required and key not in content:
+                raise self.fail(name, key, " is missing", expected=_describe(rule))
+        if name and name != "setup" and content.get("origin") not in ORIGINS:
+            raise self.fail(
+                name,
+                "origin",
+                f" = {content['origin']!r}" if "origin" in content else " is missing",
+                expected=f"one of {', '.join(ORIGINS)}",
+            )
+        return {k: self.value(name, k, v, keys[k]) if k in keys else str(v) for k, v in content.items()}
+
+    def value(self, section: str, key: str, raw: Any, rule: Key) -> Any:
+        shown = _shorten(raw)
+        if rule.text:
+            if not isinstance(raw, str) or not raw.strip():
+                raise self.fail(section, key, f" = {shown}", expected="a text that is not empty")
+            return raw
+        array = _as_array(raw)
+        shapes = [rule.shape, *([(rule.also_length,)] if rule.also_length else [])]
+        if array is None or array.shape not in shapes:
+            raise self.fail(section, key, f" = {shown}", expected=_describe(rule))
+        bad = np.isnan(array) | (array < rule.low) | (array > rule.high)
+        if rule.open_low:
+            bad |= array <= rule.low
+        if not rule.infinite:
+            bad |= np.isinf(array)
+        if bad.any():
+            worst = float(array[bad][0])
+            raise self.fail(section, key, f" = {worst:g}", expected=_describe(rule))
+        return float(array) if array.ndim == 0 else array
+
+    def joints(self, section: str, values: dict[str, dict[str, Any]]) -> FloatArray:
+        """(6, 3) m from whichever of the two forms is given."""
+        given = [key for key in ("mm", "cylindrical_mm_deg") if key in values[section]]
+        if len(given) != 1:
+            raise self.fail(
+                section,
+                "mm",
+                " and cylindrical_mm_deg are both given" if given else " is missing",
+                expected="one of mm (6 rows x, y, z) and cylindrical_mm_deg (6 rows radius, angle, height)",
+            )
+        rows = values[section][given[0]]
+        if given[0] == "cylindrical_mm_deg":
+            angle = rad_from_deg(rows[:, 1])
+            rows = np.column_stack([rows[:, 0] * np.cos(angle), rows[:, 0] * np.sin(angle), rows[:, 2]])
+        return m_from_mm(rows)
+
+    def strut_law(self, values: dict[str, Any]) -> StrutLaw:
+        lengths, stiffnesses = m_from_mm(values["length_mm"]), values["stiffness_N_per_um"] * 1e6
+        if lengths[0] == lengths[1]:
+            raise self.fail("strut_law", "length_mm", ": both lengths are equal", "two lengths apart")
+        return StrutLaw(float(lengths[0]), float(stiffnesses[0]), float(lengths[1]), float(stiffnesses[1]))
+
+    def limits(self, values: dict[str, dict[str, Any]]) -> Limits:
+        strut = values["limits.strut_length"]
+        if not strut["min_mm"] < strut["max_mm"]:
+            raise self.fail(
+                "limits.strut_length",
+                "max_mm",
+                f" = {strut['max_mm']:g}",
+                expected=f"more than min_mm = {strut['min_mm']:g}",
+            )
+        given: dict[str, Any] = {"strut_length": (m_from_mm(strut["min_mm"]), m_from_mm(strut["max_mm"]))}
+        box = values.get("limits.workspace")
+        if box:
+            if not (box["min_mm"] < box["max_mm"]).all():
+                raise self.fail(
+                    "limits.workspace",
+                    "max_mm",
+                    ": not above min_mm",
+                    expected="max_mm > min_mm in x, y and z",
+                )
+            given["workspace"] = m_from_mm(np.array([box["min_mm"], box["max_mm"]]))
+        angles = values.get("limits.joint_angle")
+        if angles:
+            given["frame_joint_angle"] = rad_from_deg(angles["frame_max_deg"])
+            given["platform_joint_angle"] = rad_from_deg(angles["platform_max_deg"])
+            given["neutral_pose"] = _pose(angles["neutral_pose_mm_deg"])
+        if "limits.singularity" in values:
+            given["singularity"] = values["limits.singularity"]["min_index"]
+        return Limits(**given)
+
+    def entries(self, table: dict[str, Any], kind: str) -> tuple[EffectEntry, ...]:
+        """`[[effect]]` and `[[instrument]]`: a name, the parameters in SI, the provenance if there is one.
+
+        What the parameters mean, and their bounds, is known to the effects themselves (the room above).
+        """
+        rows = table.get(kind, [])
+        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+            raise self.fail("", kind, f" is not a list of tables; write [[{kind}]]")
+        entries = []
+        for row in rows:
+            name = row.get("name")
+            if not isinstance(name, str) or not name:
+                raise self.fail(
+                    kind, "name", " is missing" if name is None else f" = {name!r}", "an effect's name"
+                )
+            provenance = row.get("provenance", {})
+            parameters = {k: v for k, v in row.items() if k not in ("name", "provenance")}
+            entries.append(EffectEntry(name, parameters, provenance if isinstance(provenance, dict) else {}))
+        return tuple(entries)
+
+
+def _as_array(raw: Any) -> FloatArray | None:
+    """A float array of TOML numbers and lists of them; None for anything else (booleans too)."""
+
+    def numeric(item: Any) -> bool:
+        if isinstance(item, list):
+            return all(numeric(part) for part in item)
+        return isinstance(item, int | float) and not isinstance(item, bool)
+
+    if not numeric(raw):
+        return None
+    try:
+        return np.array(raw, dtype=float)
+    except ValueError:  # rows of unequal length
+        return None
+
+
+def _describe(rule: Key) -> str:
+    if rule.text:
+        return "a text"
+    shape = {
+        (): "a number",
+        (2,): "2 numbers",
+        (3,): "3 numbers",
+        (6,): "6 numbers",
+        (6, 3): "6 rows of 3 numbers",
+    }[rule.shape]
+    if rule.also_length:
+        shape = f"{rule.shape[0]} or {rule.also_length} numbers"
+    unit = f" in {rule.unit}" if rule.unit else ""
+    low = f"above {rule.low:g}" if rule.open_low else f"at least {rule.low:g}"
+    high = "" if math.isinf(rule.high) else f", at most {rule.high:g}"
+    return f"{shape}{unit}, {low}{high}"
+
+
+def _shorten(raw: Any) -> str:
+    text = repr(raw)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _pose(values: Any) -> Pose:
+    """x, y, z in mm and optionally three angles in degrees, to SI."""
+    x, y, z, *angles = (float(v) for v in values)
+    a, b, c = angles or (0.0, 0.0, 0.0)
+    return (
+        m_from_mm(x),
+        m_from_mm(y),
+        m_from_mm(z),
+        rad_from_deg(a),
+        rad_from_deg(b),
+        rad_from_deg(c),
+    )

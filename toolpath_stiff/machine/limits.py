@@ -1,0 +1,146 @@
+"""Reach: how far each pose is from each limit of the machine, and which limit is nearest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from toolpath_stiff.machine.kinematics import Struts, joint_angles, singularity_index
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.units import deg_from_rad, mm_from_m
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One bound: its name, the bound, whether it is a lower one, the span that margins are counted in.
+
+    `span` is max - min where there are two bounds, else the distance of the bound from the value's natural
+    end (0 for angles, 1 for the singularity index).
+    """
+
+    name: str
+    bound: float
+    lower: bool
+    span: float
+    unit: str
+
+
+def machine_limits(machine: Machine) -> tuple[Limit, ...]:
+    """The finite limits of a machine, in the order of `limit_values`' columns."""
+    return tuple(limit for limit in _all_limits(machine) if np.isfinite(limit.bound))
+
+
+def _all_limits(machine: Machine) -> list[Limit]:
+    limits = machine.limits
+    low, high = limits.strut_length
+    span = high - low if np.isfinite(high) else max(low, 1.0)
+    found: list[Limit] = []
+    for i in range(6):
+        found += [
+            Limit(f"strut{i + 1} min length", low, True, span, "mm"),
+            Limit(f"strut{i + 1} max length", high, False, span, "mm"),
+        ]
+    for place, angle in (("frame", limits.frame_joint_angle), ("platform", limits.platform_joint_angle)):
+        found += [Limit(f"{place} joint{i + 1} angle", angle, False, angle, "deg") for i in range(6)]
+    lower, upper = limits.workspace
+    for axis, lo, hi in zip("xyz", lower, upper, strict=True):
+        both = hi - lo if np.isfinite(hi - lo) else 1.0
+        found += [
+            Limit(f"workspace {axis} min", float(lo), True, float(both), "mm"),
+            Limit(f"workspace {axis} max", float(hi), False, float(both), "mm"),
+        ]
+    found.append(Limit("singularity", limits.singularity, True, 1.0 - limits.singularity, ""))
+    return found
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How n poses stand to the limits.
+
+    Attributes
+    ----------
+    margin
+        (n,) smallest distance to a limit, as a share of that limit's span: 0 at the limit, negative beyond.
+    limit
+        (n,) index into `limits` of that limit.
+    value
+        (n,) the value that the limit bounds (SI).
+    limits
+        The machine's limits.
+    """
+
+    margin: FloatArray
+    limit: IntArray
+    value: FloatArray
+    limits: tuple[Limit, ...]
+
+    @property
+    def reachable(self) -> NDArray[np.bool_]:
+        """(n,) whether every limit is kept."""
+        return np.asarray(self.margin >= 0.0)
+
+    def describe(self, i: int) -> str:
+        """Which limit pose i meets or breaks, and by how much, in words and shop units."""
+        if not self.limits:
+            return "no limit"
+        limit = self.limits[int(self.limit[i])]
+        value, bound = _shown(limit, float(self.value[i])), _shown(limit, limit.bound)
+        if self.margin[i] >= 0.0:
+            return f"{limit.name} at {value}, limit {bound}"
+        beyond = _shown(limit, abs(float(self.value[i]) - limit.bound))
+        return f"{limit.name} needs {value}, limit {bound}, {beyond} beyond"
+
+
+def _shown(limit: Limit, value: float) -> str:
+    if limit.unit == "mm":
+        return f"{mm_from_m(value):.3f} mm"
+    if limit.unit == "deg":
+        return f"{deg_from_rad(value):.2f} deg"
+    return f"{value:.4f}"
+
+
+def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: ArrayLike | None = None) -> Reach:
+    """Margin to every limit at n poses.
+
+    Parameters
+    ----------
+    machine
+        The machine.
+    position
+        (n, 3) m, tool tip.
+    struts
+        The struts at these poses.
+    rotation
+        (n, 3, 3); None: vertical.
+    """
+    tip = np.atleast_2d(np.asarray(position, dtype=float))
+    frame, platform = joint_angles(machine, struts, rotation)
+    columns = np.concatenate(
+        [
+            np.repeat(struts.lengths, 2, axis=1),
+            frame,
+            platform,
+            np.repeat(tip, 2, axis=1),
+            singularity_index(machine, struts)[:, None],
+        ],
+        axis=1,
+    )
+    everything = _all_limits(machine)
+    finite = [i for i, limit in enumerate(everything) if np.isfinite(limit.bound)]
+    limits = tuple(everything[i] for i in finite)
+    if not limits:
+        nothing = np.full(len(tip), np.inf)
+        return Reach(nothing, np.zeros(len(tip), dtype=np.int64), nothing, ())
+    values = columns[:, finite]
+    bound = np.array([limit.bound for limit in limits])
+    sign = np.array([1.0 if limit.lower else -1.0 for limit in limits])
+    span = np.array([limit.span for limit in limits])
+    margins = sign * (values - bound) / span
+    worst = np.argmin(margins, axis=1)
+    rows = np.arange(len(tip))
+    return Reach(margins[rows, worst], worst, values[rows, worst], limits)
