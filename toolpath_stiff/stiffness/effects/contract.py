@@ -1,0 +1,201 @@
+"""The contract of a physical effect: a deviation from six linear struts on a rigid platform and frame.
+
+An effect sits on one link of the load path, declares its parameters, and implements what it adds:
+
+- `strut_compliance`: compliance in series with each strut;
+- `load_compliance`: a quadratic form in the loads, the six strut forces and the tip wrench. Frame vertices couple
+  two struts, platform bars all six, a spindle only the wrench;
+- `parallel_stiffness`: a stiffness parallel to the struts. The core then solves instead of using equilibrium alone;
+- `geometry`: another machine geometry;
+- `reading`: a change of the measured figure, not of the machine (an instrument).
+
+Everything is SI and batched over n poses. A method that an effect does not implement adds nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.kinematics import Struts
+from toolpath_stiff.machine.model import Machine
+
+FloatArray = NDArray[np.float64]
+
+LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
+DEFAULT_FORCE = 1000.0  # N, assumed wherever neither the user nor the data say at which load
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    Attributes
+    ----------
+    name
+        Physical name, without unit.
+    unit
+        Unit in files and reports.
+    si
+        SI value of one `unit`; effects compute in SI.
+    bounds
+        (low, high) in `unit`: what is physically possible. A value outside is an error.
+    typical
+        (low, high) in `unit`: what is usual. Ranks, never excludes.
+    source
+        Where `typical` comes from.
+    neutral
+        The value (in `unit`) at which the effect vanishes; may be inf.
+    meaning
+        One line for the user.
+    """
+
+    name: str
+    unit: str
+    si: float
+    bounds: tuple[float, float]
+    typical: tuple[float, float]
+    source: str
+    neutral: float = 0.0
+    meaning: str = ""
+
+    @property
+    def key(self) -> str:
+        """The key in machine files: the name with its unit, such as `bar_stiffness_N_per_m`."""
+        unit = self.unit.replace("/", "_per_").replace(" ", "_").replace("%", "percent")
+        return f"{self.name}_{unit}" if unit else self.name
+
+
+@dataclass(frozen=True)
+class LoadPath:
+    """What an effect sees of n poses under load. SI, base axes.
+
+    Attributes
+    ----------
+    machine
+        The machine, geometry effects included.
+    position, rotation
+        (n, 3) m, (n, 3, 3): the tool tip and the platform.
+    struts
+        Lengths, directions, arms of the struts.
+    tool_extension
+        (n,) m, how much longer the tool is than the machine's reference tool.
+    force
+        (n,) N, size of the load at the tip.
+    strut_forces
+        (n, 6) N, forces in the struts under that load, from equilibrium; None where no direction is given. Only
+        effects that depend on the load (`load_dependent`) may ask for it.
+    setup
+        (n,) names of the clamping arrangement, or None.
+    time, temperature
+        (n,) s since the indicator was zeroed, (n,) degrees C; or None.
+    """
+
+    machine: Machine
+    position: FloatArray
+    rotation: FloatArray
+    struts: Struts
+    tool_extension: FloatArray
+    force: FloatArray
+    strut_forces: FloatArray | None = None
+    setup: NDArray[np.str_] | None = None
+    time: FloatArray | None = None
+    temperature: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+class Effect:
+    """Base of all effects; subclass, fill in the attributes, implement what the effect adds.
+
+    Attributes
+    ----------
+    name
+        As in machine files and on the command line.
+    title, equation, source
+        For people: what it is, its formula, where the formula comes from.
+    link
+        Its place in the load path, one of `LINKS`.
+    parameters
+        What it is made of.
+    needs
+        Columns of the measurements without which it cannot be tested.
+    load_dependent
+        Whether the compliance depends on the size of the load; it is then the secant one.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    link: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    needs: ClassVar[tuple[str, ...]] = ()
+    load_dependent: ClassVar[bool] = False
+
+    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """(n, 6) m/N in series with each strut. `p`: parameter name -> SI value."""
+        return None
+
+    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """(n, 12, 12) symmetric Q; twice the stored energy is [f; w]^T Q [f; w].
+
+        f (6) are the strut forces with J^T f = w, w (6) the force and the moment about the tip, base axes. The
+        force of strut i on the platform is -f_i u_i, on the frame +f_i u_i.
+        """
+        return None
+
+    def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """(n, 6, 6) between platform and base about the tip, parallel to the struts, base axes."""
+        return None
+
+    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
+        """The machine with this effect's geometry."""
+        return machine
+
+    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
+        """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m."""
+        return stiffness
+
+    @property
+    def is_instrument(self) -> bool:
+        """Whether it changes readings only."""
+        return self.link == "instrument"
+
+
+def read_parameters(effect: Effect, given: Mapping[str, object], where: str) -> dict[str, float]:
+    """SI values of an effect's parameters from a machine file's keys.
+
+    Raises
+    ------
+    InputError
+        A key is unknown or missing, a value is not a number or out of bounds; `where` names the file.
+    """
+    by_key = {parameter.key: parameter for parameter in effect.parameters}
+    for key in given:
+        if key not in by_key:
+            raise InputError(
+                f"{where}: effect {effect.name}: unknown key {key}", expected=f"one of {', '.join(by_key)}"
+            )
+    values = {}
+    for key, parameter in by_key.items():
+        if key not in given:
+            raise InputError(
+                f"{where}: effect {effect.name}: {key} is missing",
+                expected=f"{parameter.bounds[0]:g} to {parameter.bounds[1]:g} {parameter.unit}".rstrip(),
+            )
+        value = given[key]
+        low, high = parameter.bounds
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise InputError(
+                f"{where}: effect {effect.name}: {key} = {value!r}",
+                expected=f"a number from {low:g} to {high:g} {parameter.unit}".rstrip(),
+            )
+        values[parameter.name] = float(value) * parameter.si
+    return values

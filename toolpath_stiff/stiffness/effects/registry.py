@@ -1,0 +1,146 @@
+"""Which effects there are: the packaged ones, installed ones (entry points), and those of a user's file."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.effects.contract import LINKS, Effect
+
+ENTRY_POINTS = "toolpath_stiff.effects"
+NOT_EFFECTS = ("contract", "registry")
+
+
+@cache
+def packaged_effects() -> dict[str, Effect]:
+    """Name -> effect of the files in this folder."""
+    folder = [str(Path(__file__).parent)]
+    names = sorted(m.name for m in pkgutil.iter_modules(folder) if m.name not in NOT_EFFECTS)
+    found: dict[str, Effect] = {}
+    for name in names:
+        found |= _effects_in(importlib.import_module(f"toolpath_stiff.stiffness.effects.{name}"), name)
+    return found
+
+
+@cache
+def installed_effects() -> tuple[dict[str, Effect], dict[str, str]]:
+    """Effects that other packages offer as entry points, and name -> reason of those that fail to load."""
+    from importlib.metadata import entry_points
+
+    found: dict[str, Effect] = {}
+    broken: dict[str, str] = {}
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            loaded = point.load()
+            effect = loaded() if isinstance(loaded, type) else loaded
+            _check(effect, point.name)
+            found[effect.name] = effect
+        except Exception as error:  # a broken plug-in is listed with its reason; the rest still works
+            broken[point.name] = f"{type(error).__name__}: {error}"
+    return found, broken
+
+
+def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
+    """Name -> effect: packaged, installed, and those of the given files, sorted along the load path.
+
+    Raises
+    ------
+    InputError
+        A file cannot be loaded, holds no effect, or names one that exists already.
+    """
+    known = packaged_effects() | installed_effects()[0]
+    for file in files:
+        for name, effect in effects_from_file(file).items():
+            if name in known:
+                raise InputError(f"effect {name} exists already", hint="give it another name", file=str(file))
+            known[name] = effect
+    return dict(sorted(known.items(), key=lambda item: (LINKS.index(item[1].link), item[0])))
+
+
+def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
+    """The effect of that name. Raises `InputError` with the nearest name if there is none."""
+    known = known_effects(files)
+    if name in known:
+        return known[name]
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else "`tps effects list` lists them"
+    raise InputError(f"unknown effect {name!r}", expected=f"one of {', '.join(known)}", hint=hint)
+
+
+def effects_from_file(file: str | Path) -> dict[str, Effect]:
+    """Name -> effect of every `Effect` subclass that a Python file defines. Raises `InputError`."""
+    path = Path(file)
+    if not path.is_file():
+        raise InputError(f"effects file {str(file)!r} does not exist", hint="`tps effects new FILE.py` writes one")
+    name = f"toolpath_stiff_user_effects_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError("not a Python file", expected="a name that ends in .py", file=str(file))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        line = getattr(error, "lineno", None) or _line_in(error, path)
+        raise InputError(f"{type(error).__name__}: {error}", file=str(file), line=line) from None
+    found = _effects_in(module, str(file))
+    if not found:
+        raise InputError(
+            "defines no effect",
+            expected="a class derived from toolpath_stiff.stiffness.effects.Effect",
+            file=str(file),
+        )
+    return found
+
+
+def _line_in(error: BaseException, path: Path) -> int | None:
+    """Line of `path` that raised `error`."""
+    trace, line = error.__traceback__, None
+    while trace is not None:
+        if Path(trace.tb_frame.f_code.co_filename) == path:
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
+    """Effects that a module itself defines."""
+    found = {}
+    for value in vars(module).values():
+        if isinstance(value, type) and issubclass(value, Effect) and value.__module__ == module.__name__:
+            effect = value()
+            _check(effect, where)
+            found[effect.name] = effect
+    return found
+
+
+def _check(effect: object, where: str) -> None:
+    """Refuse what is not a complete effect."""
+    if not isinstance(effect, Effect):
+        raise InputError(f"{where}: {effect!r} is not an effect")
+    label = type(effect).__name__
+    for attribute in ("name", "title", "link", "equation", "source", "parameters"):
+        if not hasattr(effect, attribute):
+            raise InputError(f"{where}: effect {label} has no `{attribute}`")
+    if effect.link not in LINKS:
+        raise InputError(f"{where}: effect {label}: link = {effect.link!r}", expected=f"one of {', '.join(LINKS)}")
+    names = [parameter.name for parameter in effect.parameters]
+    doubled = {name for name in names if names.count(name) > 1}
+    if doubled:
+        raise InputError(f"{where}: effect {label}: parameter {doubled.pop()} is declared twice")
+    for parameter in effect.parameters:
+        low, high = parameter.bounds
+        if not low < high or not low <= parameter.neutral <= high:
+            raise InputError(
+                f"{where}: effect {label}: parameter {parameter.name}: bounds {parameter.bounds}, "
+                f"neutral {parameter.neutral:g}",
+                expected="low < high with the neutral value between them",
+            )

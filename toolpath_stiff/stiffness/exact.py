@@ -1,0 +1,140 @@
+"""The exact route: strut forces from equilibrium, compliance from energy, effects along the load path.
+
+Six pin-jointed struts carry a wrench w at the tip in one way only: J^T f = w with the rows [u_i, r_i x u_i] of J.
+Castigliano's second theorem then gives the tip's displacement from the stored energy, half of [f; w]^T Q [f; w],
+where Q holds the struts' compliances on its diagonal and whatever the effects add.
+
+With a stiffness K parallel to the struts the load divides, J^T f + K x = w, and minimal complementary energy gives
+
+    Q_ff f + Q_fw w = J x,      (J^T Q_ff^-1 J + K) x = (1 + J^T Q_ff^-1 Q_fw) w,      y = x + Q_wf f + Q_ww w,
+
+with x the motion of the platform and y that of the tip. Both are exact, no iteration, no assembly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import LoadPath
+from toolpath_stiff.stiffness.model import StiffnessModel
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Links:
+    """What the load path is made of at n poses.
+
+    Attributes
+    ----------
+    strut
+        (n, 6) m/N, compliance of each strut.
+    loads
+        (n, 12, 12) quadratic form in the strut forces and the tip wrench, or None.
+    parallel
+        (n, 6, 6) stiffness parallel to the struts, or None.
+    """
+
+    strut: FloatArray
+    loads: FloatArray | None
+    parallel: FloatArray | None
+
+
+def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
+    """Add up what the strut law and the effects contribute at n poses."""
+    strut = 1.0 / path.machine.strut_law.stiffness(path.struts.lengths)
+    loads: FloatArray | None = None
+    parallel: FloatArray | None = None
+    for active in model.effects:
+        effect, values = active.effect, active.values
+        if effect.load_dependent and path.strut_forces is None:
+            continue
+        series = effect.strut_compliance(path, values)
+        form = effect.load_compliance(path, values)
+        beside = effect.parallel_stiffness(path, values)
+        strut = strut if series is None else strut + series
+        loads = form if loads is None else loads if form is None else loads + form
+        parallel = beside if parallel is None else parallel if beside is None else parallel + beside
+    return Links(strut, loads, parallel)
+
+
+def respond(path: LoadPath, links: Links, wrenches: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Tip twists and strut forces under wrenches at the tip.
+
+    Parameters
+    ----------
+    path, links
+        n poses and what they are made of.
+    wrenches
+        (n, 6, m) N and N m about the tip, base axes.
+
+    Returns
+    -------
+    twists, forces
+        (n, 6, m) m and rad; (n, 6, m) N. nan where the machine is singular.
+    """
+    jacobian = path.struts.jacobian
+    transposed = np.swapaxes(jacobian, 1, 2)
+    if links.parallel is None:
+        forces = _solve(transposed, wrenches)
+        stretch = links.strut[..., None] * forces
+        if links.loads is None:
+            return _solve(jacobian, stretch), forces
+        form = links.loads
+        stretch = stretch + form[:, :6, :6] @ forces + form[:, :6, 6:] @ wrenches
+        twists = _solve(jacobian, stretch)
+        return twists + form[:, 6:, :6] @ forces + form[:, 6:, 6:] @ wrenches, forces
+    form = np.zeros((len(path), 12, 12)) if links.loads is None else links.loads
+    struts = form[:, :6, :6] + links.strut[..., None] * np.eye(6)
+    stiffened = _solve(struts, np.concatenate([jacobian, form[:, :6, 6:] @ wrenches], axis=-1))
+    system = transposed @ stiffened[..., :6] + links.parallel
+    motion = _solve(system, wrenches + transposed @ stiffened[..., 6:])
+    forces = stiffened[..., :6] @ motion - stiffened[..., 6:]
+    return motion + form[:, 6:, :6] @ forces + form[:, 6:, 6:] @ wrenches, forces
+
+
+def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve per pose with pivoting; nan where a matrix is singular instead of giving up on all of them."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError:
+        solution = np.full(np.broadcast_shapes(matrix.shape[:-2], right.shape[:-2]) + right.shape[-2:], np.nan)
+        for i, (one, side) in enumerate(zip(matrix, right, strict=True)):
+            if np.linalg.matrix_rank(one) == len(one):
+                solution[i] = np.linalg.solve(one, side)
+        return solution
+
+
+def wrench_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
+    """(n, 6, 6) compliance of the tip for forces and moments; load-dependent effects are not in it."""
+    wrenches = np.broadcast_to(np.eye(6), (len(path), 6, 6))
+    twists, _ = respond(path, assemble_links(model, path), wrenches)
+    return np.asarray(0.5 * (twists + np.swapaxes(twists, 1, 2)))
+
+
+def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
+    """(n, 3, 3) m/N, displacements of the tip under forces at it; load-dependent effects are not in it."""
+    wrenches = np.zeros((len(path), 6, 3))
+    wrenches[:, :3] = np.eye(3)
+    twists, _ = respond(path, assemble_links(model, path), wrenches)
+    compliance = twists[:, :3]
+    return np.asarray(0.5 * (compliance + np.swapaxes(compliance, 1, 2)))
+
+
+def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
+    """(n,) m/N, displacement along unit vectors (n, 3) per force along them, load-dependent effects included.
+
+    Those see the strut forces that the load would cause without them. Equilibrium alone fixes these forces, so that
+    this is exact unless a stiffness parallel to the struts shares the load.
+    """
+    wrenches = np.zeros((len(path), 6, 1))
+    wrenches[:, :3, 0] = direction
+    links = assemble_links(model, path)
+    twists, forces = respond(path, links, wrenches)
+    if model.load_dependent:
+        loaded = replace(path, strut_forces=forces[..., 0] * path.force[:, None])
+        twists, _ = respond(loaded, assemble_links(model, loaded), wrenches)
+    return np.asarray(np.einsum("ni,ni->n", twists[:, :3, 0], direction))

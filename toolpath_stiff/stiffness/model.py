@@ -1,0 +1,150 @@
+"""A stiffness model: a machine with the physical effects that it carries, ready to be evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.kinematics import solve_struts
+from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath, read_parameters
+from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
+from toolpath_stiff.stiffness.effects.registry import find_effect
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ActiveEffect:
+    """An effect with its parameters, name -> SI value."""
+
+    effect: Effect
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class StiffnessModel:
+    """What the stiffness is computed from.
+
+    Attributes
+    ----------
+    machine
+        The machine with its geometry effects applied; kinematics and stiffness use this one.
+    effects
+        Effects that act on the machine, platform bars included.
+    instruments
+        Effects that act on readings; only comparisons with measurements use them.
+    """
+
+    machine: Machine
+    effects: tuple[ActiveEffect, ...] = ()
+    instruments: tuple[ActiveEffect, ...] = ()
+
+    @property
+    def load_dependent(self) -> bool:
+        """Whether the stiffness depends on the size of the load (it is then the secant one)."""
+        return any(active.effect.load_dependent for active in self.effects)
+
+    @property
+    def platform_bars(self) -> float:
+        """Stiffness of the platform bars in N/m, inf if rigid; only meaningful if `is_plain`."""
+        for active in self.effects:
+            if isinstance(active.effect, PlatformFlexibility):
+                return active.values["bar_stiffness"]
+        return float(np.inf)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether linear struts and platform bars are all there is, so that the fast kernels apply."""
+        return all(type(active.effect) is PlatformFlexibility for active in self.effects)
+
+
+def build_model(
+    machine: Machine, effect_files: Iterable[str | Path] = (), extra: Iterable[ActiveEffect] = ()
+) -> StiffnessModel:
+    """The model of a machine with the effects of its file and any extra ones.
+
+    Parameters
+    ----------
+    machine
+        As loaded.
+    effect_files
+        Python files with a user's own effects, which the machine's entries may name.
+    extra
+        Further effects, after those of the machine.
+
+    Raises
+    ------
+    InputError
+        An entry names an unknown effect or has wrong parameters, or an effect appears twice.
+    """
+    files = tuple(effect_files)
+    acting = [_activate(machine, entry, files, instrument=False) for entry in machine.effects]
+    reading = [_activate(machine, entry, files, instrument=True) for entry in machine.instruments]
+    if np.isfinite(machine.platform_bar_stiffness):
+        bars = ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness})
+        acting.insert(0, bars)
+    for active in extra:
+        (reading if active.effect.is_instrument else acting).append(active)
+    names = [active.effect.name for active in (*acting, *reading)]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"machine {machine.name}: effect {name} is given twice",
+                hint="keep one of them (finite platform bars count as platform_flexibility)",
+            )
+    for active in acting:
+        machine = active.effect.geometry(machine, active.values)
+    return StiffnessModel(machine, tuple(acting), tuple(reading))
+
+
+def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
+    effect = find_effect(entry.name, files)
+    kind = "instrument" if instrument else "effect"
+    if effect.is_instrument != instrument:
+        other = "effect" if instrument else "instrument"
+        raise InputError(
+            f"machine {machine.name}: [[{kind}]] {entry.name} acts on "
+            f"{'readings' if effect.is_instrument else 'the machine'}",
+            hint=f"write it as [[{other}]]",
+        )
+    where = f"machine {machine.name}, [[{kind}]]"
+    return ActiveEffect(effect, read_parameters(effect, entry.parameters, where))
+
+
+def load_path(
+    model: StiffnessModel,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    tool_length: ArrayLike = np.nan,
+    force: ArrayLike = DEFAULT_FORCE,
+    setup: NDArray[np.str_] | None = None,
+    time: FloatArray | None = None,
+    temperature: FloatArray | None = None,
+) -> LoadPath:
+    """What the effects see at n poses; see `LoadPath` for shapes and units.
+
+    `rotation` None is a vertical spindle; `tool_length` nan the reference tool (m, scalar or (n,)).
+    """
+    tip = np.atleast_2d(np.asarray(position, dtype=float))
+    n = len(tip)
+    length = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
+    one_length = length[0] if n and (np.isnan(length).all() or np.ptp(length) == 0.0) else length
+    struts = solve_struts(model.machine, tip, rotation, one_length)
+    turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
+    return LoadPath(
+        machine=model.machine,
+        position=tip,
+        rotation=np.broadcast_to(turn, (n, 3, 3)),
+        struts=struts,
+        tool_extension=np.where(np.isnan(length), 0.0, length - model.machine.reference_tool_length),
+        force=np.broadcast_to(np.asarray(force, dtype=float), (n,)),
+        setup=setup,
+        time=time,
+        temperature=temperature,
+    )
