@@ -1,0 +1,160 @@
+"""Directions of the load at the tool tip: one option, `--load`, everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+LOADS = ("tangential", "axial", "normal", "softest", "radial", "x", "y", "z")
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+RULES = {
+    "tangential": "along the motion of the tip; a corner is evaluated once for each of its two moves",
+    "axial": "along the tool axis",
+    "normal": "across the motion and the tool axis (sideways); a move along the tool axis takes the softest "
+    "direction across it",
+    "softest": "the direction in which the tip gives way most",
+    "radial": "in the plane z = const towards the machine axis; on the axis itself along X",
+    "x": "along X of the machine",
+    "y": "along Y of the machine",
+    "z": "along Z of the machine",
+    "fixed": "along a fixed direction of the machine",
+}
+# Below this sine of the angle between motion and tool axis (0.06 degrees) "sideways" has no meaning.
+ALONG_AXIS = 1e-3
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load direction: one of `LOADS`, or "fixed" with a unit vector in machine axes."""
+
+    kind: str = "tangential"
+    vector: tuple[float, float, float] | None = None
+
+    def __str__(self) -> str:
+        return self.kind if self.vector is None else ",".join(f"{v:g}" for v in self.vector)
+
+
+def parse_load(text: str) -> Load:
+    """Read `--load`: a name of `LOADS` or `DX,DY,DZ` (any length but zero). Raises `InputError`."""
+    name = text.strip().lower()
+    if name in LOADS:
+        return Load(name)
+    parts = name.split(",")
+    try:
+        vector = np.array([float(part) for part in parts])
+    except ValueError:
+        vector = np.array([])
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not np.abs(vector).max() > 0.0:
+        raise InputError(
+            f"load {text!r} is not a direction",
+            expected=f"one of {', '.join(LOADS)}, or DX,DY,DZ such as 1,0,-0.5",
+        )
+    vector = vector / np.abs(vector).max()
+    x, y, z = (float(v) for v in vector / np.linalg.norm(vector))
+    return Load("fixed", (x, y, z))
+
+
+def load_directions(
+    load: Load,
+    compliance: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray | None,
+    tangent: FloatArray,
+) -> tuple[FloatArray, BoolArray]:
+    """Unit vectors of the load at n poses, and where the softest direction had to stand in.
+
+    Parameters
+    ----------
+    load
+        Which load.
+    compliance
+        (n, 3, 3) m/N of the tip.
+    position
+        (n, 3) m.
+    rotation
+        (n, 3, 3); None: vertical spindle.
+    tangent
+        (n, 3) unit vectors of the motion, 0 where the tip does not move.
+
+    Returns
+    -------
+    directions, substituted
+        (n, 3) and (n,): `substituted` where the asked direction does not exist.
+    """
+    n = len(position)
+    nowhere = np.zeros(n, dtype=bool)
+    if load.vector is not None:
+        return np.broadcast_to(np.array(load.vector), (n, 3)), nowhere
+    if load.kind in AXES:
+        return np.broadcast_to(np.array(AXES[load.kind]), (n, 3)), nowhere
+    if load.kind == "softest":
+        return softest_directions(compliance), nowhere
+    if load.kind == "radial":
+        return _radial(position), nowhere
+    axis = np.broadcast_to(np.array(AXES["z"]), (n, 3)) if rotation is None else rotation[:, :, 2]
+    if load.kind == "axial":
+        return axis, nowhere
+    still = ~np.any(tangent != 0.0, axis=1)
+    if load.kind == "normal":
+        return _normal(compliance, axis, tangent, still)
+    directions = tangent.copy()
+    if still.any():
+        directions[still] = softest_directions(compliance[still])
+    return directions, still
+
+
+def _radial(position: FloatArray) -> FloatArray:
+    radius = np.hypot(position[:, 0], position[:, 1])
+    on_axis = radius < 1e-9
+    safe = np.where(on_axis, 1.0, radius)
+    directions = np.zeros_like(position)
+    directions[:, 0] = np.where(on_axis, 1.0, -position[:, 0] / safe)
+    directions[:, 1] = np.where(on_axis, 0.0, -position[:, 1] / safe)
+    return directions
+
+
+def _normal(
+    compliance: FloatArray, axis: FloatArray, tangent: FloatArray, still: BoolArray
+) -> tuple[FloatArray, BoolArray]:
+    sideways = np.cross(axis, tangent)
+    sine = np.linalg.norm(sideways, axis=1)
+    plunge = ~still & (sine < ALONG_AXIS)
+    directions = sideways / np.where(sine > 0.0, sine, 1.0)[:, None]
+    if plunge.any():
+        directions[plunge] = _softest_across(compliance[plunge], axis[plunge])
+    if still.any():
+        directions[still] = softest_directions(compliance[still])
+    return directions, still | plunge
+
+
+def _softest_across(compliance: FloatArray, axis: FloatArray) -> FloatArray:
+    """Softest direction in the plane across `axis`."""
+    across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
+    return softest_directions(across @ compliance @ across)
+
+
+def softest_directions(compliance: FloatArray) -> FloatArray:
+    """(n, 3) unit vectors of the largest eigenvalue of C; the sign makes the largest component positive."""
+    return _principal(compliance, -1)
+
+
+def stiffest_directions(compliance: FloatArray) -> FloatArray:
+    """(n, 3) unit vectors of the smallest eigenvalue of C, signed as `softest_directions`."""
+    return _principal(compliance, 0)
+
+
+def _principal(compliance: FloatArray, which: int) -> FloatArray:
+    finite = np.isfinite(compliance).all(axis=(1, 2))
+    directions = np.full((len(compliance), 3), np.nan)
+    vectors = np.linalg.eigh(compliance[finite])[1][:, :, which]
+    rows = np.arange(len(vectors))
+    largest = vectors[rows, np.abs(vectors).argmax(axis=1)]
+    directions[finite] = vectors * np.where(largest < 0.0, -1.0, 1.0)[:, None]
+    return directions

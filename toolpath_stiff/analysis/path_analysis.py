@@ -1,0 +1,281 @@
+"""A program on a machine: sample its path, evaluate every sample, say what was assumed and what is out of reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis.evaluate import PoseStiffness, Progress, evaluate
+from toolpath_stiff.analysis.loads import RULES, Load, parse_load
+from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.machine.model import Machine, Pose
+from toolpath_stiff.nc.moves import Moves, Program
+from toolpath_stiff.path import place, sample_moves
+from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+DEFAULT_STEP = 1e-3  # m; 1 mm resolves any feature that a mill can cut, and costs microseconds
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """A program evaluated on a machine.
+
+    Attributes
+    ----------
+    program, model
+        What was analysed, on what.
+    origin, origin_source
+        Where program zero sits (m, rad) and who said so: "option", "program" or "default".
+    load, force, step
+        Direction of the load; its size in N; distance of the samples in m.
+    moves, samples
+        The path in machine coordinates.
+    at
+        Stiffness, struts, reach at every sample.
+    warnings
+        What deserves a look, sentences for people, the program's own included.
+    """
+
+    program: Program
+    model: StiffnessModel
+    origin: Pose
+    origin_source: str
+    load: Load
+    force: float
+    step: float
+    moves: Moves
+    samples: Samples
+    at: PoseStiffness
+    warnings: tuple[str, ...]
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, geometry effects included."""
+        return self.model.machine
+
+    @property
+    def counted(self) -> BoolArray:
+        """(n,) samples in the statistics: cutting, reachable, with a load in the asked direction."""
+        return np.asarray(self.samples.cutting & self.at.reachable & (self.samples.weight > 0.0))
+
+    @property
+    def deflection(self) -> FloatArray:
+        """(n,) m, the tip's deflection along the load under `force`."""
+        return np.asarray(self.force / self.at.stiffness)
+
+    @property
+    def out_of_reach(self) -> BoolArray:
+        """(n,) cutting samples that the machine cannot reach."""
+        return np.asarray(self.samples.cutting & ~self.at.reachable)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The samples as a pandas DataFrame, columns as in `samples.csv` (mm, degrees, N/mm)."""
+        from toolpath_stiff.analysis.tables import samples_frame
+
+        return samples_frame(self)
+
+    def summary(self) -> dict[str, object]:
+        """The figures of `summary.json`."""
+        from toolpath_stiff.analysis.statistics import summarise
+
+        return summarise(self)
+
+
+def analyse(
+    machine: Machine | StiffnessModel,
+    program: Program,
+    *,
+    origin: Pose | None = None,
+    load: Load | str = "tangential",
+    step: float = DEFAULT_STEP,
+    force: float = DEFAULT_FORCE,
+    partial: bool = False,
+    progress: Progress | None = None,
+) -> Analysis:
+    """Stiffness along the path of a program.
+
+    Parameters
+    ----------
+    machine
+        A machine, or a model that carries further effects.
+    program
+        As read by `read_program`.
+    origin
+        Where program zero sits, m and rad; unless given, where the program says, else the machine's default.
+    load
+        Direction of the load, see `loads.LOADS`.
+    step
+        Largest distance of two samples, m.
+    force
+        Size of the load, N: for deflections, and for effects that depend on it.
+    partial
+        Keep the reachable samples of a program that leaves the workspace.
+    progress
+        Called with (samples done, samples in all).
+
+    Raises
+    ------
+    UnreachableError
+        A cutting sample is out of reach and `partial` is not set.
+    InputError
+        The program cuts nothing, or uses machine coordinates and was read for another origin.
+    """
+    model = machine if isinstance(machine, StiffnessModel) else build_model(machine)
+    direction = parse_load(load) if isinstance(load, str) else load
+    place_at, source = _effective_origin(model.machine, program, origin)
+    moves = place(program.moves, place_at)
+    samples = sample_moves(moves, step=step, rapid_feed=model.machine.rapid_feed, origin=place_at)
+    at = evaluate(
+        model,
+        samples.position,
+        samples.abc,
+        samples.tangent,
+        samples.tool_length,
+        direction,
+        force,
+        progress,
+    )
+    analysis = Analysis(
+        program=program,
+        model=model,
+        origin=place_at,
+        origin_source=source,
+        load=direction,
+        force=force,
+        step=step,
+        moves=moves,
+        samples=samples,
+        at=at,
+        warnings=(*program.warnings, *_warnings(samples, at)),
+    )
+    _check_reach(analysis, partial)
+    return analysis
+
+
+def _effective_origin(machine: Machine, program: Program, origin: Pose | None) -> tuple[Pose, str]:
+    """The option, else the program's own word, else the machine's default."""
+    if origin is not None:
+        chosen, source = origin, "option"
+    elif program.origin_source == "default":
+        chosen, source = machine.default_origin, "default"
+    else:
+        chosen, source = program.origin, program.origin_source
+    if program.moves.from_machine.any() and not np.allclose(chosen, program.origin, rtol=0.0, atol=1e-12):
+        raise InputError(
+            "moves in machine coordinates (G53, G28, G30) depend on where program zero sits",
+            hint=f"read the program with origin={tuple(round(v, 9) for v in chosen)}",
+            file=program.name,
+        )
+    return chosen, source
+
+
+def _warnings(samples: Samples, at: PoseStiffness) -> list[str]:
+    """What the evaluation itself has to say."""
+    found = []
+    rapids = ~samples.cutting & ~at.reachable
+    if rapids.any():
+        first = int(np.argmax(rapids))
+        found.append(
+            f"line {samples.line[first]}: {int(rapids.sum())} samples of rapid moves are out of reach, first "
+            f"{describe_pose(samples, first)}: {at.reach.describe(first)}"
+        )
+    swapped = samples.cutting & at.substituted
+    if swapped.any():
+        lines = np.unique(samples.line[swapped])
+        found.append(
+            f"{_lines(lines)}: the load direction does not exist there (rotary axes alone, or a move along "
+            "the tool axis); the softest direction stands in"
+        )
+    return found
+
+
+def _lines(lines: NDArray[np.int64], most: int = 5) -> str:
+    """Line numbers in words: "lines 3, 4, 9 and 12 more"."""
+    shown = ", ".join(str(line) for line in lines[:most])
+    more = f" and {len(lines) - most} more" if len(lines) > most else ""
+    return f"line{'s' if len(lines) > 1 else ''} {shown}{more}"
+
+
+def describe_pose(samples: Samples, i: int) -> str:
+    """The pose of sample i as a control would show it, machine coordinates."""
+    x, y, z = (mm_from_m(float(v)) for v in samples.position[i])
+    a, b, c = (deg_from_rad(float(v)) for v in samples.abc[i])
+    text = f"at X{x:.3f} Y{y:.3f} Z{z:.3f}"
+    return text + (f" A{a:.3f} B{b:.3f} C{c:.3f}" if a or b or c else "") + " (machine coordinates, mm)"
+
+
+def _check_reach(analysis: Analysis, partial: bool) -> None:
+    """Refuse a program that cuts nothing, or, unless `partial`, whose cuts leave the machine's reach."""
+    samples, at = analysis.samples, analysis.at
+    if not samples.cutting.any():
+        raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=analysis.program.name)
+    bad = analysis.out_of_reach
+    if not bad.any() or (partial and not bad[samples.cutting].all()):
+        return
+    first = int(np.argmax(bad))
+    hint = "place the work elsewhere with --origin, or keep the reachable part with --partial"
+    if partial:
+        hint = "place the work elsewhere with --origin"
+    raise UnreachableError(
+        f"{int(bad.sum())} of {int(samples.cutting.sum())} cutting samples are out of reach, first "
+        f"{describe_pose(samples, first)}: {at.reach.describe(first)}",
+        hint=hint,
+        file=analysis.program.name,
+        line=int(samples.line[first]),
+    )
+
+
+def assumptions(analysis: Analysis) -> list[str]:
+    """Everything that was assumed or recovered rather than published or given, sentences for people."""
+    machine = analysis.machine
+    found = list(analysis.program.assumptions)
+    x, y, z, *angles = analysis.origin
+    where = f"X{mm_from_m(x):g} Y{mm_from_m(y):g} Z{mm_from_m(z):g}" + (
+        " A{:g} B{:g} C{:g}".format(*(deg_from_rad(v) for v in angles)) if any(angles) else ""
+    )
+    if analysis.origin_source == "default":
+        found.append(f"program zero (G54) sits at {where} in machine coordinates: the machine's default (--origin)")
+    for quantity, origin in machine.origins.items():
+        if origin != "published":
+            remark = machine.remarks.get(quantity)
+            found.append(f"machine {machine.name}: {quantity} {origin}" + (f": {remark}" if remark else ""))
+    feed = mm_per_min_from_m_per_s(machine.rapid_feed)
+    found.append(f"rapid moves take {feed:g} mm/min (time only)")
+    found.append(f"load {analysis.load}: {RULES[analysis.load.kind]}")
+    secant = "; the stiffness is the secant one at this load" if analysis.model.load_dependent else ""
+    found.append(f"a force of {analysis.force:g} N for deflections{secant}")
+    if analysis.model.instruments:
+        names = ", ".join(active.effect.name for active in analysis.model.instruments)
+        found.append(f"instruments set aside (they act on readings, not on the machine): {names}")
+    law = machine.strut_law
+    found.append(
+        f"the strut law is extrapolated outside {mm_from_m(min(law.length_1, law.length_2)):.1f} to "
+        f"{mm_from_m(max(law.length_1, law.length_2)):.1f} mm of strut length"
+    )
+    if not analysis.model.effects:
+        found.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
+    return found
+
+
+def required_stiffness_missed(analysis: Analysis, required: float) -> list[tuple[int, float]]:
+    """(line, smallest stiffness in N/mm) of cutting moves below `required` N/m, weakest first."""
+    counted = analysis.counted
+    line, stiffness = analysis.samples.line[counted], analysis.at.stiffness[counted]
+    lines, index = np.unique(line, return_inverse=True)
+    lowest = np.full(len(lines), np.inf)
+    np.minimum.at(lowest, index, stiffness)
+    below = np.flatnonzero(lowest < required)
+    order = below[np.argsort(lowest[below], kind="stable")]
+    return [(int(lines[i]), n_per_mm_from_n_per_m(float(lowest[i]))) for i in order]

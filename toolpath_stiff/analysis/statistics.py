@@ -1,0 +1,153 @@
+"""Figures of a path: length-weighted mean, extremes, the weakest places, shares; per tool and in all."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis.path_analysis import Analysis, assumptions
+from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.path.samples import Samples
+
+BoolArray = NDArray[np.bool_]
+
+
+def stiffness_figures(analysis: Analysis, rows: BoolArray) -> dict[str, Any]:
+    """Mean (by length), min, max, range in N/mm and mean deflection in um of some counted samples.
+
+    None for each where there are no such samples.
+    """
+    weight, stiffness = analysis.samples.weight[rows], analysis.at.stiffness[rows]
+    if not len(stiffness):
+        keys = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
+        return dict.fromkeys(keys)
+    low, high = float(stiffness.min()), float(stiffness.max())
+    mean = float(np.average(stiffness, weights=weight))
+    deflection = float(np.average(analysis.deflection[rows], weights=weight))
+    return {
+        "mean_N_per_mm": n_per_mm_from_n_per_m(mean),
+        "min_N_per_mm": n_per_mm_from_n_per_m(low),
+        "max_N_per_mm": n_per_mm_from_n_per_m(high),
+        "range_N_per_mm": n_per_mm_from_n_per_m(high - low),
+        "mean_deflection_um": um_from_m(deflection),
+    }
+
+
+def path_length(samples: Samples, rapid: bool) -> float:
+    """Length in m of the rapid, or of the cutting moves."""
+    if not len(samples):
+        return 0.0
+    step = np.diff(samples.s, prepend=samples.s[0])
+    step[np.diff(samples.move, prepend=samples.move[0]) != 0] = 0.0  # a move's first sample repeats the last end
+    return float(step[(samples.motion == RAPID) == rapid].sum())
+
+
+def weakest_places(analysis: Analysis, count: int = 3) -> list[int]:
+    """Rows of the weakest counted samples, one a place: apart by at least a twentieth of the path, other lines."""
+    rows = np.flatnonzero(analysis.counted)
+    if not len(rows):
+        return []
+    s, line = analysis.samples.s, analysis.samples.line
+    apart = (s[rows[-1]] - s[rows[0]]) / 20.0
+    order = rows[np.argsort(analysis.at.stiffness[rows], kind="stable")]
+    chosen: list[int] = []
+    while len(order) and len(chosen) < count:
+        best = int(order[0])
+        chosen.append(best)
+        order = order[(np.abs(s[order] - s[best]) >= apart) & (line[order] != line[best])]
+    return chosen
+
+
+def describe_sample(analysis: Analysis, row: int) -> dict[str, Any]:
+    """Line, source text, position and stiffness of one sample."""
+    samples = analysis.samples
+    line = int(samples.line[row])
+    x, y, z = (mm_from_m(float(v)) for v in samples.position[row])
+    a, b, c = (deg_from_rad(float(v)) for v in samples.abc[row])
+    source = analysis.program.source
+    return {
+        "line": line,
+        "text": source[line - 1].strip() if 0 < line <= len(source) else "",
+        "s_mm": mm_from_m(float(samples.s[row])),
+        "x_mm": x,
+        "y_mm": y,
+        "z_mm": z,
+        "a_deg": a,
+        "b_deg": b,
+        "c_deg": c,
+        "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(analysis.at.stiffness[row])),
+    }
+
+
+def summarise(analysis: Analysis) -> dict[str, Any]:
+    """The figures of `summary.json`, in the shop's units."""
+    from toolpath_stiff import __version__
+
+    samples, counted = analysis.samples, analysis.counted
+    places = weakest_places(analysis)
+    cutting = samples.cutting & analysis.at.reachable
+    x, y, z, a, b, c = analysis.origin
+    nearest = int(np.argmin(np.where(cutting, analysis.at.margin, np.inf)))
+    return {
+        "program": analysis.program.name,
+        "machine": analysis.machine.name,
+        "load": str(analysis.load),
+        "force_N": analysis.force,
+        "step_mm": mm_from_m(analysis.step),
+        "origin_mm_deg": [mm_from_m(x), mm_from_m(y), mm_from_m(z), *(deg_from_rad(v) for v in (a, b, c))],
+        "origin_source": analysis.origin_source,
+        "samples": len(samples),
+        "cutting_length_mm": mm_from_m(path_length(samples, rapid=False)),
+        "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
+        "time_s": float(samples.t[-1]) if len(samples) else 0.0,
+        **stiffness_figures(analysis, counted),
+        "weakest": describe_sample(analysis, places[0]) if places else None,
+        "weakest_places": [describe_sample(analysis, row) for row in places],
+        "per_tool": per_tool(analysis),
+        "min_margin": float(analysis.at.margin[nearest]),
+        "min_margin_limit": analysis.at.reach.describe(nearest),
+        "min_margin_line": int(samples.line[nearest]),
+        "out_of_reach_samples": int(analysis.out_of_reach.sum()),
+        "extrapolated_share": share(analysis.at.extrapolated, cutting),
+        "effects": [active.effect.name for active in analysis.model.effects],
+        "unsupported": [
+            {"line": u.line, "column": u.column, "word": u.word, "reason": u.reason}
+            for u in analysis.program.unsupported
+        ],
+        "assumptions": assumptions(analysis),
+        "warnings": list(analysis.warnings),
+        "version": __version__,
+    }
+
+
+def per_tool(analysis: Analysis) -> list[dict[str, Any]]:
+    """The figures of each tool, in order of use."""
+    samples, counted = analysis.samples, analysis.counted
+    remarks = {tool.number: tool.remark for tool in analysis.program.tools}
+    length = np.nan_to_num(samples.tool_length, nan=-1.0)  # nan is not equal to itself; -1 stands for it here
+    keys = np.stack([samples.tool.astype(float), length], axis=1)[counted]
+    _, first = np.unique(keys, axis=0, return_index=True)
+    rows = []
+    for tool, tool_length in keys[np.sort(first)]:
+        mine = counted & (samples.tool == tool) & (length == tool_length)
+        rows.append(
+            {
+                "tool": int(tool),
+                "remark": remarks.get(int(tool), ""),
+                "length_mm": None if tool_length < 0.0 else mm_from_m(float(tool_length)),
+                "cutting_length_mm": mm_from_m(float(samples.weight[mine].sum())),
+                **stiffness_figures(analysis, mine),
+            }
+        )
+    return rows
+
+
+def share(condition: BoolArray, among: BoolArray) -> float:
+    """Share of the rows of `among` for which `condition` holds; 0 of none."""
+    total = int(among.sum())
+    return float((condition & among).sum()) / total if total else 0.0
