@@ -1,0 +1,155 @@
+"""Arguments that several commands share, and the types that read them: shop units in, SI out."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from toolpath_stiff.units import m_from_mm, rad_from_deg
+
+if TYPE_CHECKING:
+    from toolpath_stiff.machine import Machine
+    from toolpath_stiff.nc import Program
+
+Pose = tuple[float, float, float, float, float, float]
+
+FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
+LOADS_HELP = "tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ"
+
+
+def finite_number(text: str) -> float:
+    """A number that is neither infinite nor nan."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+    return value
+
+
+def positive_number(unit: str, highest: float) -> Callable[[str], float]:
+    """A type for numbers above 0 and up to `highest`, in `unit`."""
+
+    def read(text: str) -> float:
+        value = finite_number(text)
+        if not 0.0 < value <= highest:
+            raise argparse.ArgumentTypeError(f"{text} {unit}: expected more than 0 and at most {highest:g} {unit}")
+        return value
+
+    return read
+
+
+def length_m(highest_mm: float) -> Callable[[str], float]:
+    """A type for positive lengths in mm, to m."""
+    read_mm = positive_number("mm", highest_mm)
+
+    def read(text: str) -> float:
+        return m_from_mm(read_mm(text))
+
+    return read
+
+
+def pose_argument(text: str) -> Pose:
+    """`X,Y,Z` or `X,Y,Z,A,B,C` in mm and degrees, to SI."""
+    parts = text.split(",")
+    if len(parts) not in (3, 6):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected X,Y,Z or X,Y,Z,A,B,C in mm and degrees")
+    x, y, z, *angles = (finite_number(part) for part in parts)
+    a, b, c = angles or (0.0, 0.0, 0.0)
+    if max(abs(x), abs(y), abs(z)) > FARTHEST_MM or max(abs(a), abs(b), abs(c)) > 360.0:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: expected positions within +-{FARTHEST_MM:g} mm and angles within +-360 degrees"
+        )
+    return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))
+
+
+def range_argument(text: str) -> tuple[float, float]:
+    """`LO:HI`, or one number for both ends; in the unit of the option."""
+    parts = text.split(":")
+    if len(parts) not in (1, 2):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected LO:HI or one number")
+    low, high = finite_number(parts[0]), finite_number(parts[-1])
+    if low > high:
+        raise argparse.ArgumentTypeError(f"{text!r}: the lower bound {low:g} is above the upper bound {high:g}")
+    return low, high
+
+
+def load_argument(text: str) -> str:
+    """Check `--load` early; the analysis parses it again."""
+    from toolpath_stiff.analysis.loads import parse_load
+    from toolpath_stiff.errors import InputError
+
+    try:
+        parse_load(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
+def add_program_options(parser: argparse.ArgumentParser) -> None:
+    """Options about how a program is read and sampled."""
+    group = parser.add_argument_group("program")
+    group.add_argument(
+        "--origin",
+        type=pose_argument,
+        metavar="X,Y,Z[,A,B,C]",
+        help="where program zero (G54) sits in machine coordinates, mm and degrees "
+        "(default: where the program's G10 says, else the machine's default)",
+    )
+    group.add_argument(
+        "--step", type=length_m(1000.0), default=1e-3, metavar="MM", help="distance of the samples (default: 1)"
+    )
+    group.add_argument("--offsets", metavar="FILE", help="work offsets G54 to G59.3")
+    group.add_argument("--tools", metavar="FILE", help="tool table: LinuxCNC .tbl, or CSV tool,length_mm,diameter_mm")
+    group.add_argument("--block-delete", action="store_true", help="leave out blocks that begin with /")
+
+
+def add_machine_options(parser: argparse.ArgumentParser) -> None:
+    """Options about the machine and its physics."""
+    group = parser.add_argument_group("machine")
+    group.add_argument(
+        "--machine", default="nist", metavar="NAME|FILE", help="machine name or machine file (default: nist)"
+    )
+    group.add_argument(
+        "--effects", action="append", default=[], metavar="FILE.py", help="file with your own physical effects"
+    )
+    group.add_argument(
+        "--force",
+        type=positive_number("N", 1e6),
+        default=1000.0,
+        metavar="N",
+        help="load at the tool tip, for deflections and load-dependent effects (default: 1000)",
+    )
+
+
+def add_load_options(parser: argparse.ArgumentParser) -> None:
+    """The direction of the load."""
+    parser.add_argument(
+        "--load",
+        type=load_argument,
+        default="tangential",
+        metavar="DIRECTION",
+        help=f"{LOADS_HELP} (default: tangential)",
+    )
+
+
+def add_json_option(parser: argparse.ArgumentParser, text: str) -> None:
+    """`--json`, with what it prints."""
+    parser.add_argument("--json", action="store_true", help=text)
+
+
+def read_program_for(args: argparse.Namespace, file: str, machine: Machine | None) -> Program:
+    """Read a program with the options of `add_program_options`; without a machine the default origin is 0."""
+    from toolpath_stiff.nc import read_program
+
+    return read_program(
+        file,
+        origin=args.origin,
+        default_origin=machine.default_origin if machine else (0.0,) * 6,
+        offsets_file=args.offsets,
+        tool_table=args.tools,
+        block_delete=args.block_delete,
+    )

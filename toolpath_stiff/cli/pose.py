@@ -1,0 +1,209 @@
+"""`tps pose`: stiffness at single poses."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.cli.arguments import add_json_option, add_machine_options, finite_number
+from toolpath_stiff.errors import InputError, InputErrors
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolpath_stiff.analysis.poses import PoseReport
+    from toolpath_stiff.stiffness.model import StiffnessModel
+
+    FloatArray = NDArray[np.float64]
+
+EPILOG = """\
+examples:
+  tps pose -300 300 300 -30 0 0
+  tps pose --csv poses.csv > stiffness.csv
+
+Angles are roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); the position is the tool tip in mm, machine
+coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row a pose in the
+same order, with empty cells where a pose is out of reach (exit code 1).
+"""
+POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument(
+        "pose", nargs="*", type=finite_number, metavar="X Y Z [A B C]", help="tool tip in mm, angles in degrees"
+    )
+    parser.add_argument("--csv", metavar="FILE", help="read poses from a CSV file, write CSV to standard output")
+    add_machine_options(parser)
+    add_json_option(parser, "print JSON instead of a table")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Evaluate and print."""
+    if (args.csv is None) == (not args.pose):
+        raise InputError(
+            "give either a pose or --csv FILE" if args.csv is None else "give a pose or --csv FILE, not both",
+            expected="tps pose X Y Z [A B C], or tps pose --csv FILE",
+        )
+    if args.csv is None and len(args.pose) not in (3, 6):
+        raise InputError(f"a pose of {len(args.pose)} numbers", expected="X Y Z or X Y Z A B C")
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.stiffness.model import build_model
+
+    model = build_model(load_machine(args.machine), args.effects)
+    if args.csv is not None:
+        return _csv(model, args)
+    return _single(model, args)
+
+
+def _evaluate(model: StiffnessModel, poses: FloatArray, force: float) -> PoseReport:
+    """Evaluate poses (n, 6) in mm and degrees."""
+    from toolpath_stiff.analysis.poses import evaluate_poses
+    from toolpath_stiff.units import m_from_mm, rad_from_deg
+
+    return evaluate_poses(model, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force)
+
+
+def _columns(poses: FloatArray, found: PoseReport) -> dict[str, Any]:
+    """Column -> values of the table, in the shop's units."""
+    import numpy as np
+
+    from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+    names = np.array([limit.name for limit in found.reach.limits] or ["none"])
+    columns: dict[str, Any] = {name: poses[:, i] for i, name in enumerate(POSE_COLUMNS)}
+    for i, axis in enumerate("xyz"):
+        columns[f"k{axis}_N_per_mm"] = n_per_mm_from_n_per_m(found.along_axes[:, i])
+    for which, direction, stiffness in (
+        ("softest", found.softest, found.softest_stiffness),
+        ("stiffest", found.stiffest, found.stiffest_stiffness),
+    ):
+        columns[f"{which}_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
+        for i, axis in enumerate("xyz"):
+            columns[f"{which}_d{axis}"] = direction[:, i]
+    for i in range(6):
+        columns[f"strut{i + 1}_mm"] = mm_from_m(found.strut_lengths[:, i])
+    columns["extrapolated"] = found.extrapolated.astype(int)
+    columns["margin"] = found.reach.margin
+    columns["margin_limit"] = names[found.reach.limit]
+    return columns
+
+
+def _decimals(name: str) -> int | None:
+    """Decimals of a column; None: a whole number or a word."""
+    if name in ("extrapolated", "margin_limit"):
+        return None
+    return 4 if name.endswith("N_per_mm") else 6
+
+
+def _csv(model: StiffnessModel, args: argparse.Namespace) -> int:
+    from toolpath_stiff.path.table import csv_rows
+
+    poses = _read_poses(args.csv)
+    found = _evaluate(model, poses, args.force)
+    columns = _columns(poses, found)
+    sys.stdout.write(",".join(columns) + "\n")
+    sys.stdout.write(csv_rows(columns, {name: _decimals(name) for name in columns}))
+    unreachable = (~found.reach.reachable).nonzero()[0]
+    for i in unreachable[:10]:
+        print(f"tps: warning: row {i + 1}: out of reach: {found.reach.describe(i)}", file=sys.stderr)
+    if len(unreachable) > 10:
+        print(f"tps: warning: {len(unreachable) - 10} more rows are out of reach", file=sys.stderr)
+    return 1 if len(unreachable) else 0
+
+
+def _read_poses(file: str) -> FloatArray:
+    """(n, 6) mm and degrees from a CSV file. Raises `InputErrors` with every bad cell named."""
+    import csv
+    from pathlib import Path
+
+    import numpy as np
+
+    path = Path(file)
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [(stream_line, row) for stream_line, row in enumerate(csv.reader(stream), 1) if any(row)]
+    except OSError as error:
+        raise InputError(f"cannot read {file!r}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError("not a text file", expected="CSV with columns x_mm,y_mm,z_mm", file=file) from None
+    if len(rows) < 2:
+        raise InputError("no poses", expected=f"a heading ({','.join(POSE_COLUMNS)}) and rows", file=file)
+    heading = [cell.strip() for cell in rows[0][1]]
+    for name in heading:
+        if name in POSE_COLUMNS and heading.count(name) > 1:
+            raise InputError(f"column {name} appears twice", file=file, line=rows[0][0])
+    missing = [name for name in POSE_COLUMNS[:3] if name not in heading]
+    if missing:
+        raise InputError(
+            f"column {missing[0]} is missing (found {', '.join(heading)})",
+            expected=", ".join(POSE_COLUMNS[:3]),
+            file=file,
+            line=rows[0][0],
+        )
+    where = {name: heading.index(name) for name in POSE_COLUMNS if name in heading}
+    poses, errors = np.zeros((len(rows) - 1, 6)), []
+    for i, (line, row) in enumerate(rows[1:]):
+        for name, column in where.items():
+            text = row[column].strip() if column < len(row) else ""
+            try:
+                value = float(text)
+            except ValueError:
+                value = math.nan
+            if not math.isfinite(value) or abs(value) > 1e5:
+                errors.append(
+                    InputError(
+                        f"row {i + 1}, {name}: {text!r}", expected="a number within +-100000", file=file, line=line
+                    )
+                )
+                continue
+            poses[i, POSE_COLUMNS.index(name)] = value
+    if errors:
+        raise InputErrors(errors)
+    return poses
+
+
+def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
+    import numpy as np
+
+    from toolpath_stiff.errors import UnreachableError
+
+    poses = np.array([[*args.pose, 0.0, 0.0, 0.0][:6]])
+    if np.abs(poses).max() > 1e5:
+        raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected="numbers within +-100000")
+    found = _evaluate(model, poses, args.force)
+    if not found.reach.reachable[0]:
+        raise UnreachableError(
+            f"the pose is out of reach on machine {model.machine.name}: {found.reach.describe(0)}",
+            hint=f"`tps machine show {args.machine}` lists the limits",
+        )
+    values = {name: column[0] for name, column in _columns(poses, found).items()}
+    if args.json:
+        plain = {n: v.item() if hasattr(v, "item") else v for n, v in values.items()}
+        plain["extrapolated"] = bool(plain["extrapolated"])
+        json.dump({"machine": model.machine.name, **plain}, sys.stdout, indent=2)
+        sys.stdout.write("\n")
+        return 0
+    _print_pose(model, values, found)
+    return 0
+
+
+def _print_pose(model: StiffnessModel, values: dict[str, Any], found: PoseReport) -> None:
+    x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
+    print(f"{model.machine.title}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n")
+    for axis in "xyz":
+        print(f"  stiffness along {axis.upper()}   {values[f'k{axis}_N_per_mm']:10.0f} N/mm")
+    for which in ("softest", "stiffest"):
+        dx, dy, dz = (values[f"{which}_d{axis}"] + 0.0 for axis in "xyz")
+        print(f"  {which:<10} direction{values[f'{which}_N_per_mm']:10.0f} N/mm along ({dx:.3f}, {dy:.3f}, {dz:.3f})")
+    lengths = "  ".join(f"{values[f'strut{i}_mm']:.3f}" for i in range(1, 7))
+    print(f"  struts 1 to 6        {lengths} mm")
+    print(f"  nearest limit        {found.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
+    if values["extrapolated"]:
+        print("  the strut law is extrapolated at this pose")

@@ -1,0 +1,59 @@
+"""Rigid turns of the work: moves of the set-up frame placed on the machine.
+
+Rule: points p' = o + Q p with Q = Rz(C) Ry(B) Rx(A); orientations R' = Q R Rz(-C). Path and tool axis turn with the
+work, the vertical platform never yaws. With it the machine's 120-degree symmetry holds exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
+
+FloatArray = NDArray[np.float64]
+
+
+def place(moves: Moves, origin: ArrayLike) -> Moves:
+    """Moves in machine coordinates, positions only.
+
+    `start`, `end`, arc centres and normals are turned; the rotary words stay as programmed, because a control
+    interpolates them as such. `place_orientations` turns the sampled orientations.
+
+    Parameters
+    ----------
+    moves
+        In the set-up frame.
+    origin
+        (6,) x, y, z in m, A, B, C in rad: where program zero sits.
+    """
+    at = np.asarray(origin, dtype=float)
+    turn = rotation_matrices(at[3:])
+
+    def placed(pose: FloatArray) -> FloatArray:
+        # Plain addition where nothing turns: a multiplication by the unit matrix would cost the last digit.
+        point = pose[:, :3] @ turn.T if at[3:].any() else pose[:, :3]
+        return np.concatenate([point + at[:3], pose[:, 3:]], axis=1)
+
+    arc = (moves.arc_sweep != 0.0)[:, None]
+    return replace(
+        moves,
+        start=placed(moves.start),
+        end=placed(moves.end),
+        arc_center=np.where(arc, moves.arc_center @ turn.T + at[:3], 0.0),
+        arc_normal=moves.arc_normal @ turn.T,
+    )
+
+
+def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
+    """Roll, pitch, yaw (n, 3) rad on the machine of programmed angles (n, 3) rad; unturned ones stay as they are."""
+    angles = np.asarray(origin, dtype=float)[3:]
+    if not angles.any():
+        return abc
+    if not angles[:2].any() and not abc.any():
+        return abc  # a vertical platform never yaws
+    turn, back = rotation_matrices(angles), rotation_about_z(-angles[2])
+    return roll_pitch_yaw(turn @ rotation_matrices(abc) @ back)
