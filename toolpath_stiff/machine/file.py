@@ -62,9 +62,7 @@ SECTIONS: dict[str, dict[str, Key]] = {
         "length_mm": Key(unit="mm", shape=(2,), low=0.0, open_low=True),
         "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=0.0, high=1e5, open_low=True),
     },
-    "platform": {
-        "bar_stiffness_N_per_m": Key(unit="N/m", low=1e5, high=INFINITY, infinite=True, open_low=True)
-    },
+    "platform": {"bar_stiffness_N_per_m": Key(unit="N/m", low=1e5, high=INFINITY, infinite=True, open_low=True)},
     "limits.strut_length": {
         "min_mm": Key(unit="mm", low=0.0),
         "max_mm": Key(unit="mm", low=0.0, open_low=True),
@@ -325,9 +323,7 @@ class _Reader:
         for row in rows:
             name = row.get("name")
             if not isinstance(name, str) or not name:
-                raise self.fail(
-                    kind, "name", " is missing" if name is None else f" = {name!r}", "an effect's name"
-                )
+                raise self.fail(kind, "name", " is missing" if name is None else f" = {name!r}", "an effect's name")
             provenance = row.get("provenance", {})
             parameters = {k: v for k, v in row.items() if k not in ("name", "provenance")}
             entries.append(EffectEntry(name, parameters, provenance if isinstance(provenance, dict) else {}))

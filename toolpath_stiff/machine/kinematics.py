@@ -103,9 +103,7 @@ def neutral_axes(machine: Machine) -> tuple[FloatArray, FloatArray]:
     return directions, directions @ rotation_matrices(neutral[3:])
 
 
-def joint_angles(
-    machine: Machine, struts: Struts, rotation: ArrayLike | None = None
-) -> tuple[FloatArray, FloatArray]:
+def joint_angles(machine: Machine, struts: Struts, rotation: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     """Swing of the frame joints and of the platform joints from their neutral axes.
 
     Returns

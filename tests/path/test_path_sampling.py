@@ -1,0 +1,169 @@
+"""Sampling: closed-form curves, ends, weights, times, rigid turns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.moves_factory import make_moves
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.path import move_lengths, place, sample_moves
+from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
+
+ROUNDING = 1e-12  # m: a few hundred units in the last place of a metre
+
+coordinate = st.floats(-0.5, 0.5)
+point = st.tuples(coordinate, coordinate, coordinate)
+angle = st.floats(-3.0, 3.0)
+
+
+def test_full_circle_has_the_circumference_and_lies_on_the_circle():
+    radius = 0.025
+    moves = make_moves([{"start": [radius, 0, 0], "end": [radius, 0, 0], "sweep": 2 * np.pi}])
+    samples = sample_moves(moves, step=1e-3)
+    assert move_lengths(moves)[0] == pytest.approx(2 * np.pi * radius, rel=1e-14)
+    np.testing.assert_allclose(np.hypot(*samples.position[:, :2].T), radius, atol=ROUNDING)
+    np.testing.assert_allclose(np.sum(samples.position * samples.tangent, axis=1), 0.0, atol=ROUNDING)
+    quarter = sample_moves(moves, step=2 * np.pi * radius / 4).position
+    expected = radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [1, 0, 0]])
+    np.testing.assert_allclose(quarter, expected, atol=ROUNDING)
+
+
+def test_clockwise_arc_goes_the_other_way():
+    moves = make_moves([{"start": [0.01, 0, 0], "end": [0, 0.01, 0], "sweep": -1.5 * np.pi}])
+    middle = sample_moves(moves, step=1.5 * np.pi * 0.01 / 2).position[1]
+    np.testing.assert_allclose(middle, [-0.01 / np.sqrt(2), -0.01 / np.sqrt(2), 0], atol=ROUNDING)
+
+
+def test_helix_of_three_turns():
+    radius, climb, turns = 0.01, -0.006, 3
+    moves = make_moves(
+        [{"start": [radius, 0, 0], "end": [radius, 0, climb], "sweep": 2 * np.pi * turns, "normal": [0, 0, 1]}]
+    )
+    assert move_lengths(moves)[0] == pytest.approx(np.hypot(2 * np.pi * radius * turns, climb), rel=1e-14)
+    samples = sample_moves(moves, step=1e-4)
+    theta = np.unwrap(np.arctan2(samples.position[:, 1], samples.position[:, 0]))
+    np.testing.assert_allclose(samples.position[:, 2], climb * theta / (2 * np.pi * turns), atol=1e-11)
+
+
+def test_spiral_length_against_quadrature():
+    # Radii 20 and 20.5 mm over a half turn: the length formula is exact to second order in the difference.
+    from scipy.integrate import quad
+
+    r0, r1, sweep = 0.020, 0.0205, np.pi
+    moves = make_moves([{"start": [r0, 0, 0], "end": [-r1, 0, 0], "sweep": sweep}])
+    exact = quad(lambda u: np.hypot((r0 + u * (r1 - r0)) * sweep, r1 - r0), 0, 1)[0]
+    assert move_lengths(moves)[0] == pytest.approx(exact, rel=(0.5 / 20) ** 2)
+
+
+@pytest.mark.parametrize("normal", [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+def test_arcs_in_every_plane_tangents_against_finite_differences(normal):
+    n = np.array(normal, dtype=float)
+    e1 = np.roll(n, 1)
+    center = np.array([0.1, -0.2, 0.3])
+    moves = make_moves(
+        [
+            {
+                "start": center + 0.05 * e1,
+                "end": center + 0.05 * np.cross(n, e1) + 0.02 * n,
+                "sweep": np.pi / 2,
+                "center": center,
+                "normal": n,
+            }
+        ]
+    )
+    samples = sample_moves(moves, step=1e-5)
+    slope = np.gradient(samples.position, samples.s, axis=0)
+    # Central differences of a circle of 50 mm at 10 um: error (h/r)^2/6, far below 1e-6.
+    np.testing.assert_allclose(samples.tangent[1:-1], slope[1:-1], atol=1e-6)
+
+
+@given(st.lists(point, min_size=1, max_size=8), st.floats(1e-3, 0.3))
+def test_polyline_ends_steps_and_weights(points, step):
+    rows = [{"end": [0.9, 0.9, 0.9]}, *({"end": p} for p in points)]
+    moves = make_moves(rows)
+    samples = sample_moves(moves, step=step)
+    lengths = move_lengths(moves)
+    assert samples.weight.sum() == pytest.approx(lengths.sum(), rel=1e-12)
+    for i in range(len(moves)):
+        mine = samples.position[samples.move == i]
+        np.testing.assert_array_equal(mine[0], moves.start[i, :3])
+        np.testing.assert_array_equal(mine[-1], moves.end[i, :3])
+        gaps = np.linalg.norm(np.diff(mine, axis=0), axis=1)
+        assert gaps.max(initial=0.0) <= step * (1 + 1e-9)
+    assert (np.diff(samples.s) >= -1e-15).all() and (np.diff(samples.t) >= -1e-12).all()
+
+
+def test_rapids_weigh_nothing_and_take_the_rapid_feed():
+    moves = make_moves([{"end": [0.1, 0, 0], "motion": RAPID, "feed": np.nan}, {"end": [0.1, 0.03, 0], "dwell": 2.0}])
+    samples = sample_moves(moves, step=0.01, rapid_feed=0.2)
+    assert samples.weight.sum() == pytest.approx(0.03)
+    assert samples.t[samples.move == 0][-1] == pytest.approx(0.5)
+    assert samples.t[-1] == pytest.approx(0.5 + 0.03 / 0.01)
+    assert np.isnan(samples.feed[0]) and not samples.cutting[0]
+
+
+def test_rotary_move_alone_has_no_tangent_and_no_weight():
+    moves = make_moves([{"end": [0, 0, 0, np.deg2rad(10)], "feed": np.deg2rad(5)}])
+    samples = sample_moves(moves, step=1e-3)
+    assert len(samples) == 11  # one degree at a time
+    assert not samples.tangent.any() and not samples.weight.any()
+    assert samples.t[-1] == pytest.approx(2.0)
+
+
+def test_too_fine_a_step_is_refused_with_the_step_to_use():
+    with pytest.raises(InputError, match="--step"):
+        sample_moves(make_moves([{"end": [1.0, 0, 0]}]), step=1e-9)
+
+
+@given(st.tuples(angle, st.floats(-1.5, 1.5), angle))
+def test_roll_pitch_yaw_round_trip(abc):
+    turn = rotation_matrices(abc)
+    np.testing.assert_allclose(rotation_matrices(roll_pitch_yaw(turn)), turn, atol=1e-12)
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-14)
+
+
+def test_rotation_matrix_is_yaw_pitch_roll():
+    quarter = np.pi / 2
+    np.testing.assert_allclose(rotation_matrices([quarter, 0, 0]) @ [0, 1, 0], [0, 0, 1], atol=1e-15)
+    np.testing.assert_allclose(rotation_matrices([0, quarter, 0]) @ [0, 0, 1], [1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(rotation_matrices([0, 0, quarter]) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    # Roll first, yaw last: x stays under roll and goes to y under yaw.
+    np.testing.assert_allclose(rotation_matrices([quarter, 0, quarter]) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+
+
+def test_gimbal_lock_comes_back_as_the_same_rotation():
+    turn = rotation_matrices([0.3, np.pi / 2, 0.5])
+    np.testing.assert_allclose(rotation_matrices(roll_pitch_yaw(turn)), turn, atol=1e-9)
+
+
+@settings(max_examples=50)
+@given(point, angle)
+def test_turn_about_z_turns_path_and_tool_axis_but_a_vertical_platform_never_yaws(shift, turn):
+    origin = (*shift, 0.0, 0.0, turn)
+    moves = make_moves(
+        [{"end": [0.1, 0, 0]}, {"end": [0.1, 0.1, 0, 0.2, -0.1]}, {"start": [0.1, 0.1, 0], "end": [0.1, 0.2, 0]}]
+    )
+    plain = sample_moves(moves, step=0.05)
+    turned = sample_moves(place(moves, origin), step=0.05, origin=origin)
+    about_z = rotation_about_z(turn)
+    np.testing.assert_allclose(turned.position, plain.position @ about_z.T + shift, atol=ROUNDING)
+    np.testing.assert_allclose(turned.tangent, plain.tangent @ about_z.T, atol=ROUNDING)
+    axes = rotation_matrices(turned.abc)[:, :, 2]
+    np.testing.assert_allclose(axes, rotation_matrices(plain.abc)[:, :, 2] @ about_z.T, atol=ROUNDING)
+    vertical = ~plain.abc.any(axis=1)
+    np.testing.assert_allclose(turned.abc[vertical], 0.0, atol=ROUNDING)
+
+
+def test_tilted_set_up_tilts_path_and_tool_axis():
+    origin = (0.0, 0.0, 0.8, 0.0, np.deg2rad(10), np.deg2rad(90))
+    moves = make_moves([{"end": [0.1, 0, 0]}])
+    samples = sample_moves(place(moves, origin), step=0.1, origin=origin)
+    # x of the set-up: down by 10 degrees about y, then turned to y.
+    expected = [0.0, 0.1 * np.cos(np.deg2rad(10)), 0.8 - 0.1 * np.sin(np.deg2rad(10))]
+    np.testing.assert_allclose(samples.position[-1], expected, atol=ROUNDING)
+    axis = rotation_matrices(samples.abc[-1])[:, 2]
+    np.testing.assert_allclose(axis, [0.0, np.sin(np.deg2rad(10)), np.cos(np.deg2rad(10))], atol=ROUNDING)
