@@ -1,0 +1,124 @@
+"""What each G and M code means to a tool path: acted upon, harmless, or refused with the reason.
+
+Codes and modal groups follow LinuxCNC (its manual, "G-Code overview", modal groups), because its interpreter is what
+the results are compared with; where Fanuc-style controls differ in a code that changes the path, it is refused.
+"""
+
+from __future__ import annotations
+
+MOTION, PLANE, DISTANCE, ARC_DISTANCE = "motion", "plane", "distance", "arc distance"
+UNITS, FEED_MODE, CUTTER, LENGTH = "units", "feed mode", "cutter compensation", "tool length"
+OFFSET, RETRACT, ONCE = "work offset", "cycle return", "non-modal"
+PATH_CONTROL, SPINDLE_MODE, DIAMETER = "path control", "spindle mode", "lathe diameter"
+
+CYCLES = ("G73", "G81", "G82", "G83", "G85", "G89")
+ARCS = ("G2", "G3")
+
+# G codes that are acted upon, or that say what holds anyway: code -> modal group.
+G_GROUPS: dict[str, str] = {
+    **dict.fromkeys(("G0", "G1", *ARCS, *CYCLES, "G80"), MOTION),
+    **dict.fromkeys(("G17", "G18", "G19"), PLANE),
+    **dict.fromkeys(("G90", "G91"), DISTANCE),
+    **dict.fromkeys(("G90.1", "G91.1"), ARC_DISTANCE),
+    **dict.fromkeys(("G20", "G21"), UNITS),
+    **dict.fromkeys(("G93", "G94", "G95"), FEED_MODE),
+    **dict.fromkeys(("G40",), CUTTER),
+    **dict.fromkeys(("G43", "G43.1", "G49"), LENGTH),
+    **dict.fromkeys(("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"), OFFSET),
+    **dict.fromkeys(("G98", "G99"), RETRACT),
+    **dict.fromkeys(("G4", "G10", "G28", "G28.1", "G30", "G30.1", "G52", "G53"), ONCE),
+    **dict.fromkeys(("G92", "G92.1", "G92.2", "G92.3"), ONCE),
+    **dict.fromkeys(("G61", "G61.1", "G64"), PATH_CONTROL),
+    **dict.fromkeys(("G96", "G97"), SPINDLE_MODE),
+    **dict.fromkeys(("G8",), DIAMETER),
+    "G15": "polar",
+    "G50": "scaling",
+    "G69": "rotation",
+}
+WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+
+# Harmless G codes: the path does not change, the user is told.
+G_HARMLESS = {
+    "G61": "exact stop: corners are taken as programmed anyway",
+    "G61.1": "exact stop: corners are taken as programmed anyway",
+    "G64": "path blending: the path is taken as programmed, corners included",
+    "G96": "constant surface speed: the spindle speed does not enter",
+}
+
+# G codes that change the path, or what a force does to it, in a way that is not supported.
+G_REFUSED = {
+    "G5": ("a spline", "post the program with arcs and lines"),
+    "G5.1": ("a spline", "post the program with arcs and lines"),
+    "G5.2": ("a NURBS curve", "post the program with arcs and lines"),
+    "G5.3": ("a NURBS curve", "post the program with arcs and lines"),
+    "G7": ("lathe diameter mode", "this is a mill"),
+    "G12": ("a pocket cycle of one control", "post the program with arcs"),
+    "G13": ("a pocket cycle of one control", "post the program with arcs"),
+    "G16": ("polar coordinates", "post the program in Cartesian coordinates"),
+    "G17.1": ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C"),
+    "G18.1": ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C"),
+    "G19.1": ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C"),
+    "G33": ("spindle-synchronised motion", "leave threading out"),
+    "G33.1": ("rigid tapping", "leave tapping out"),
+    "G38.2": ("probing", "leave probing out"),
+    "G38.3": ("probing", "leave probing out"),
+    "G38.4": ("probing", "leave probing out"),
+    "G38.5": ("probing", "leave probing out"),
+    "G41": ("cutter compensation", "post the path of the tool centre"),
+    "G41.1": ("cutter compensation", "post the path of the tool centre"),
+    "G42": ("cutter compensation", "post the path of the tool centre"),
+    "G42.1": ("cutter compensation", "post the path of the tool centre"),
+    "G43.2": ("an added tool length", "put the whole length into the tool table"),
+    "G43.4": ("tool centre point control of one control", "post X, Y, Z, A, B, C of the tool tip"),
+    "G51": ("scaling", "post the program at its size"),
+    "G65": ("a macro call", "expand macros before analysing"),
+    "G66": ("a macro call", "expand macros before analysing"),
+    "G68": ("a rotated coordinate system", "turn the work with --origin X,Y,Z,0,0,C instead"),
+    "G68.2": ("a tilted work plane", "post X, Y, Z, A, B, C of the tool tip"),
+    "G70": ("a lathe cycle", "this is a mill"),
+    "G71": ("a lathe cycle", "this is a mill"),
+    "G72": ("a lathe cycle", "this is a mill"),
+    "G74": ("left-hand tapping", "leave tapping out"),
+    "G76": ("a threading cycle", "leave threading out"),
+    "G84": ("right-hand tapping", "leave tapping out"),
+    "G86": ("boring with spindle stop", "post the moves of the cycle"),
+    "G87": ("back boring", "post the moves of the cycle"),
+    "G88": ("boring with manual feed out", "post the moves of the cycle"),
+}
+
+M_STOP, M_TOOL, M_SPINDLE, M_COOLANT = "stop", "tool change", "spindle", "coolant"
+# M codes that are acted upon, or that no tool path depends on and every program has.
+M_GROUPS: dict[str, str] = {
+    **dict.fromkeys(("M0", "M1", "M2", "M30", "M60"), M_STOP),
+    **dict.fromkeys(("M6", "M61"), M_TOOL),
+    **dict.fromkeys(("M3", "M4", "M5", "M19"), M_SPINDLE),
+    **dict.fromkeys(("M7", "M8", "M9"), M_COOLANT),
+    **dict.fromkeys(("M48", "M49", "M50", "M51", "M52", "M53"), "overrides"),
+}
+M_QUIET = ("M0", "M1", "M2", "M30", "M60", "M6", "M61", "M3", "M4", "M5")
+M_HARMLESS = {
+    "M7": "coolant",
+    "M8": "coolant",
+    "M9": "coolant",
+    "M19": "spindle orientation",
+    "M48": "overrides",
+    "M49": "overrides",
+    "M50": "overrides",
+    "M51": "overrides",
+    "M52": "overrides",
+    "M53": "overrides",
+}
+M_REFUSED = {
+    "M98": ("a subprogram call", "expand subprograms before analysing"),
+    "M99": ("a subprogram return", "expand subprograms before analysing"),
+    "M97": ("a local subprogram call", "expand subprograms before analysing"),
+    "M70": ("saved modal state", "post the program without M70 to M73"),
+    "M71": ("saved modal state", "post the program without M70 to M73"),
+    "M72": ("saved modal state", "post the program without M70 to M73"),
+    "M73": ("saved modal state", "post the program without M70 to M73"),
+}
+
+
+def code_name(letter: str, value: float) -> str:
+    """`G` and 59.3 to "G59.3", `G` and 1.0 to "G1"."""
+    return f"{letter}{value:g}"

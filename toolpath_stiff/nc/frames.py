@@ -1,0 +1,138 @@
+"""Coordinates of a control: program, work offsets, G92 and G52, tool length, machine. mm and degrees.
+
+As LinuxCNC: control = Rz(rotation) (program + g92) + offset, and the spindle nose = control + tool length. The
+"control" coordinates are those in which the work offsets are numbers; the set-up frame of `Moves` is the control frame
+shifted so that G54 (its value at the first motion) is zero; the machine frame places that at the origin.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from toolpath_stiff.nc.tables import Offsets
+
+Pose = tuple[float, float, float, float, float, float]
+
+
+@dataclass
+class Frames:
+    """The coordinate systems in force, and the tool tip in control coordinates.
+
+    Attributes
+    ----------
+    offsets
+        Work offsets and reference points.
+    option, default
+        Where G54's zero sits on the machine as the caller says, and unless anyone says; mm and degrees.
+    active
+        Index of the work offset in force.
+    g92
+        Shift of G92 or G52; `g92_kept` remembers it while G92.2 suspends it.
+    tool
+        Tool length offset in force along Z.
+    position
+        Controlled point in control coordinates.
+    from_machine
+        Axes of `position` that were given in machine coordinates.
+    reference
+        G54's zero in control coordinates, fixed at the first motion.
+    """
+
+    offsets: Offsets
+    option: Pose | None
+    default: Pose
+    active: int = 0
+    g92: list[float] = field(default_factory=lambda: [0.0] * 6)
+    g92_kept: list[float] = field(default_factory=lambda: [0.0] * 6)
+    tool: float = 0.0
+    position: list[float] = field(default_factory=lambda: [0.0] * 6)
+    from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
+    reference: tuple[float, float, float] | None = None
+    source: str = ""
+
+    def to_control(self, program: list[float]) -> list[float]:
+        """Control coordinates of a point in program coordinates."""
+        offset = self.offsets.table[self.active]
+        moved = [p + g for p, g in zip(program, self.g92, strict=True)]
+        if offset.rotation:
+            moved[0], moved[1] = _turned(moved[0], moved[1], offset.rotation)
+        return [m + o for m, o in zip(moved, offset.axes, strict=True)]
+
+    def to_program(self, control: list[float]) -> list[float]:
+        """Program coordinates of a point in control coordinates."""
+        offset = self.offsets.table[self.active]
+        moved = [c - o for c, o in zip(control, offset.axes, strict=True)]
+        if offset.rotation:
+            moved[0], moved[1] = _turned(moved[0], moved[1], -offset.rotation)
+        return [m - g for m, g in zip(moved, self.g92, strict=True)]
+
+    def turn_direction(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
+        """A direction of the program's axes in control axes."""
+        rotation = self.offsets.table[self.active].rotation
+        if not rotation:
+            return vector
+        return (*_turned(vector[0], vector[1], rotation), vector[2])
+
+    def fix_reference(self) -> tuple[float, float, float]:
+        """G54's zero at the first motion, from then on the set-up frame's."""
+        if self.reference is None:
+            g54 = self.offsets.table[0]
+            x, y, z = g54.axes[:3]
+            self.reference = (x, y, z)
+            self.source = "option" if self.option is not None else "program" if g54.given else "default"
+        return self.reference
+
+    @property
+    def origin(self) -> Pose:
+        """Where G54's zero sits on the machine, mm and degrees."""
+        x, y, z = self.fix_reference()
+        if self.option is not None:
+            return self.option
+        return (x, y, z, 0.0, 0.0, 0.0) if self.source == "program" else self.default
+
+    def to_setup(self, control: list[float]) -> list[float]:
+        """Set-up coordinates of a point in control coordinates."""
+        reference = self.fix_reference()
+        return [*(c - r for c, r in zip(control[:3], reference, strict=True)), *control[3:]]
+
+    def machine_position(self) -> list[float]:
+        """The controlled point in machine coordinates (rotary axes as they are)."""
+        point = self.to_setup(self.position)
+        origin = self.origin
+        turned = _rotate(_matrix(origin), point[:3])
+        return [*(t + o for t, o in zip(turned, origin[:3], strict=True)), *point[3:]]
+
+    def control_of_machine(self, machine: list[float]) -> list[float]:
+        """Control coordinates of a point in machine coordinates."""
+        origin, reference = self.origin, self.fix_reference()
+        shifted = [m - o for m, o in zip(machine[:3], origin[:3], strict=True)]
+        matrix = _matrix(origin)
+        back = _rotate([[matrix[j][i] for j in range(3)] for i in range(3)], shifted)
+        return [*(b + r for b, r in zip(back, reference, strict=True)), *machine[3:]]
+
+    def set_tool(self, length: float) -> None:
+        """Another tool length: the machine stands still, the controlled point's numbers change."""
+        self.position[2] += self.tool - length
+        self.tool = length
+
+
+def _turned(x: float, y: float, degrees: float) -> tuple[float, float]:
+    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return (cos * x - sin * y, sin * x + cos * y)
+
+
+def _matrix(origin: Pose) -> list[list[float]]:
+    """Q = Rz(C) Ry(B) Rx(A) of a placement; plain floats, so that reading a program needs no numpy."""
+    (ca, sa), (cb, sb), (cc, sc) = (
+        (math.cos(math.radians(v)), math.sin(math.radians(v))) if v else (1.0, 0.0) for v in origin[3:]
+    )
+    return [
+        [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
+        [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
+        [-sb, cb * sa, cb * ca],
+    ]
+
+
+def _rotate(matrix: list[list[float]], vector: list[float]) -> list[float]:
+    return [sum(m * v for m, v in zip(row, vector, strict=True)) for row in matrix]

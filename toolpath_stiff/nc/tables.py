@@ -1,0 +1,197 @@
+"""Tool tables and work-offset files: LinuxCNC's own formats and plain ones. mm and degrees."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes import WORK_OFFSETS
+
+AXES = "XYZABC"
+LARGEST_MM = 1e5
+# LinuxCNC's parameter file (manual, "Parameters"): G54 is 5221 to 5230, each further offset 20 on; X Y Z A B C U V W R.
+FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
+HOME_G28, HOME_G30 = 5161, 5181
+
+
+@dataclass
+class ToolEntry:
+    """A tool: length and diameter in mm, nan where the table does not say."""
+
+    number: int
+    length: float = math.nan
+    diameter: float = math.nan
+    remark: str = ""
+
+
+@dataclass
+class WorkOffset:
+    """A work offset: six axes in mm and degrees, and the rotation of X and Y in degrees. `given`: someone set it."""
+
+    axes: list[float] = field(default_factory=lambda: [0.0] * 6)
+    rotation: float = 0.0
+    given: bool = False
+
+
+@dataclass
+class Offsets:
+    """Work offsets in the order of `WORK_OFFSETS`, and the reference points of G28 and G30."""
+
+    table: list[WorkOffset] = field(default_factory=lambda: [WorkOffset() for _ in WORK_OFFSETS])
+    home_g28: list[float] = field(default_factory=lambda: [0.0] * 6)
+    home_g30: list[float] = field(default_factory=lambda: [0.0] * 6)
+
+
+def _lines(path: str | Path, what: str) -> list[str]:
+    try:
+        return Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        raise InputError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{what} is not a text file", file=str(path)) from None
+
+
+def _number(text: str, what: str, path: str | Path, line: int) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or abs(value) > LARGEST_MM:
+        raise InputError(f"{what} = {text!r}", expected=f"a number within +-{LARGEST_MM:g}", file=str(path), line=line)
+    return value
+
+
+def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
+    """Tool number -> tool, from a LinuxCNC table (`T1 P1 Z50 D6 ;end mill`) or CSV (`tool,length_mm,...`).
+
+    Lengths are taken as mm in both. Raises `InputError` with the line.
+    """
+    lines = _lines(path, "tool table")
+    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    if not filled:
+        raise InputError("the tool table is empty", file=str(path))
+    is_csv = "," in filled[0][1] and not filled[0][1].lstrip().upper().startswith(("T0", "T1", ";"))
+    tools = _csv_tools(path, filled) if is_csv else _linuxcnc_tools(path, filled)
+    found: dict[int, ToolEntry] = {}
+    for line, tool in tools:
+        if tool.number in found:
+            raise InputError(f"tool {tool.number} appears twice", file=str(path), line=line)
+        found[tool.number] = tool
+    return found
+
+
+def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
+    columns = ("tool", "length_mm", "diameter_mm", "remark")
+    heading = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
+    unknown = [name for name in heading if name not in columns]
+    missing = [name for name in columns[:2] if name not in heading]
+    if unknown or missing:
+        found = f"column {unknown[0]!r} is not known" if unknown else f"column {missing[0]!r} is missing"
+        raise InputError(found, expected=f"columns {', '.join(columns)}", file=str(path), line=lines[0][0])
+    rows = []
+    for line, text in lines[1:]:
+        cells = dict(zip(heading, (cell.strip() for cell in next(csv.reader([text]))), strict=False))
+        number = _number(cells.get("tool", ""), "tool", path, line)
+        if number != int(number) or number < 0:
+            raise InputError(f"tool = {cells['tool']!r}", expected="a whole number", file=str(path), line=line)
+        length = _number(cells.get("length_mm", ""), "length_mm", path, line)
+        diameter = cells.get("diameter_mm", "")
+        rows.append(
+            (
+                line,
+                ToolEntry(
+                    int(number),
+                    length,
+                    _number(diameter, "diameter_mm", path, line) if diameter else math.nan,
+                    cells.get("remark", ""),
+                ),
+            )
+        )
+    return rows
+
+
+def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
+    rows = []
+    for line, text in lines:
+        content, _, remark = text.partition(";")
+        if not content.strip():
+            continue
+        words = dict(re.findall(r"([A-Za-z])\s*([^\sA-Za-z]+(?:[eE][+-]?\d+)?)", content))
+        words = {letter.upper(): value for letter, value in words.items()}
+        if "T" not in words or not words["T"].isdigit():
+            raise InputError(
+                f"{content.strip()!r} is not a tool",
+                expected="T<number> P<pocket> Z<length mm> D<diameter mm> ;remark",
+                file=str(path),
+                line=line,
+            )
+        length = _number(words["Z"], "Z", path, line) if "Z" in words else math.nan
+        diameter = _number(words["D"], "D", path, line) if "D" in words else math.nan
+        rows.append((line, ToolEntry(int(words["T"]), length, diameter, remark.strip())))
+    return rows
+
+
+def read_offsets(path: str | Path) -> Offsets:
+    """Work offsets from a file. Raises `InputError` with the line.
+
+    Lines are `G55 = [x, y, z, a, b, c, r]` (mm and degrees, short lists allowed), or those of a LinuxCNC parameter
+    file (`5221 12.5`).
+    """
+    lines = _lines(path, "offsets file")
+    filled = [(number, line.split("#")[0].strip()) for number, line in enumerate(lines, 1)]
+    filled = [(number, line) for number, line in filled if line]
+    if not filled:
+        raise InputError("the offsets file is empty", expected="lines such as G55 = [100, 0, 0]", file=str(path))
+    offsets = Offsets()
+    for line, text in filled:
+        parameter = re.fullmatch(r"(\d+)\s+(\S+)", text)
+        assignment = re.fullmatch(r'"?([Gg][\d.]+)"?\s*=\s*\[(.*)\]', text)
+        if parameter:
+            _set_parameter(offsets, int(parameter[1]), _number(parameter[2], parameter[1], path, line))
+        elif assignment and assignment[1].upper() in (*WORK_OFFSETS, "G28", "G30"):
+            name = assignment[1].upper()
+            values = [_number(v.strip(), name, path, line) for v in assignment[2].split(",") if v.strip()]
+            most = 7 if name in WORK_OFFSETS else 6
+            if not 1 <= len(values) <= most:
+                raise InputError(
+                    f"{name} has {len(values)} numbers", expected=f"1 to {most}", file=str(path), line=line
+                )
+            _set_offset(offsets, name, values)
+        else:
+            raise InputError(
+                f"{text!r} is not an offset",
+                expected="G54 = [x, y, z, a, b, c, r] (to G59.3, G28, G30), or LinuxCNC's `5221 12.5`",
+                file=str(path),
+                line=line,
+            )
+    return offsets
+
+
+def _set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
+    axes = [*values[:6], *[0.0] * (6 - len(values[:6]))]
+    if name == "G28":
+        offsets.home_g28 = axes
+    elif name == "G30":
+        offsets.home_g30 = axes
+    else:
+        rotation = values[6] if len(values) > 6 else 0.0
+        offsets.table[WORK_OFFSETS.index(name)] = WorkOffset(axes, rotation, given=True)
+
+
+def _set_parameter(offsets: Offsets, number: int, value: float) -> None:
+    """One line of a LinuxCNC parameter file; parameters that are no offset are none of ours."""
+    for home, first in ((offsets.home_g28, HOME_G28), (offsets.home_g30, HOME_G30)):
+        if 0 <= number - first < 6:
+            home[number - first] = value
+    index, place = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)
+    if 0 <= index < len(offsets.table) and 0 <= place <= ROTATION and not 6 <= place < ROTATION:
+        offset = offsets.table[index]
+        if place == ROTATION:
+            offset.rotation = value
+        else:
+            offset.axes[place] = value
+        offset.given = offset.given or value != 0.0
