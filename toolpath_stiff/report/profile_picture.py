@@ -1,0 +1,197 @@
+"""`profile.png`: stiffness along the path."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis.statistics import weakest_places
+from toolpath_stiff.report.figure import (
+    INK,
+    MUTED,
+    SECOND_ORANGE,
+    UNREACHABLE_RED,
+    add_heading,
+    house_style,
+    label_place,
+    new_figure,
+    png_bytes,
+)
+from toolpath_stiff.report.wording import number, plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from toolpath_stiff.analysis import Analysis
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+WIDTH, HEIGHT = 14.0, 6.2  # inches
+LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
+CURVE_BLUE = "#2b59c3"
+MOST_TOOL_LABELS = 14
+
+
+def profile_picture(analysis: Analysis, *, other: Analysis | None = None, required: float | None = None) -> bytes:
+    """Stiffness against path length, as PNG.
+
+    Parameters
+    ----------
+    analysis
+        What to draw.
+    other
+        The same program on another machine: a second curve.
+    required
+        N/m: a line, and red below it.
+    """
+    with house_style():
+        figure = new_figure(WIDTH, HEIGHT)
+        axes = figure.add_axes(
+            (LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, 1.0 - (TOP + BOTTOM) / HEIGHT)
+        )
+        s, k = profile_curve(analysis)
+        _set_limits(axes, analysis, other, required)
+        _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
+        _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
+        columns = int(axes.get_window_extent().width)
+        if other is not None:
+            s2, k2 = profile_curve(other)
+            keep = extremes_by_column(s2, k2, columns)
+            name = shortened(plain(other.machine.name), 30)
+            axes.plot(s2[keep], k2[keep], color=SECOND_ORANGE, linewidth=1.3, label=name, zorder=3)
+        keep = extremes_by_column(s, k, columns)
+        name = shortened(plain(analysis.machine.name), 30)
+        axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
+        _levels(axes, analysis, required)
+        _tool_changes(axes, analysis)
+        _line_numbers(axes, analysis)
+        taken: list[tuple[float, float, float, float]] = []
+        for row in weakest_places(analysis):
+            at = (float(s[row]), float(k[row]))
+            label_place(axes, at, f"line {analysis.samples.line[row]}", taken, below=True)
+        _legend(axes)
+        add_heading(figure, analysis)
+        return png_bytes(figure)
+
+
+def profile_curve(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
+    """Path length in mm and stiffness in N/mm of every sample; nan on rapids and out of reach."""
+    stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness)
+    return mm_from_m(analysis.samples.s), np.where(analysis.samples.cutting, stiffness, np.nan)
+
+
+def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
+    """Rows that draw the same picture as all of them on `columns` pixels, in order.
+
+    Of every run of rows in one column of pixels the first, the last, the lowest and the highest are kept, so no
+    extreme is lost; of a run of nan the first, which keeps the gap. x ascends.
+    """
+    if len(x) <= 4 * columns:
+        return np.arange(len(x))
+    span = float(x[-1] - x[0])
+    column = np.zeros(len(x), dtype=np.int64) if span == 0.0 else ((x - x[0]) / span * columns).astype(np.int64)
+    missing = np.isnan(y)
+    fresh = np.concatenate([[True], (np.diff(column) != 0) | (missing[1:] != missing[:-1])])
+    first = np.flatnonzero(fresh)
+    last = np.append(first[1:], len(x)) - 1
+    by_value = np.lexsort((y, np.cumsum(fresh)))  # ascending within each run, the runs in order
+    kept = np.concatenate([first, last, by_value[first], by_value[last]])
+    rows = np.unique(kept)
+    return np.asarray(rows[~missing[rows] | fresh[rows]])
+
+
+def _set_limits(axes: Axes, analysis: Analysis, other: Analysis | None, required: float | None) -> None:
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    curves = [profile_curve(a)[1] for a in (analysis, other) if a is not None]
+    low, high = float(min(np.nanmin(k) for k in curves)), float(max(np.nanmax(k) for k in curves))
+    if required is not None:
+        level = n_per_mm_from_n_per_m(required)
+        low, high = min(low, level), max(high, level)
+    pad = max(0.12 * (high - low), 0.005 * high)
+    axes.set_ylim(max(low - pad, 0.0), high + pad)
+    end = mm_from_m(float(analysis.samples.s[-1]))
+    axes.set_xlim(0.0, end or 1.0)
+    axes.set_xlabel("path length, mm (rapids included)")
+    axes.set_ylabel("stiffness along the load, N/mm")
+    axes.xaxis.set_major_locator(MaxNLocator(12, steps=[1, 2, 2.5, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if end > 20 else 2)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if high - low > 5 else 2)))
+    axes.grid(axis="x", visible=False)
+
+
+def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) -> None:
+    """Shade the spans of path in which `rows` holds."""
+    edges = np.diff(np.concatenate([[0], rows.astype(np.int8), [0]]))
+    start, stop = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    if not len(start):
+        return
+    low, high = axes.get_ylim()
+    spans = [(float(s[i]), float(s[j] - s[i])) for i, j in zip(start, stop, strict=True)]
+    axes.broken_barh(spans, (low, high - low), facecolor=colour, edgecolor="none", label=label, zorder=1)
+
+
+def _levels(axes: Axes, analysis: Analysis, required: float | None) -> None:
+    counted = analysis.counted
+    weight = analysis.samples.weight[counted]
+    mean = n_per_mm_from_n_per_m(float(analysis.at.stiffness[counted] @ weight / weight.sum()))
+    axes.axhline(mean, color=INK, linewidth=1.0, linestyle=(0, (6, 3)), zorder=5, label=f"mean {number(mean)} N/mm")
+    if required is None:
+        return
+    level = n_per_mm_from_n_per_m(required)
+    axes.axhline(level, color=UNREACHABLE_RED, linewidth=1.3, zorder=5, label=f"required {number(level)} N/mm")
+
+
+def _tool_changes(axes: Axes, analysis: Analysis) -> None:
+    """A dotted line where another tool takes over; labels while they are few."""
+    samples = analysis.samples
+    changes = np.flatnonzero(np.diff(samples.tool) != 0) + 1
+    if not len(changes):
+        return
+    s = mm_from_m(samples.s[changes])
+    axes.vlines(s, 0, 1, transform=axes.get_xaxis_transform(), color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
+    if len(changes) > MOST_TOOL_LABELS:
+        return
+    for where, row in zip(s, changes, strict=True):
+        axes.annotate(
+            f"T{samples.tool[row]}",
+            (float(where), 0.0),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=(4, 5),
+            textcoords="offset points",
+            fontsize=9,
+            color=MUTED,
+        )
+
+
+def _line_numbers(axes: Axes, analysis: Analysis) -> None:
+    """Program lines along the upper edge, where the ticks below fall."""
+    end = float(analysis.samples.s[-1])
+    where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
+    rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
+    upper = axes.secondary_xaxis("top")
+    upper.set_xticks(mm_from_m(where), [str(line) for line in analysis.samples.line[rows]])
+    upper.tick_params(length=3, labelsize=9)
+    upper.set_xlabel("program line", fontsize=9, color=MUTED)
+
+
+def _legend(axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    axes.figure.legend(
+        handles,
+        labels,
+        loc="upper right",
+        bbox_to_anchor=(1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT),
+        ncols=len(labels),
+        frameon=False,
+        fontsize=9.5,
+        borderaxespad=0.0,
+        columnspacing=1.4,
+        handlelength=1.8,
+    )

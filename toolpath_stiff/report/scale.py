@@ -1,0 +1,60 @@
+"""The colour scale of stiffness, shared by the pictures and the page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.units import n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.analysis import Analysis
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+CLASSES = 32  # colours; more cannot be told apart along a line, and each costs a drawing call
+FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
+UNREACHABLE = -1
+
+
+def scale_limits(analysis: Analysis) -> tuple[float, float]:
+    """Ends of the colour scale in N/mm: lowest and highest value, values far out (`FENCE`) set aside.
+
+    A few plunges, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
+    that values lie beyond.
+    """
+    counted = analysis.counted
+    stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness[counted])
+    order = np.argsort(stiffness, kind="stable")
+    length = np.cumsum(analysis.samples.weight[counted][order])
+    lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
+    reach = FENCE * (upper - lower)
+    inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
+    values = inside if np.ptp(inside) > 0.0 else stiffness
+    low, high = float(values.min()), float(values.max())
+    if high - low < 1e-6 * high:  # a constant: keep the scale from collapsing
+        low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
+    return low, high
+
+
+def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntArray:
+    """(n - 1,) class 0 to CLASSES - 1 of the segments between n samples, from the mean of their ends.
+
+    `stiffness` and `limits` in N/mm; values beyond the limits take the end classes; UNREACHABLE where an end is nan.
+    """
+    low, high = limits
+    mean = 0.5 * (stiffness[1:] + stiffness[:-1])
+    missing = np.isnan(mean)
+    part = (np.where(missing, low, mean) - low) / (high - low)
+    classes = np.clip((part * CLASSES).astype(np.int64), 0, CLASSES - 1)
+    return np.where(missing, UNREACHABLE, classes)
+
+
+def legend_extend(analysis: Analysis, limits: tuple[float, float]) -> str:
+    """Which ends of the scale values lie beyond: "neither", "min", "max" or "both" (matplotlib's words)."""
+    stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness[analysis.counted])
+    below, above = bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])
+    return {(False, False): "neither", (True, False): "min", (False, True): "max"}.get((below, above), "both")

@@ -1,0 +1,151 @@
+"""The short tables that `tps analyze` prints: plain text, no colour codes, at most 100 columns."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from toolpath_stiff.report.comparison import FIGURES, compare_summaries
+from toolpath_stiff.report.wording import duration, number, plain, shortened
+
+WIDTH = 100
+LABEL = 14  # columns of the left-hand words
+
+TITLES = {
+    "mean_N_per_mm": "mean N/mm",
+    "min_N_per_mm": "min N/mm",
+    "max_N_per_mm": "max N/mm",
+    "range_N_per_mm": "range N/mm",
+    "mean_deflection_um": "deflection um",
+}
+
+
+def terminal_table(summary: Mapping[str, Any]) -> str:
+    """The figures of one analysis.
+
+    Parameters
+    ----------
+    summary
+        As in `summary.json`.
+    """
+    lines = [
+        *_entry("program", summary["program"]),
+        *_entry("machine", _machine(summary)),
+        *_entry("load", f"{summary['load']}, {summary['force_N']:g} N"),
+        *_entry("program zero", _origin(summary)),
+        *_entry("samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
+        *_entry("path", _path(summary)),
+        *_entry("stiffness", _stiffness(summary)),
+        *_weakest(summary),
+        *_entry("limits", _limits(summary)),
+        *_entry(
+            "extrapolated", f"{summary['extrapolated_share']:.1%} of the cutting samples are outside the strut law"
+        ),
+    ]
+    if len(summary["per_tool"]) > 1:
+        lines += _tools(summary["per_tool"])
+    if summary["unsupported"]:
+        words = ", ".join(sorted({str(entry["word"]) for entry in summary["unsupported"]}))
+        lines += _entry("not acted upon", f"{len(summary['unsupported'])} words (in summary.json): {words}")
+    lines += _entry("assumptions", f"{len(summary['assumptions'])}, listed in summary.json")
+    for warning in summary["warnings"]:
+        lines += _entry("warning", warning)
+    return "\n".join(lines)
+
+
+def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+    """Two machines side by side, the difference in percent of the first."""
+    compared = compare_summaries(summary, other)
+    rows = [["", shortened(plain(summary["machine"]), 24), shortened(plain(other["machine"]), 24), "difference"]]
+    for name, change in zip(FIGURES, compared["difference_percent"].values(), strict=True):
+        digits = 2 if name.endswith("_um") else 0
+        difference = "-" if change is None else f"{change:+.1f} %"
+        rows.append([TITLES[name], number(summary[name], digits), number(other[name], digits), difference])
+    places = [s["weakest"] for s in (summary, other)]
+    rows.append(["weakest line", *(str(place["line"]) if place else "-" for place in places), ""])
+    rows.append(["extrapolated", *(f"{s['extrapolated_share']:.1%}" for s in (summary, other)), ""])
+    if any(s["out_of_reach_samples"] for s in (summary, other)):
+        rows.append(["out of reach", *(number(s["out_of_reach_samples"]) for s in (summary, other)), ""])
+    return "\n".join(_columns(rows))
+
+
+def _entry(label: str, text: str) -> list[str]:
+    """A labelled entry, wrapped and indented."""
+    return textwrap.wrap(
+        plain(text),
+        WIDTH,
+        initial_indent=f"{label:<{LABEL}}  ",
+        subsequent_indent=" " * (LABEL + 2),
+        break_on_hyphens=False,
+    ) or [label]
+
+
+def _machine(summary: Mapping[str, Any]) -> str:
+    effects = summary["effects"]
+    return f"{summary['machine']} with {', '.join(effects)}" if effects else str(summary["machine"])
+
+
+def _origin(summary: Mapping[str, Any]) -> str:
+    says = {"option": "--origin", "program": "from the program", "default": "the machine's default"}
+    words = [f"{axis}{value:.10g}" for axis, value in zip("XYZABC", summary["origin_mm_deg"], strict=True)]
+    shown = words if any(summary["origin_mm_deg"][3:]) else words[:3]
+    return f"{' '.join(shown)} ({says.get(summary['origin_source'], summary['origin_source'])})"
+
+
+def _path(summary: Mapping[str, Any]) -> str:
+    cutting, rapid = number(summary["cutting_length_mm"], 1), number(summary["rapid_length_mm"], 1)
+    return f"{cutting} mm cutting, {rapid} mm rapid, {duration(summary['time_s'])}"
+
+
+def _stiffness(summary: Mapping[str, Any]) -> str:
+    mean, low, high, span = (number(summary[name]) for name in FIGURES[:4])
+    return f"mean {mean} N/mm, min {low}, max {high}, range {span} N/mm"
+
+
+def _weakest(summary: Mapping[str, Any]) -> list[str]:
+    place = summary["weakest"]
+    if place is None:
+        return _entry("weakest", "-")
+    where = " ".join(f"{axis.upper()}{place[f'{axis}_mm']:.3f}" for axis in "xyz")
+    if any(place[f"{axis}_deg"] for axis in "abc"):
+        where += " " + " ".join(f"{axis.upper()}{place[f'{axis}_deg']:.3f}" for axis in "abc")
+    lines = _entry("weakest", f"{number(place['stiffness_N_per_mm'])} N/mm in line {place['line']} at {where}")
+    if place["text"]:
+        lines.append(" " * (LABEL + 2) + shortened(plain(place["text"]), WIDTH - LABEL - 2))
+    return lines
+
+
+def _limits(summary: Mapping[str, Any]) -> str:
+    text = f"nearest in line {summary['min_margin_line']}: {summary['min_margin_limit']}"
+    if summary["out_of_reach_samples"]:
+        text += f"; {number(summary['out_of_reach_samples'])} cutting samples are out of reach and left out"
+    return text
+
+
+def _tools(per_tool: Sequence[Mapping[str, Any]]) -> list[str]:
+    rows = [["tool", "length mm", "cutting mm", "mean N/mm", "min", "max", "remark"]]
+    for row in per_tool:
+        rows.append(
+            [
+                f"T{row['tool']}",
+                "reference" if row["length_mm"] is None else number(row["length_mm"], 2),
+                number(row["cutting_length_mm"], 1),
+                *(number(row[name]) for name in FIGURES[:3]),
+                shortened(plain(row["remark"]), 30),
+            ]
+        )
+    return _columns(rows, left_last=True)
+
+
+def _columns(rows: list[list[str]], left_last: bool = False) -> list[str]:
+    """Align: the first column (and the last, if asked) to the left, the others to the right."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    widths[0] = max(widths[0], LABEL)
+    left = {0, len(widths) - 1} if left_last else {0}
+    return [
+        "  ".join(
+            f"{c:<{w}}" if i in left else f"{c:>{w}}" for i, (c, w) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()[:WIDTH]
+        for row in rows
+    ]
