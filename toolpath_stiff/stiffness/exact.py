@@ -13,6 +13,7 @@ with x the motion of the platform and y that of the tip. Both are exact, no iter
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,7 +75,8 @@ def respond(path: LoadPath, links: Links, wrenches: FloatArray) -> tuple[FloatAr
     Returns
     -------
     twists, forces
-        (n, 6, m) m and rad; (n, 6, m) N. nan where the machine is singular.
+        (n, 6, m) m and rad; (n, 6, m) N. nan where a pivot is exactly 0; near a singular pose they are just huge
+        (`machine.limits` refuses such poses).
     """
     jacobian = path.struts.jacobian
     transposed = np.swapaxes(jacobian, 1, 2)
@@ -103,7 +105,8 @@ def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
     except np.linalg.LinAlgError:
         solution = np.full(np.broadcast_shapes(matrix.shape[:-2], right.shape[:-2]) + right.shape[-2:], np.nan)
         for i, (one, side) in enumerate(zip(matrix, right, strict=True)):
-            if np.linalg.matrix_rank(one) == len(one):
+            # The same test as for a batch without singular poses: a pose's result does not hang on its neighbours.
+            with suppress(np.linalg.LinAlgError):
                 solution[i] = np.linalg.solve(one, side)
         return solution
 

@@ -181,7 +181,8 @@ def read_parameters(effect: Effect, given: Mapping[str, object], where: str) -> 
     for key in given:
         if key not in by_key:
             raise InputError(
-                f"{where}: effect {effect.name}: unknown key {key}", expected=f"one of {', '.join(by_key)}"
+                f"{where}: effect {effect.name}: unknown key {key}",
+                expected=f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance",
             )
     values = {}
     for key, parameter in by_key.items():

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.stiffness.effects.contract import LINKS, Effect
+from toolpath_stiff.stiffness.effects.contract import LINKS, Effect, Parameter
 
 ENTRY_POINTS = "toolpath_stiff.effects"
 NOT_EFFECTS = ("contract", "registry")
@@ -42,6 +42,8 @@ def installed_effects() -> tuple[dict[str, Effect], dict[str, str]]:
             loaded = point.load()
             effect = loaded() if isinstance(loaded, type) else loaded
             _check(effect, point.name)
+            if effect.name in packaged_effects() or effect.name in found:
+                raise InputError(f"effect {effect.name} exists already")
             found[effect.name] = effect
         except Exception as error:  # a broken plug-in is listed with its reason; the rest still works
             broken[point.name] = f"{type(error).__name__}: {error}"
@@ -70,6 +72,9 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
     known = known_effects(files)
     if name in known:
         return known[name]
+    broken = installed_effects()[1]
+    if name in broken:
+        raise InputError(f"effect {name} does not load: {broken[name]}", hint="repair or uninstall its package")
     near = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean {near[0]}?" if near else "`tps effects list` lists them"
     raise InputError(f"unknown effect {name!r}", expected=f"one of {', '.join(known)}", hint=hint)
@@ -88,10 +93,12 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
+        found = _effects_in(module, str(file))
+    except InputError:
+        raise
     except Exception as error:
         line = getattr(error, "lineno", None) or _line_in(error, path)
         raise InputError(f"{type(error).__name__}: {error}", file=str(file), line=line) from None
-    found = _effects_in(module, str(file))
     if not found:
         raise InputError(
             "defines no effect",
@@ -105,7 +112,7 @@ def _line_in(error: BaseException, path: Path) -> int | None:
     """Line of `path` that raised `error`."""
     trace, line = error.__traceback__, None
     while trace is not None:
-        if Path(trace.tb_frame.f_code.co_filename) == path:
+        if Path(trace.tb_frame.f_code.co_filename).resolve() == path.resolve():
             line = trace.tb_lineno
         trace = trace.tb_next
     return line
@@ -113,11 +120,13 @@ def _line_in(error: BaseException, path: Path) -> int | None:
 
 def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
     """Effects that a module itself defines."""
-    found = {}
+    found: dict[str, Effect] = {}
     for value in vars(module).values():
         if isinstance(value, type) and issubclass(value, Effect) and value.__module__ == module.__name__:
             effect = value()
             _check(effect, where)
+            if effect.name in found and type(found[effect.name]) is not value:
+                raise InputError(f"{where}: effect {effect.name} is defined twice", hint="give one another name")
             found[effect.name] = effect
     return found
 
@@ -132,6 +141,8 @@ def _check(effect: object, where: str) -> None:
             raise InputError(f"{where}: effect {label} has no `{attribute}`")
     if effect.link not in LINKS:
         raise InputError(f"{where}: effect {label}: link = {effect.link!r}", expected=f"one of {', '.join(LINKS)}")
+    if not all(isinstance(parameter, Parameter) for parameter in effect.parameters):
+        raise InputError(f"{where}: effect {label}: parameters hold something else", expected="Parameter(...)")
     names = [parameter.name for parameter in effect.parameters]
     doubled = {name for name in names if names.count(name) > 1}
     if doubled:
