@@ -1,0 +1,115 @@
+"""`tps effects`: what it lists agrees with the registry, what it writes loads as it stands."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import EntryPoint
+
+import numpy as np
+import pytest
+
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.stiffness.core import tip_compliance
+from toolpath_stiff.stiffness.effects import LINKS, find_effect, known_effects, registry
+from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+
+
+@pytest.fixture
+def template(tmp_path, capsys):
+    file = tmp_path / "my_screw.py"
+    assert main(["effects", "new", str(file)]) == 0
+    capsys.readouterr()
+    return file
+
+
+def test_list_shows_every_effect_along_the_load_path(capsys):
+    assert main(["effects", "list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert [effect["name"] for effect in listed["effects"]] == list(known_effects())
+    places = [LINKS.index(effect["link"]) for effect in listed["effects"]]
+    assert places == sorted(places)
+    assert main(["effects", "list"]) == 0
+    text = capsys.readouterr().out
+    for effect in known_effects().values():
+        line = next(line for line in text.splitlines() if f" {effect.name} " in line)
+        assert effect.title in line
+        assert all(parameter.name in line and parameter.unit in line for parameter in effect.parameters)
+
+
+def test_show_tells_what_a_parameter_is(capsys):
+    assert main(["effects", "show", "platform_flexibility"]) == 0
+    text = capsys.readouterr().out
+    effect = find_effect("platform_flexibility")
+    parameter = effect.parameters[0]
+    for part in (effect.equation, effect.source, parameter.key, parameter.source, parameter.meaning, "1e+08 to inf"):
+        assert part in text
+
+
+def test_show_json_is_strict_json_even_with_infinite_bounds(capsys):
+    assert main(["effects", "show", "platform_flexibility", "--json"]) == 0
+
+    def refuse(constant: str):
+        raise AssertionError(constant)
+
+    shown = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    assert shown["parameters"][0]["bounds"] == [1e8, "inf"]
+
+
+def test_what_new_writes_loads_and_softens_the_machine(template, capsys):
+    assert len(template.read_text().splitlines()) < 60
+    assert main(["effects", "show", "my_screw", "--effects", str(template)]) == 0
+    shown = capsys.readouterr().out
+    machine = load_machine("nist")
+    effect = find_effect("my_screw", [template])
+    position = np.array([[0.1, 0.0, 0.4]])
+    soft = tip_compliance(build_model(machine, extra=[ActiveEffect(effect, {"compliance": 2e-9})]), position)
+    assert (np.diag(soft[0]) > np.diag(tip_compliance(build_model(machine), position)[0])).all()
+    assert f"{effect.parameters[0].key} = " in shown
+    # The key that the template's own text names is the one that is read.
+    assert f"    {effect.parameters[0].key} = " in template.read_text()
+
+
+def test_several_effect_files(template, tmp_path, capsys):
+    other = tmp_path / "other.py"
+    assert main(["effects", "new", str(other)]) == 0
+    capsys.readouterr()
+    assert main(["effects", "list", "--json", "--effects", str(template), "--effects", str(other)]) == 0
+    names = {effect["name"] for effect in json.loads(capsys.readouterr().out)["effects"]}
+    assert {"my_screw", "other"} <= names
+
+
+def test_a_plug_in_that_does_not_load_is_listed_with_its_reason(monkeypatch, capsys):
+    point = EntryPoint("gone", "no_such_package:Thing", registry.ENTRY_POINTS)
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [point])
+    registry.installed_effects.cache_clear()
+    try:
+        assert main(["effects", "list"]) == 0
+        assert "gone: ModuleNotFoundError" in capsys.readouterr().out
+    finally:
+        registry.installed_effects.cache_clear()
+
+
+def test_new_never_overwrites(template, capsys):
+    template.write_text("mine")
+    assert main(["effects", "new", str(template)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert template.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["show", "platform_flexibilty"], "Did you mean platform_flexibility"),
+        (["list", "--effects", "none.py"], "'none.py' does not exist"),
+        (["new", "my screw.py"], "such as my_screw.py"),
+        (["new", "screw.txt"], "such as my_screw.py"),
+        ([], "required"),
+    ],
+)
+def test_wrong_input_is_one_message_and_exit_code_2(words, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["effects", *words]) == 2
+    error = capsys.readouterr().err
+    assert message in error and "Traceback" not in error
+    assert list(tmp_path.iterdir()) == []

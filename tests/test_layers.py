@@ -1,0 +1,134 @@
+"""The rooms of docs/architecture.md: a lower one never imports a higher one, and the help imports nothing heavy."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import toolpath_stiff
+
+PACKAGE = Path(toolpath_stiff.__file__).parent
+# From the lowest to the highest; rooms of one rank do not import each other. `files` writes what others made.
+RANK = {
+    "units": 0,
+    "errors": 0,
+    "files": 1,
+    "nc": 2,
+    "path": 3,
+    "machine": 4,
+    "stiffness": 5,
+    "analysis": 6,
+    "placement": 7,
+    "updating": 7,
+    "report": 8,
+    "cli": 9,
+}
+RIG_MAY_IMPORT = {"units", "errors", "files", "rig"}
+HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
+
+
+def imports(source: str, package: str) -> Iterator[str]:
+    """Every absolute module name that the source imports, inside functions too; relative ones are resolved."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            # `from toolpath_stiff import machine` imports a room as well.
+            yield from (f"{module}.{alias.name}" for alias in node.names)
+
+
+def room_of(module: str) -> str:
+    """First name below the package: `toolpath_stiff.nc.words` -> `nc`."""
+    return module.split(".")[1]
+
+
+def trespasses(source: str, room: str, package: str) -> list[str]:
+    """The imports of a module in `room` that its rank forbids."""
+    found = []
+    for name in imports(source, package):
+        if not name.startswith("toolpath_stiff.") or room_of(name) not in {*RANK, "rig"}:
+            continue
+        other = room_of(name)
+        if room == "rig":
+            allowed = other in RIG_MAY_IMPORT
+        else:
+            allowed = other == room or (other != "rig" and RANK[other] < RANK[room]) or (other, room) == ("rig", "cli")
+        if not allowed:
+            found.append(name)
+    return found
+
+
+def modules() -> list[Path]:
+    """Modules of the package that stand in a room; `__init__` and `__main__` of the package itself see all rooms."""
+    files = sorted(path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py"))
+    return [path for path in files if path.parts[0] not in ("__init__.py", "__main__.py", "data")]
+
+
+@pytest.mark.parametrize("path", modules(), ids=str)
+def test_no_module_imports_a_higher_room(path):
+    room = path.parts[0].removesuffix(".py")
+    assert room in {*RANK, "rig"}, f"{room} has no place in docs/architecture.md"
+    package = ".".join(("toolpath_stiff", *path.parts[:-1]))
+    assert trespasses((PACKAGE / path).read_text("utf-8"), room, package) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "room"),
+    [
+        ("from toolpath_stiff.stiffness import exact", "machine"),
+        ("def f():\n    from toolpath_stiff.report import page", "analysis"),
+        ("from toolpath_stiff import machine", "nc"),
+        ("import toolpath_stiff.cli.main", "report"),
+        ("from ..stiffness import exact", "machine"),
+        ("from toolpath_stiff.machine import load_machine", "rig"),
+        ("from toolpath_stiff.updating import fit", "placement"),
+    ],
+)
+def test_the_check_finds_a_trespass(source, room):
+    assert trespasses(source, room, f"toolpath_stiff.{room}")
+
+
+def test_every_room_is_in_the_architecture_page_or_beside_it():
+    """The ranks above follow the page's table, top to bottom."""
+    page = (PACKAGE.parent / "docs" / "architecture.md").read_text("utf-8")
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
+    named = [name.strip().strip("`") for row in rows for name in row.split(",")]
+    ranks = [RANK[name] for name in named if name != "rig"]
+    assert ranks == sorted(ranks)
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], []])
+def test_the_help_imports_nothing_heavy(words):
+    """In a fresh interpreter: this one has numpy already."""
+    code = (
+        "import sys, io, contextlib\n"
+        "from toolpath_stiff.cli.main import main\n"
+        "with contextlib.redirect_stdout(io.StringIO()):\n"
+        f"    main({words!r})\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("command", ["analyze", "path", "pose", "effects", "machine"])
+def test_the_help_of_a_command_imports_nothing_heavy(command):
+    """Commands import numpy and its like in `run`, so that a slip in an option is answered at once."""
+    if not (PACKAGE / "cli" / f"{command}.py").exists():
+        pytest.skip(f"{command} is not there yet")
+    code = (
+        "import sys, io, contextlib\n"
+        "from toolpath_stiff.cli.main import main\n"
+        "with contextlib.redirect_stdout(io.StringIO()):\n"
+        f"    main([{command!r}, '--help'])\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
