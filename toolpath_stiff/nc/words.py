@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError
 
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[E][+-]?\d+)?"
-WORD = re.compile(rf"([A-Z])({NUMBER})")
-PLAIN = re.compile(r"-?(?:\d+\.?\d*|\.\d+)$")
-LETTERS = frozenset("ABCDFGHIJKLMNPQRSTUVWXYZ")
-CODE_DECIMALS = 1  # G59.3, G92.1: more digits are no code
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
+# ASCII digits alone: the digits of other scripts are no numbers to any control.
+WORD = re.compile(rf"([A-Z])({NUMBER})(E[+-]?\d+)?", re.ASCII)
+LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTUVWXYZ")
+COMMENT = re.compile("[();]")
+NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
 
 
 class Word(NamedTuple):
@@ -46,9 +48,7 @@ class Block:
 
 def read_block(text: str, line: int, name: str) -> Block:
     """Read the words of one line. Raises `InputError` with line and column."""
-    # The bulk of a big program is plain words with single blanks: no comment, nothing to normalise.
-    characters, columns = _strip(text, line, name)
-    compact = "".join(characters)
+    compact, columns = _strip(text, line, name)
     if not compact:
         return Block(line, ())
     if compact == "%":
@@ -79,8 +79,13 @@ def _program_number(compact: str, column: int, line: int, name: str) -> Block:
     )
 
 
-def _strip(text: str, line: int, name: str) -> tuple[list[str], list[int]]:
-    """Upper-case characters outside comments and blanks, with their columns."""
+def _strip(text: str, line: int, name: str) -> tuple[str, Sequence[int]]:
+    """Upper-case text without comments and blanks, and the column of each of its characters."""
+    if text.isascii() and not COMMENT.search(text):  # the bulk of a big program
+        compact = "".join(text.split()).upper()
+        if len(compact) == len(text):
+            return compact, range(1, len(text) + 1)
+        return compact, [column for column, character in enumerate(text, 1) if not character.isspace()]
     characters: list[str] = []
     columns: list[int] = []
     inside = 0
@@ -103,16 +108,17 @@ def _strip(text: str, line: int, name: str) -> tuple[list[str], list[int]]:
         elif character == ")":
             raise InputError("`)` without `(`", file=name, line=line, column=column)
         elif not character.isspace() and character != "\ufeff":
-            characters.append(character.upper())
+            # Of other scripts some letters grow in upper case, and some become ASCII ones.
+            characters.append(character.upper() if character.isascii() else character)
             columns.append(column)
     if inside:
         raise InputError(
             "a comment is not closed", expected="`)` on the same line", file=name, line=line, column=inside
         )
-    return characters, columns
+    return "".join(characters), columns
 
 
-def _tokens(compact: str, columns: list[int], start: int, text: str, line: int, name: str) -> list[Word]:
+def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: int, name: str) -> list[Word]:
     """Words of the compacted text; N words are checked and left out."""
     words: list[Word] = []
     position = start
@@ -121,8 +127,15 @@ def _tokens(compact: str, columns: list[int], start: int, text: str, line: int, 
         column = columns[position]
         if match is None:
             raise _unreadable(compact, position, column, line, name)
-        letter, number = match.groups()
+        letter, number, exponent = match.groups()
         end = match.end()
+        if exponent:
+            # An exponent stands without blanks; `X1 E5` is two words, and not a hundred metres.
+            begin = match.start(3)
+            if letter in NO_EXPONENT or columns[begin] - columns[begin - 1] > 1:
+                end = begin
+            else:
+                number += exponent
         original = text[column - 1 : columns[end - 1]]
         if letter == "N":
             if words:
@@ -180,14 +193,8 @@ def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...
         read = list(text2words(" ".join([_plain(word) for word in words])))
     except GCodeWordStrError:
         read = []
-    if len(read) == len(words):
-        checked = [
-            Word(word.letter, float(got.value), word.column, word.text)
-            for word, got in zip(words, read, strict=True)
-            if got.letter == word.letter and float(got.value) == word.value
-        ]
-        if len(checked) == len(words):
-            return tuple(checked)
+    if [(got.letter, float(got.value)) for got in read] == [(word.letter, word.value) for word in words]:
+        return tuple(words)
     for word in words:  # one at a time, to find the one that pygcode refuses
         try:
             (alone,) = text2words(_plain(word))
@@ -206,7 +213,9 @@ def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...
 
 def _plain(word: Word) -> str:
     """The word as pygcode can read it: no plus, no exponent, whole numbers where it wants them."""
-    number = format(Decimal(repr(word.value)), "f")
+    number = repr(word.value)
+    if "e" in number:
+        number = format(Decimal(number), "f")
     if number.endswith(".0"):
         number = number[:-2]
     return word.letter + number
