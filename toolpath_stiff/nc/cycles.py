@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
 
+SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
+
 
 @dataclass(frozen=True)
 class Drilling:
@@ -35,13 +37,15 @@ def strokes(hole: Drilling) -> Iterator[Stroke]:
         yield from _pecks(hole)
     dwell = hole.dwell if hole.code in ("G82", "G89") else 0.0
     yield Stroke(hole.bottom, feed=True, dwell=dwell)
-    yield Stroke(hole.clear, feed=hole.code in ("G85", "G89"))
+    if hole.code == "G85":  # out to the R plane at feed, from there at rapid
+        yield Stroke(hole.retract, feed=True)
+    yield Stroke(hole.clear, feed=hole.code == "G89")
 
 
 def _pecks(hole: Drilling) -> Iterator[Stroke]:
     """The pecks above the bottom. G73 breaks the chip at depth, G83 clears it at the R plane."""
     count = 1
-    while hole.retract - count * hole.peck > hole.bottom:
+    while hole.retract - count * hole.peck > hole.bottom + SAME_HEIGHT_MM:
         depth = hole.retract - count * hole.peck
         yield Stroke(depth, feed=True)
         if hole.code == "G83":

@@ -97,8 +97,9 @@ class Frames:
         return [*(c - r for c, r in zip(control[:3], reference, strict=True)), *control[3:]]
 
     def machine_position(self) -> list[float]:
-        """The controlled point in machine coordinates (rotary axes as they are)."""
+        """The spindle's place in machine coordinates, as a control shows it: without the tool length in force."""
         point = self.to_setup(self.position)
+        point[2] += self.tool
         origin = self.origin
         turned = _rotate(_matrix(origin), point[:3])
         return [*(t + o for t, o in zip(turned, origin[:3], strict=True)), *point[3:]]
@@ -109,7 +110,8 @@ class Frames:
         shifted = [m - o for m, o in zip(machine[:3], origin[:3], strict=True)]
         matrix = _matrix(origin)
         back = _rotate([[matrix[j][i] for j in range(3)] for i in range(3)], shifted)
-        return [*(b + r for b, r in zip(back, reference, strict=True)), *machine[3:]]
+        x, y, z = (b + r for b, r in zip(back, reference, strict=True))
+        return [x, y, z - self.tool, *machine[3:]]
 
     def set_tool(self, length: float) -> None:
         """Another tool length: the machine stands still, the controlled point's numbers change."""

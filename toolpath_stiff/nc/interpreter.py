@@ -370,12 +370,18 @@ class Interpreter:
         tool.diameter = tool.diameter if radius is None else 2.0 * radius * self._scale
 
     def _go_home(self, code: str) -> None:
-        """G28, G30: rapid to the intermediate point, if one is given, then to the reference point."""
+        """G28, G30: rapid to the intermediate point, then the axes named there, or all, to the reference point."""
         words = self._axis_words()
         if words:
             self._straight(RAPID, self._target(words), set(words))
         home = self.frames.offsets.home_g28 if code == "G28" else self.frames.offsets.home_g30
-        self._straight(RAPID, self.frames.control_of_machine(list(home)), set(), machine=set(range(6)))
+        going = set(words) or set(range(6))
+        # Axis by axis in program coordinates, as LinuxCNC does: with a rotation in force it is not the same.
+        frames = self.frames
+        there = frames.to_program(frames.control_of_machine(list(home)))
+        here = frames.to_program(frames.position)
+        point = [there[axis] if axis in going else here[axis] for axis in range(6)]
+        self._straight(RAPID, frames.to_control(point), set(), machine=going)
 
     def _shift(self, code: str, word: Word) -> None:
         words = self._axis_words()
@@ -407,7 +413,8 @@ class Interpreter:
         machine_word = next((w for c, w in codes.once if c == "G53"), None)
         if given is not None:
             if given[0] != self.motion and given[0] in CYCLES:
-                self.sticky = {}
+                level = self.sticky.get("level") if self.motion in CYCLES else None
+                self.sticky = {} if level is None else {"level": level}
             self.motion = None if given[0] == "G80" else given[0]
         axes = any(self.has(letter) for letter in AXES)
         if self.motion is None:
@@ -606,12 +613,14 @@ class Interpreter:
             self.sticky["Z"] = words.pop(normal)
         self._check_cycle(code, normal)
         frames = self.frames
-        point = frames.to_program(frames.position)
-        level = point[normal]
-        retract = self.sticky["R"] if self.absolute else self.sticky["R"] + level
+        here = frames.to_program(frames.position)[normal]
+        # The level from which a run of cycles began: G91's R counts from it, G98 returns to it.
+        initial = self.sticky.setdefault("level", here)
+        retract = self.sticky["R"] if self.absolute else self.sticky["R"] + initial
         bottom = self.sticky["Z"] if self.absolute else retract + self.sticky["Z"]
         if retract < bottom:
             raise self.fail(None, f"{code}: R at {retract:g} mm is below the bottom at {bottom:g} mm", "R above it")
+        level = initial if self.retract == "G98" else here
         if level < retract:
             self._along_normal(normal, retract, RAPID)
             level = retract
@@ -622,7 +631,9 @@ class Interpreter:
             for axis in (first, second):
                 if axis in words:
                     place[axis] = words[axis] if self.absolute else place[axis] + words[axis]
+            place[normal] = level
             self._straight(RAPID, frames.to_control(place), set(words))
+            level = clear
             self._along_normal(normal, retract, RAPID)
             for stroke in strokes(hole):
                 self._along_normal(normal, stroke.height, CYCLE if stroke.feed else RAPID, stroke.dwell)

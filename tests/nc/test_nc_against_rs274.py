@@ -1,0 +1,219 @@
+"""Our moves against LinuxCNC's interpreter: random programs over every supported code, and programs of others."""
+
+from __future__ import annotations
+
+import math
+import random
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.nc import rs274
+from toolpath_stiff.errors import TpsError
+from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
+
+pytestmark = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
+
+# rs274 prints four decimals of the active unit, of position, work offset, G92 and tool length each: half a unit
+# in the last place of each, in inches.
+TOLERANCE_MM = 4 * 0.5e-4 * 25.4
+# LinuxCNC takes tool table lengths as inches in rs274, whatever the ini says; ours as mm.
+TOOLS = {1: 50.0, 2: 75.5, 3: 101.6}
+TABLE_RS274 = "".join(f"T{n} P{n} Z{z / 25.4:.8f} D0.25 ;\n" for n, z in TOOLS.items())
+TABLE_OURS = "".join(f"T{n} P{n} Z{z} D6.35 ;\n" for n, z in TOOLS.items())
+
+
+def our_moves(program: Program):
+    moves, origin = program.moves, np.array(program.origin[:3]) * 1e3
+    for i in range(len(moves)):
+        ends = []
+        for pose in (moves.start[i], moves.end[i]):
+            ends.append(np.concatenate([pose[:3] * 1e3 + origin, np.rad2deg(pose[3:])]))
+        arc = None
+        if moves.arc_sweep[i]:
+            arc = (moves.arc_center[i] * 1e3 + origin, moves.arc_normal[i], moves.arc_sweep[i])
+        kind = {"cycle": "feed"}.get(MOTION_NAMES[moves.motion[i]], MOTION_NAMES[moves.motion[i]])
+        yield kind, *ends, arc, int(moves.line[i])
+
+
+def assert_same_path(program: Program, canon: rs274.Canon) -> None:
+    """Same kinds, ends, arc axes and senses, move by move; moves shorter than the printed digits are left out."""
+
+    def long_enough(move) -> bool:
+        return move[3] is not None or np.abs(move[2] - move[1]).max() > 2 * TOLERANCE_MM
+
+    ours = [m for m in our_moves(program) if long_enough(m)]
+    theirs = [m for m in canon.moves if long_enough(m)]
+    for mine, other in zip(ours, theirs, strict=False):
+        where = f"line {mine[4]}: {program.source[mine[4] - 1]!r}\nours {mine}\ntheirs {other}"
+        assert mine[0] == other[0], where
+        np.testing.assert_allclose(mine[2], other[2], atol=TOLERANCE_MM, rtol=0, err_msg=where)
+        if mine[3] is not None:
+            center, normal, sweep = mine[3]
+            their_center, their_normal, turns = other[3]
+            np.testing.assert_allclose(normal, their_normal, atol=1e-6, err_msg=where)
+            apart = center - their_center
+            # A centre from R magnifies the printed digits where the chord is nearly a diameter.
+            assert np.linalg.norm(apart - (apart @ normal) * normal) < 50 * TOLERANCE_MM, where
+            assert np.sign(sweep) == np.sign(turns), where
+            assert math.ceil(abs(sweep) / math.tau - 1e-6) == abs(turns), where
+    assert len(ours) == len(theirs)
+
+
+class Writer:
+    """Writes a random program that stays valid: it tracks just enough state for that."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+        self.lines = ["G21 G17 G90 G94 F500", "G0 X1 Y2 Z30"]
+        self.inch = False
+
+    def number(self, low: float, high: float) -> str:
+        value = self.random.uniform(low, high) / (25.4 if self.inch else 1.0)
+        return self.random.choice([f"{value:.3f}", f"{value:+.4f}", f" {value:.2f}", f"{value:.1f}"])
+
+    def axes(self, letters: str, low: float = -40, high: float = 40, least: int = 1) -> str:
+        chosen = self.random.sample(letters, self.random.randint(least, len(letters)))
+        return " ".join(
+            f"{c}{self.random.uniform(-20, 20):.2f}" if c in "ABC" else f"{c}{self.number(low, high)}" for c in chosen
+        )
+
+    def arc(self) -> None:
+        plane = self.random.choice(["G17", "G18", "G19"])
+        first, second, normal = {"G17": "XYZ", "G18": "ZXY", "G19": "YZX"}[plane]
+        words = {"X": "I", "Y": "J", "Z": "K"}
+        code = self.random.choice(["G2", "G3"])
+        radius = self.random.uniform(3, 20)
+        angle, sweep = self.random.uniform(0, 6.28), self.random.uniform(0.3, 6.0)
+        if self.random.random() < 0.2:
+            sweep = 0.0  # a full circle
+        u = 25.4 if self.inch else 1.0
+        i, j = radius * math.cos(angle) / u, radius * math.sin(angle) / u
+        sign = -1 if code == "G2" else 1
+        end = angle + math.pi + sign * sweep
+        dx, dy = i + radius * math.cos(end) / u, j + radius * math.sin(end) / u
+        helix = f"{normal}{self.number(-5, 5)}" if self.random.random() < 0.4 else ""
+        turns = f"P{self.random.randint(1, 3)}" if self.random.random() < 0.3 else ""
+        if self.random.random() < 0.3 and 0.3 < sweep < 5.9:
+            r = radius / u if sweep < math.pi else -radius / u
+            words_of_center, turns = f"R{r:.6f}", ""
+        else:
+            words_of_center = f"{words[first]}{i:.6f} {words[second]}{j:.6f}"
+        ends = "" if sweep == 0.0 else f"{first}{dx:.6f} {second}{dy:.6f}"
+        self.lines += ["G91", f"{plane} {code} {ends} {helix} {words_of_center} {turns}", "G90 G17"]
+
+    def cycle(self) -> None:
+        r = self.random
+        code = r.choice(["G81", "G82", "G83", "G73", "G85", "G89"])
+        plane = r.choice(["G17", "G18", "G19"])
+        first, second, normal = {"G17": "XYZ", "G18": "XZY", "G19": "YZX"}[plane]
+        extra = f"P{r.uniform(0, 2):.1f}" if code in ("G82", "G89") else ""
+        extra += f" Q{2.37 if not self.inch else 0.0937}" if code in ("G83", "G73") else ""
+        # In G18 and G19 rs274 2.9 takes the level of Z for that of the plane's own normal (G98, and R under G91).
+        back = r.choice(["G98", "G99"]) if plane == "G17" else "G99"
+        repeat = r.choice(["", "", "L2"])
+        if plane == "G17" and r.random() < 0.4:  # incremental: R up from here, Z down from R
+            self.lines += [
+                f"G91 {plane} {back} {code} {first}{self.number(1, 9)} {normal}{self.number(-9, -5)} "
+                f"R{self.number(1, 4)} {extra} {repeat}",
+                f"{second}{self.number(1, 9)}",
+            ]
+        else:
+            self.lines += [
+                f"{plane} {back} {code} {first}{self.number(1, 9)} {normal}{self.number(-9, -5)} "
+                f"R{self.number(1, 40)} {extra} {repeat}",
+                f"{first}{self.number(-9, 9)} {second}{self.number(1, 9)}",
+            ]
+        self.lines += ["G80", "G90 G17"]
+
+    def statement(self) -> None:
+        r = self.random
+        kind = r.randrange(13)
+        if kind <= 2:
+            self.lines.append(f"{r.choice(['G0', 'G1', 'g01', 'G 1'])} {self.axes('XYZABC')}")
+        elif kind <= 4:
+            self.arc()
+        elif kind <= 6:
+            self.cycle()
+        elif kind == 7:
+            # The stand-alone rs274 does not carry a tool length over a change of unit, so none is in force here.
+            self.lines += ["G49", f"G0 {self.axes('XYZ', least=3)}"]
+            self.inch = not self.inch
+            self.lines.append("G20 F20" if self.inch else "G21 F500")
+        elif kind == 8:
+            self.lines.append(r.choice(["G54", "G55", "G56", "G59.1", "G59.3"]))
+        elif kind == 9:
+            turn = f"R{r.uniform(-90, 90):.3f}" if r.random() < 0.5 else ""
+            level = r.choice(["L2", "L20"])
+            turn = "" if level == "L20" else turn
+            self.lines.append(f"G10 {level} P{r.randint(1, 9)} {self.axes('XYZAB')} {turn}")
+            if turn:  # rs274 does not turn the present point when the offset in force turns
+                self.lines.append(f"G0 {self.axes('XYZ', least=3)}")
+        elif kind == 10:
+            self.lines.append(
+                r.choice([f"G92 {self.axes('XYZ')}", "G92.1", "G92.2", "G92.3", f"G52 {self.axes('XYZ')}"])
+            )
+        elif kind == 11:
+            tool = r.choice([1, 2, 3])
+            # Nor does it know where it stands after a tool change, so all of X, Y, Z are given.
+            length = r.choice([f"G43 H{tool}", "G43", "G49", "G43.1 Z2.5"])
+            self.lines += ["G49", f"T{tool} M6", length, f"G0 {self.axes('XYZ', least=3)}"]
+        else:
+            self.lines.append(
+                r.choice([f"G53 G0 {self.axes('XYZ')}", f"G53 G1 {self.axes('XYZ')}", "G28", f"G30 {self.axes('XYZ')}"])
+            )
+            self.lines.append("G1 X1")
+
+    def program(self, statements: int = 40) -> str:
+        for _ in range(statements):
+            self.statement()
+        return "\n".join([*self.lines, "G1 X3 Y3", "M2", ""])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_programs(seed, tmp_path):
+    text = Writer(seed).program()
+    program = tmp_path / "random.ngc"
+    program.write_text(text)
+    canon = rs274.run(program, tmp_path, TABLE_RS274)
+    assert not canon.error, f"{canon.error}\n{text}"
+    table = tmp_path / "ours.tbl"
+    table.write_text(TABLE_OURS)
+    assert_same_path(read_program(program, tool_table=table), canon)
+
+
+def debian_programs() -> list[Path]:
+    """NC programs that Debian's linuxcnc-uspace installs and that run nothing."""
+    if not rs274.AVAILABLE or shutil.which("dpkg") is None:
+        return []
+    listing = subprocess.run(["dpkg", "-L", "linuxcnc-uspace"], capture_output=True, text=True, check=False).stdout
+    files = [Path(line) for line in listing.splitlines() if line.endswith((".ngc", ".nc"))]
+    return [f for f in files if f.is_file() and not rs274.UNSAFE.search(f.read_text(errors="replace"))]
+
+
+def test_programs_of_others(tmp_path):
+    """Each is read as LinuxCNC does, or refused with file, line and column."""
+    table = tmp_path / "ours.tbl"
+    table.write_text("".join(f"T{n} P{n} Z{n * 2.54} D6 ;\n" for n in range(1, 60)))
+    for_rs274 = "".join(f"T{n} P{n} Z{n * 0.1} D0.25 ;\n" for n in range(1, 60))
+    files = debian_programs()
+    assert files, "the package lists no programs"
+    same = 0
+    for index, file in enumerate(files):
+        try:
+            program = read_program(file, tool_table=table)
+        except TpsError as error:
+            assert str(error).startswith(file.name), error
+            continue
+        own = tmp_path / f"home{index}"  # it keeps its parameters from run to run
+        own.mkdir(exist_ok=True)
+        canon = rs274.run(file, own, for_rs274)
+        if canon.error:  # it refuses user M codes above 199, which do not concern us
+            assert "M-code greater than 199" in canon.error, (file, canon.error)
+            continue
+        assert_same_path(program, canon)
+        same += 1
+    assert same >= 10
