@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from importlib import resources
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine import load_machine, parse_machine
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.effects import LINKS, find_effect, known_effects, registry
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
@@ -113,3 +115,35 @@ def test_wrong_input_is_one_message_and_exit_code_2(words, message, capsys, tmp_
     error = capsys.readouterr().err
     assert message in error and "Traceback" not in error
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_command_honours_the_machine_files_effect(template, tmp_path, capsys):
+    """`tps pose` with the packaged machine and with a copy that carries the template's effect."""
+    text = (resources.files("toolpath_stiff") / "data" / "machines" / "nist.toml").read_text("utf-8")
+    machine = tmp_path / "soft.toml"
+    machine.write_text(f'{text}\n[[effect]]\nname = "my_screw"\ncompliance_nm_per_N_per_m = 2.0\n')
+    pose = ["pose", "100", "-200", "800", "--json"]
+    assert main(pose) == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert main([*pose, "--machine", str(machine), "--effects", str(template)]) == 0
+    soft = json.loads(capsys.readouterr().out)
+    assert all(soft[f"k{axis}_N_per_mm"] < plain[f"k{axis}_N_per_mm"] for axis in "xyz")
+    assert main([*pose, "--machine", str(machine)]) == 2
+    assert "unknown effect 'my_screw'" in capsys.readouterr().err
+
+
+def test_the_walk_through_of_the_documentation_works(tmp_path, capsys):
+    """The page's Python block is an effect file, its TOML block a machine entry; Betti's law must hold for them."""
+    page = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
+    source, entry = (page.split(f"```{language}\n")[1].split("```")[0] for language in ("python", "toml"))
+    file = tmp_path / "spindle.py"
+    file.write_text(source)
+    text = (resources.files("toolpath_stiff") / "data" / "machines" / "nist.toml").read_text("utf-8")
+    model = build_model(parse_machine(text + "\n" + entry, "mine.toml"), [file])
+    added = tip_compliance(model, np.array([[0.1, -0.2, 0.8]])) - tip_compliance(
+        build_model(load_machine("nist")), np.array([[0.1, -0.2, 0.8]])
+    )
+    # Spindle vertical: the page's figures for radial and axial, in nm/N, stand on the diagonal and nothing beside it.
+    assert added[0] * 1e9 == pytest.approx(np.diag([5.0, 5.0, 2.0]), abs=1e-9)
+    assert main(["effects", "show", "spindle", "--effects", str(file)]) == 0
+    assert "radial_nm_per_N" in capsys.readouterr().out

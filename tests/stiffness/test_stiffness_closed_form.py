@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.stiffness.cases import nist, orthogonal_hexapod, random_poses
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import exact, reference
@@ -221,3 +222,10 @@ def test_a_singular_pose_is_nan_and_leaves_its_neighbours_alone():
     compliance = exact.tip_compliance(model, broken)
     assert np.isnan(compliance[1]).all()
     assert np.array_equal(compliance[0], exact.tip_compliance(model, sound)[0])
+
+
+def test_a_strut_law_carried_beyond_zero_is_refused():
+    """The NIST law reaches 0 at 3.2132 m + 32.5 / 14 * 0.6516 m = 4.726 m; a negative spring is no physics."""
+    model = build_model(nist())
+    with pytest.raises(InputError, match=r"strut \d would be .* mm long.*above 0"):
+        exact.tip_compliance(model, load_path(model, [[0.0, 0.0, 0.8], [0.0, 0.0, -2.0]]))

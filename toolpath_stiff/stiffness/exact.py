@@ -19,8 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.units import mm_from_m
 
 FloatArray = NDArray[np.float64]
 
@@ -45,8 +47,16 @@ class Links:
 
 
 def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
-    """Add up what the strut law and the effects contribute at n poses."""
-    strut = 1.0 / path.machine.strut_law.stiffness(path.struts.lengths)
+    """Add up what the strut law and the effects contribute at n poses.
+
+    Raises
+    ------
+    InputError
+        The strut law was extrapolated to no stiffness or less.
+    """
+    stiffness = path.machine.strut_law.stiffness(path.struts.lengths)
+    refuse_law_beyond_zero(path.struts.lengths, stiffness)
+    strut = 1.0 / stiffness
     loads: FloatArray | None = None
     parallel: FloatArray | None = None
     for active in model.effects:
@@ -60,6 +70,19 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
         loads = form if loads is None else loads if form is None else loads + form
         parallel = beside if parallel is None else parallel if beside is None else parallel + beside
     return Links(strut, loads, parallel)
+
+
+def refuse_law_beyond_zero(lengths: FloatArray, stiffness: FloatArray) -> None:
+    """Raise `InputError` where the linear strut law gives (n, 6) struts no stiffness or less."""
+    if not (stiffness <= 0.0).any():
+        return
+    worst = np.unravel_index(np.argmin(stiffness), stiffness.shape)
+    raise InputError(
+        f"strut {worst[1] + 1} would be {mm_from_m(float(lengths[worst])):.1f} mm long, where the machine's strut law "
+        f"gives {stiffness[worst] / 1e6:.4g} N/um",
+        expected="a stiffness above 0",
+        hint="bound the strut length in the machine file so that the law stays positive",
+    )
 
 
 def respond(path: LoadPath, links: Links, wrenches: FloatArray) -> tuple[FloatArray, FloatArray]:
