@@ -34,6 +34,11 @@ REFUSALS = [
     ("#1=5", 1, 1, "variables"),
     ("G1 F100 X#1", 1, 9, "variables"),
     ("G1 F100 X[1+2]", 1, 9, "expressions"),
+    ("G1 F100 X-[1+2]", 1, 9, "expressions"),
+    ("G1 F100 X-#1", 1, 9, "variables"),
+    ("G1 F100 X1 E2", 1, 12, "not used"),  # two words, not X100
+    ("G1 F100 X\N{FULLWIDTH DIGIT ONE}", 1, 9, "not a word"),
+    ("G1 F100 \N{LATIN SMALL LETTER DOTLESS I}1", 1, 9, "not a word"),
     ("O100 sub", 1, 1, "subprograms"),
     ("O<thing> call", 1, 1, "subprograms"),
     ("M98 P100", 1, 1, "subprogram call"),

@@ -161,7 +161,7 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
     """The error for text that is no word, with the reason if it is a known one."""
     character = compact[position]
     tail = compact[position : position + 12]
-    follower = compact[position + 1 : position + 2]
+    follower = compact[position + 1 : position + 3].lstrip("+-")[:1]  # `X-[...]` and `X-#1` too
     found, expected, hint = f"{tail!r} is not a word", "a letter and a number", ""
     if character.isalpha() and (not follower or follower.isalpha() or follower == "/"):
         if compact.startswith(("NAN", "INF"), position + 1):
