@@ -143,6 +143,18 @@ def test_parallel_stiffness_on_a_flexible_platform():
         assert np.abs(plain[i] - expected).max() > 1e-2 * np.abs(expected).max()  # the springs do matter
 
 
+def test_a_spring_in_one_direction_only():
+    """A singular K: on the orthogonal hexapod a spring along x stands beside the pair of struts along x."""
+
+    class OneSpring(Spring):
+        def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> np.ndarray:
+            return np.broadcast_to(np.diag([5e6, 0.0, 0.0, 0.0, 0.0, 0.0]), (len(path), 6, 6))
+
+    model = build_model(orthogonal_hexapod(), extra=[ActiveEffect(OneSpring(), {"scale": 1.0})])
+    compliance = exact.tip_compliance(model, load_path(model, ORIGIN))[0]
+    assert np.diag(compliance) == pytest.approx([1 / (KX + 5e6), 1 / KY, 1 / KZ], rel=1e-12)
+
+
 def test_no_spring_is_no_change():
     """The solving route with K = 0 must meet the equilibrium route."""
     machine = nist(1e9)
