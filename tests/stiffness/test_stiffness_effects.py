@@ -108,6 +108,37 @@ def test_instruments_are_set_aside(user_file):
     assert np.array_equal(tip_compliance(model, *pose), tip_compliance(build_model(nist()), *pose))
 
 
+LOW_TIP = """
+import numpy as np
+from toolpath_stiff.stiffness.effects import Effect, Parameter
+
+class LowTip(Effect):
+    name = "low_tip"
+    title = "the tip sits lower than believed"
+    link = "geometry"
+    equation = "P_i + (0, 0, h)"
+    source = "test"
+    parameters = (Parameter("height", "mm", 1e-3, (-50.0, 50.0), (-5.0, 5.0), "test"),)
+
+    def geometry(self, machine, p):
+        return machine.with_changes(platform_joints=machine.platform_joints + np.array([0.0, 0.0, p["height"]]))
+"""
+
+
+def test_a_geometry_effect_reaches_kinematics_and_stiffness(user_file):
+    """A tip 20 mm lower on the same platform is a tool 20 mm longer: the core knows that without any effect."""
+    machine = machine_with('[[effect]]\nname = "low_tip"\nheight_mm = 20.0')
+    changed = build_model(machine, [user_file(LOW_TIP)])
+    position, rotation = random_poses(5, 24)
+    longer = machine.reference_tool_length + 0.020
+    plain = build_model(nist())
+    assert load_path(changed, position, rotation).struts.lengths == pytest.approx(
+        load_path(plain, position, rotation, longer).struts.lengths, rel=1e-14
+    )
+    got, expected = tip_compliance(changed, position, rotation), tip_compliance(plain, position, rotation, longer)
+    assert np.abs(got - expected).max() < 1e-12 * np.abs(expected).max()
+
+
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
