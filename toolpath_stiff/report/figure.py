@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from toolpath_stiff.report.wording import number, plain, shortened
 from toolpath_stiff.units import n_per_mm_from_n_per_m
@@ -38,6 +40,7 @@ STYLE: dict[Any, Any] = {
     "xtick.color": MUTED,
     "ytick.color": MUTED,
     "agg.path.chunksize": 20000,
+    "path.snap": False,  # lines along an axis would jump to whole pixels and leave gaps in a dense pattern
 }
 
 
@@ -94,18 +97,22 @@ def add_heading(figure: Figure, analysis: Analysis) -> None:
     )
 
 
-def label_place(
-    axes: Axes,
-    at: tuple[float, float],
-    text: str,
-    taken: list[tuple[float, float, float, float]],
-    below: bool = False,
-) -> None:
-    """Ring a place and write beside it, where neither another label nor the edge of the axes is in the way.
+def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Sequence[str], below: bool = False) -> None:
+    """Ring places and write beside each, where no other label or ring nor the edge of the axes is in the way.
 
-    `taken` holds the boxes in pixels (x0, y0, x1, y1) of earlier labels, and gets this one's. `below`: rather below
-    the place (a low point of a curve) than beside it.
+    `below`: rather below the place (a low point of a curve) than beside it.
     """
+    taken = []
+    for x, y in axes.transData.transform(np.reshape(places, (-1, 2))):
+        taken.append((float(x) - 8.0, float(y) - 8.0, float(x) + 8.0, float(y) + 8.0))
+    for at, text in zip(places, texts, strict=True):
+        _label_place(axes, at, text, taken, below)
+
+
+def _label_place(
+    axes: Axes, at: tuple[float, float], text: str, taken: list[tuple[float, float, float, float]], below: bool
+) -> None:
+    """One ring and its label; `taken` holds boxes in pixels (x0, y0, x1, y1) to keep clear of, and gets the label's."""
     sides = [(1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1)]
     if below:
         sides.sort(key=lambda side: (side[1], abs(side[0])))

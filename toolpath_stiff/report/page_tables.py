@@ -53,7 +53,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numeric: Sequence
 def _figures(summary: Mapping[str, Any]) -> str:
     origin = " ".join(f"{axis}{v:.10g}" for axis, v in zip("XYZABC", summary["origin_mm_deg"], strict=True))
     rows = [
-        (title.capitalize(), number(summary[name], 2 if name.endswith("_um") else 0))
+        (title[0].upper() + title[1:], number(summary[name], 2 if name.endswith("_um") else 0))
         for title, name in zip(TITLES, FIGURES, strict=True)
     ]
     rows += [

@@ -15,7 +15,7 @@ from toolpath_stiff.report.figure import (
     UNREACHABLE_RED,
     add_heading,
     house_style,
-    label_place,
+    label_places,
     new_figure,
     png_bytes,
 )
@@ -59,10 +59,8 @@ def path_picture(analysis: Analysis) -> bytes:
             _set_up(axes, across, up, title, middle, span)
             for xyz, style in lines:
                 axes.plot(xyz[:, across], xyz[:, up], **style)
-            taken: list[tuple[float, float, float, float]] = []
-            for row in places:
-                at = (float(points[row, across]), float(points[row, up]))
-                label_place(axes, at, f"line {analysis.samples.line[row]}", taken)
+            spots = [(float(points[row, across]), float(points[row, up])) for row in places]
+            label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places])
         add_heading(figure, analysis)
         _legend(figure, corner, analysis, limits)
         return png_bytes(figure)
@@ -171,7 +169,9 @@ def _legend(
     bar.xaxis.set_major_locator(MaxNLocator(max(2, int(across / 0.9)), steps=[1, 2, 2.5, 5, 10]))
     bar.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)))
     bar.grid(False)
-    entries = [Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), label="rapid")]
+    entries = []
+    if not analysis.samples.cutting.all():
+        entries.append(Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), label="rapid"))
     if analysis.out_of_reach.any():
         entries.append(Line2D([], [], color=UNREACHABLE_RED, linewidth=2.2, label="out of reach"))
     entries.append(

@@ -15,7 +15,7 @@ from toolpath_stiff.report.figure import (
     UNREACHABLE_RED,
     add_heading,
     house_style,
-    label_place,
+    label_places,
     new_figure,
     png_bytes,
 )
@@ -70,10 +70,9 @@ def profile_picture(analysis: Analysis, *, other: Analysis | None = None, requir
         _levels(axes, analysis, required)
         _tool_changes(axes, analysis)
         _line_numbers(axes, analysis)
-        taken: list[tuple[float, float, float, float]] = []
-        for row in weakest_places(analysis):
-            at = (float(s[row]), float(k[row]))
-            label_place(axes, at, f"line {analysis.samples.line[row]}", taken, below=True)
+        places = weakest_places(analysis)
+        spots = [(float(s[row]), float(k[row])) for row in places]
+        label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
         _legend(axes)
         add_heading(figure, analysis)
         return png_bytes(figure)

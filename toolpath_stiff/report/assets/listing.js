@@ -46,6 +46,9 @@ new ResizeObserver(drawListing).observe(listing);
 // ---------------------------------------------------------------- everything together
 readTheme();
 const view = new View(), profile = new Profile();
+view.resize();
+profile.resize();
+drawListing();
 function retheme() {
   readTheme();
   view.draw();
@@ -66,6 +69,7 @@ for (const button of document.querySelectorAll("button.place")) button.addEventL
 });
 document.getElementById("legend-low").textContent = (data.extend.low ? "\u2264 " : "") + group(LOW);
 document.getElementById("legend-high").textContent = (data.extend.high ? "\u2265 " : "") + group(HIGH);
+document.querySelector(".rapid-key").hidden = starts[RAPIDS] === starts[RAPIDS + 1];
 document.getElementById("out-key").hidden = starts[UNREACHED] === starts[UNREACHED + 1];
 const key = document.getElementById("profile-key");
 function addKey(kindOfLine, text) {

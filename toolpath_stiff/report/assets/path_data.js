@@ -76,15 +76,15 @@ function describe(i) {
   const turned = angles ? " " + angles.map((a, axis) => "ABC"[axis] + a[i].toFixed(2)).join(" ") : "";
   const tool = data.tools.reduce((found, [start, number]) => start <= i ? number : found, 0);
   const k = kind[i] & OUT ? "out of reach" : `${group(stiffness[i])} N/mm`;
-  return [`line ${line[i]}   ${k}`, `X${x} Y${y} Z${z}${turned} mm${angles ? ", deg" : ""}`,
-    `margin ${margin[i].toFixed(3)}   T${tool}   ${MOTIONS[kind[i] & 7]}   ${group(s[i], 1)} mm along`];
+  return [`line ${line[i]} · ${k}`, `X${x} Y${y} Z${z}${turned} mm${angles ? ", deg" : ""}`,
+    `margin ${margin[i].toFixed(3)} · T${tool} · ${MOTIONS[kind[i] & 7]} · ${group(s[i], 1)} mm along`];
 }
 function point(i, stage) {
   here = i;
   for (const tip of document.querySelectorAll(".tip")) tip.hidden = true;
   if (i >= 0) {
     const text = describe(i);
-    status.textContent = text.join("   ·   ");
+    status.textContent = text.join(" · ");
     if (stage) showTip(stage, i, text);
     showLine(line[i]);
   }

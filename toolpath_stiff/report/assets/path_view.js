@@ -119,7 +119,7 @@ class View extends Stage {
     });
   }
   drawWeakest(g) {
-    const taken = [];
+    const taken = data.weakest.map((i) => { const [x, y] = this.at(i); return [x - 7, y, 14, 13]; });
     g.textAlign = "left";
     g.textBaseline = "middle";
     for (const i of data.weakest) {
@@ -127,8 +127,8 @@ class View extends Stage {
       ring(g, x, y, 6, ink.panel, 4);
       ring(g, x, y, 6, ink.ink, 1.6);
       let ty = y - 14;
-      while (taken.some(([a, b, w]) => Math.abs(b - ty) < 17 && x + 11 < a + w + 6 && a < x + 11 + wide + 6)) ty += 17;
-      taken.push([x + 11, ty, wide]);
+      while (taken.some(([a, b, w, h]) => Math.abs(b - ty) < h && x + 11 < a + w + 6 && a < x + 11 + wide + 6)) ty += 17;
+      taken.push([x + 11, ty, wide, 17]);
       g.globalAlpha = 0.85;
       g.fillStyle = ink.panel;
       g.fillRect(x + 9, ty - 8, wide + 5, 16);

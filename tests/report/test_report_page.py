@@ -1,0 +1,224 @@
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from tests.report.factory import make_analysis, short, spiral
+from toolpath_stiff.nc.moves import ToolUse, Unsupported
+from toolpath_stiff.report import page_data as page_data_module
+from toolpath_stiff.report.page import json_for_script, page
+from toolpath_stiff.report.page_data import NONE, OUT_OF_REACH, page_rows
+from toolpath_stiff.report.wording import number
+from toolpath_stiff.report.write import summary_with_options
+
+EVIL = "</script><script>alert(1)</script>"
+VOID = {"meta", "input", "br", "hr", "img", "link"}
+
+
+class Page(HTMLParser):
+    """Elements, attributes and texts of a page; fails where tags do not nest."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.elements, self.texts = [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        self.texts.append("")
+        if tag not in VOID:
+            self.open.append((tag, len(self.elements) - 1))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop()[0] == tag
+
+    def handle_data(self, data):
+        if self.open:
+            self.texts[self.open[-1][1]] += data
+
+    def all(self, tag):
+        return [text for (name, _), text in zip(self.elements, self.texts, strict=True) if name == tag]
+
+    @property
+    def data(self):
+        return next(
+            json.loads(text)
+            for (_, attrs), text in zip(self.elements, self.texts, strict=True)
+            if attrs.get("id") == "data"
+        )
+
+
+def render(analysis, required=None, other=None):
+    return page(analysis, summary_with_options(analysis, required, other), required=required, other=other)
+
+
+def column(text, dtype):
+    return np.frombuffer(base64.b64decode(text), dtype=dtype)
+
+
+@pytest.fixture(scope="module")
+def analysis():
+    return spiral()
+
+
+@pytest.fixture(scope="module")
+def parsed(analysis):
+    return Page(render(analysis))
+
+
+def evil_analysis():
+    return make_analysis(
+        [{"end": (0.1, 0.0, 0.0), "tool": 1}, {"end": (0.1, 0.05, 0.0), "tool": 2}],
+        name=f"a{EVIL}&\"'\u2028.nc",
+        source=[f"G1 X100 ({EVIL})", "G1 Y50 ; <img src=x onerror=alert(2)> {{script}} \udc80 \u2029"],
+        tools=(ToolUse(1, np.nan, np.nan, f"<b>mill</b>{EVIL}"),),
+        warnings=(f"line 1: {EVIL}",),
+        unsupported=(Unsupported(1, 9, EVIL, f"<i>{EVIL}"),),
+    )
+
+
+def test_the_page_parses_and_loads_nothing(analysis, parsed):
+    for _, attrs in parsed.elements:
+        assert not {"src", "href", "srcset", "action", "data"} & set(attrs)
+    text = render(analysis)
+    assert not re.search(r"https?://|//[a-z]+\.|@import|url\(|fetch\(|XMLHttpRequest|import\(", text)
+    policy = next(attrs["content"] for _, attrs in parsed.elements if "http-equiv" in attrs)
+    assert policy.startswith("default-src 'none'")
+
+
+def test_only_our_own_script_may_run(parsed):
+    script = next(
+        text for (tag, attrs), text in zip(parsed.elements, parsed.texts, strict=True) if tag == "script" and not attrs
+    )
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = next(attrs["content"] for _, attrs in parsed.elements if "http-equiv" in attrs)
+    assert f"script-src 'sha256-{digest}'" in policy
+
+
+def test_what_comes_from_the_program_stays_text():
+    analysis = evil_analysis()
+    hostile, harmless = Page(render(analysis)), Page(render(short()))
+    assert len(hostile.all("script")) == len(harmless.all("script")) == 2
+    assert not hostile.all("img") + hostile.all("b") + hostile.all("i")
+    assert hostile.data["source"] == [line.replace("\udc80", "\ufffd") for line in analysis.program.source]
+    cells = "".join(hostile.all("td") + hostile.all("code"))
+    assert cells.count(EVIL) == 4  # a weakest place, the tool's remark, the word, the reason
+    assert EVIL in hostile.all("h1")[0]
+    render(analysis).encode("utf-8")
+
+
+def test_json_for_script_reads_back_and_holds_no_markup():
+    value = {"a": "<!-- </ScRiPt> & \u2028\u2029", "b": [1.5, None]}
+    text = json_for_script(value)
+    assert json.loads(text) == value
+    assert not set("<>&\u2028\u2029") & set(text)
+    assert json.loads(json_for_script("a\ud800b")) == "a\ufffdb"
+
+
+def test_figures_on_the_page_are_those_of_the_summary(analysis, parsed):
+    summary = analysis.summary()
+    cells = parsed.all("td")
+    for name in ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm"):
+        assert number(summary[name]) in cells
+    for row in summary["per_tool"]:
+        assert number(row["mean_N_per_mm"]) in cells
+    for sentence in summary["assumptions"]:
+        assert sentence in parsed.all("li")
+
+
+def test_the_samples_on_the_page_are_those_of_the_analysis(analysis, parsed):
+    data, samples = parsed.data, analysis.samples
+    assert data["count"] == len(samples)
+    frame = np.array(data["frame"])
+    span = frame[:, 1] - frame[:, 0]
+    position = frame[:, 0] + column(data["position"], "<u2").reshape(-1, 3) / 65535 * span
+    # Half a step of the 16-bit fractions, and rounding.
+    assert (np.abs(position - samples.position * 1e3) <= span / 65535 / 2 + 1e-9).all()
+    low, high = data["stiffness_range"]
+    stiffness = low + column(data["stiffness"], "<u2") / 65534 * (high - low)
+    assert np.abs(stiffness - analysis.at.stiffness / 1e3).max() <= (high - low) / 65534 / 2 + 1e-6
+    assert np.array_equal(column(data["line"], "<u4"), samples.line)
+    assert np.array_equal(column(data["kind"], "u1") & 7, samples.motion)
+    assert np.allclose(column(data["s"], "<f4"), samples.s * 1e3, rtol=1e-6)  # float32 holds seven digits
+    lines = [place["line"] for place in analysis.summary()["weakest_places"]]
+    assert samples.line[data["weakest"]].tolist() == lines
+
+
+def test_out_of_reach_is_marked():
+    beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
+    data = Page(render(beyond)).data
+    assert np.array_equal(column(data["stiffness"], "<u2") == NONE, ~beyond.at.reachable)
+    assert np.array_equal(column(data["kind"], "u1") >= OUT_OF_REACH, ~beyond.at.reachable)
+
+
+def test_angles_are_there_when_something_is_tilted():
+    tilted = make_analysis([{"end": (0.05, 0.0, 0.0, 0.1, -0.05, 0.0)}])
+    data = Page(render(tilted)).data
+    low, high = data["angle_ranges"][0]
+    roll = low + column(data["angles"][0], "<u2") / 65534 * (high - low)
+    assert np.allclose(roll, np.degrees(tilted.samples.abc[:, 0]), atol=(high - low) / 65534)
+    assert Page(render(short())).data["angles"] is None
+
+
+def test_required_and_comparison_are_on_the_page(analysis):
+    text = render(analysis, required=5.2e7, other=spiral(load="x"))
+    data = Page(text).data
+    assert data["required"] == pytest.approx(52_000.0)
+    assert len(column(data["other"]["s"], "<f4")) == len(column(data["other"]["stiffness"], "<f4")) > 0
+    assert "below the required 52 000 N/mm" in text
+    assert "Every cutting move has" in render(analysis, required=1.0)
+
+
+def test_the_same_analysis_gives_the_same_page(analysis):
+    assert render(analysis) == render(spiral())
+
+
+def test_very_many_samples_are_thinned_aloud_and_keep_the_extremes(analysis, monkeypatch):
+    monkeypatch.setattr(page_data_module, "MOST_SAMPLES", 1200)
+    rows = page_rows(analysis)
+    assert len(rows) <= 1200 < len(analysis.samples)
+    stiffness, counted = analysis.at.stiffness, analysis.counted
+    assert stiffness[rows][counted[rows]].min() == stiffness[counted].min()
+    assert stiffness[rows][counted[rows]].max() == stiffness[counted].max()
+    text = render(analysis)
+    assert f"{number(len(rows))} of the {number(len(analysis.samples))} samples" in text
+    weakest = Page(text).data["weakest"]
+    assert [int(analysis.samples.line[rows[i]]) for i in weakest] == [
+        place["line"] for place in analysis.summary()["weakest_places"]
+    ]
+
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+@pytest.mark.parametrize("make", [spiral, evil_analysis])
+def test_a_browser_draws_the_page_without_complaint(make, tmp_path):
+    file = tmp_path / "report.html"
+    analysis = make()
+    file.write_text(render(analysis), encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
+    profile = f"--user-data-dir={tmp_path / 'profile'}"
+    done = subprocess.run(
+        [BROWSER, *options, profile, "--dump-dom", file.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "CONSOLE" not in done.stderr
+    dom = Page(done.stdout)
+    rows = [attrs for _, attrs in dom.elements if "data-line" in attrs and attrs.get("class") == "row"]
+    assert 2 <= len(rows) <= len(analysis.program.source)
+    assert analysis.program.source[0] in done.stdout.replace("&lt;", "<").replace("&gt;", ">")
+    assert "≥" in done.stdout or make is evil_analysis  # the legend is filled by the script

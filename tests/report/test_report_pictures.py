@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import io
+import itertools
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.image import imread
+
+from tests.report.factory import make_analysis, short, spiral
+from toolpath_stiff.report.path_picture import path_picture
+from toolpath_stiff.report.profile_picture import extremes_by_column, profile_picture
+from toolpath_stiff.report.scale import CLASSES, UNREACHABLE, scale_limits, segment_classes
+
+
+def pixels(png: bytes) -> np.ndarray:
+    return imread(io.BytesIO(png), format="png")[:, :, :3]
+
+
+def count_colour(png: bytes, rgb: tuple[int, int, int]) -> int:
+    return int((np.abs(pixels(png) - np.array(rgb) / 255.0).max(axis=2) < 0.02).sum())
+
+
+@pytest.fixture(scope="module")
+def analysis():
+    return spiral()
+
+
+def test_pictures_are_png_of_the_stated_size(analysis):
+    assert pixels(path_picture(analysis)).shape[1] == 1400
+    assert pixels(profile_picture(analysis)).shape[:2] == (620, 1400)
+
+
+def test_the_same_analysis_gives_the_same_bytes_whatever_the_users_own_settings(analysis):
+    first = path_picture(analysis), profile_picture(analysis)
+    with mpl.rc_context({"figure.facecolor": "black", "axes.labelsize": 30, "lines.linewidth": 9}):
+        assert (path_picture(analysis), profile_picture(analysis)) == first
+        assert mpl.rcParams["axes.labelsize"] == 30  # and the settings are left alone
+
+
+def test_pictures_need_no_pyplot():
+    code = (
+        "import sys; from tests.report.factory import short;"
+        "from toolpath_stiff.report.path_picture import path_picture;"
+        "from toolpath_stiff.report.profile_picture import profile_picture;"
+        "a = short(); before = 'matplotlib' in sys.modules; path_picture(a); profile_picture(a);"
+        "print(before, 'matplotlib.pyplot' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]
+
+
+def test_unreachable_samples_are_red_and_only_they():
+    beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
+    assert beyond.out_of_reach.any()
+    red = (0xD6, 0x45, 0x45)
+    assert count_colour(path_picture(beyond), red) > 20
+    assert count_colour(path_picture(short()), red) == 0
+    pale = (0xF6, 0xC9, 0xC9)
+    assert count_colour(profile_picture(beyond), pale) > 1000
+    assert count_colour(profile_picture(short()), pale) == 0
+
+
+def test_required_level_and_second_machine_change_the_profile(analysis):
+    plain = profile_picture(analysis)
+    orange = (0xDE, 0x6B, 0x12)
+    assert count_colour(plain, orange) == 0
+    assert count_colour(profile_picture(analysis, other=spiral(load="x")), orange) > 100
+    assert count_colour(profile_picture(analysis, required=6e7), (0xD6, 0x45, 0x45)) > 1000
+
+
+@pytest.mark.parametrize("name", ["pri$ce_$5.nc", "$\\frac{$.nc", "a\nb\x1b[0m.nc", "部品.nc", "x" * 400])
+def test_any_file_name_can_head_a_picture(name):
+    assert path_picture(short(name=name)).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    "moves",
+    [
+        [{"end": (0.0, 0.0, -0.05)}],  # one plunge: no extent in X and Y
+        [{"end": (1e-6, 0.0, 0.0)}],  # a micrometre
+        [{"end": (0.1, 0.0, 0.0)}] * 2,  # the second move goes nowhere
+        [{"end": (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)}, {"end": (0.1, 0.0, 0.0, 0.1, 0.0, 0.0)}],  # rotary axis alone
+    ],
+)
+def test_degenerate_paths_are_drawn(moves):
+    analysis = make_analysis(moves)
+    assert path_picture(analysis).startswith(b"\x89PNG")
+    assert profile_picture(analysis).startswith(b"\x89PNG")
+
+
+def test_a_constant_stiffness_has_a_scale():
+    low, high = scale_limits(make_analysis([{"end": (0.0, 0.0, 0.0), "start": (-1e-6, 0.0, 0.0)}], load="z"))
+    assert low < high
+
+
+def test_few_far_out_values_do_not_take_the_contrast_but_ordinary_ends_stay_on_the_scale(analysis):
+    plunges = np.abs(analysis.samples.tangent[:, 2]) > 0.9
+    ordinary = analysis.at.stiffness[analysis.counted & ~plunges] / 1e3
+    low, high = scale_limits(analysis)
+    assert (low, high) == (ordinary.min(), ordinary.max())
+
+
+def test_classes_cover_the_scale_in_order():
+    values = np.linspace(10.0, 20.0, 1000)
+    classes = segment_classes(values, (10.0, 20.0))
+    assert classes[0] == 0
+    assert classes[-1] == CLASSES - 1
+    assert (np.diff(classes) >= 0).all()
+    assert len(np.unique(classes)) == CLASSES
+    assert segment_classes(np.array([1.0, np.nan, 99.0, 99.0]), (10.0, 20.0)).tolist() == [
+        UNREACHABLE,
+        UNREACHABLE,
+        CLASSES - 1,
+    ]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    steps=st.lists(st.floats(0.0, 5.0), min_size=1, max_size=400),
+    columns=st.integers(1, 20),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_thinning_keeps_the_extremes_of_every_column_the_ends_and_the_gaps(steps, columns, seed):
+    x = np.cumsum(steps)
+    y = np.random.default_rng(seed).normal(size=len(x))
+    y[np.random.default_rng(seed + 1).random(len(x)) < 0.1] = np.nan
+    rows = extremes_by_column(x, y, columns)
+    assert (np.diff(rows) > 0).all()
+    assert rows[0] == 0
+    assert np.isnan(y[rows]).any() == np.isnan(y).any()
+    if np.isfinite(y).any():
+        assert np.nanmin(y[rows]) == np.nanmin(y)
+        assert np.nanmax(y[rows]) == np.nanmax(y)
+    # Whatever stood between two finite samples that now follow each other was finite too: no gap is bridged.
+    for before, after in itertools.pairwise(rows):
+        if np.isfinite(y[before]) and np.isfinite(y[after]):
+            assert np.isfinite(y[before : after + 1]).all()
+
+
+def test_thinning_a_long_path_leaves_few_rows_and_one_spike():
+    x = np.arange(1_000_000.0)
+    y = np.sin(x / 1e4)
+    y[123_457] = 7.0
+    rows = extremes_by_column(x, y, 1000)
+    assert len(rows) <= 4 * 1001
+    assert 123_457 in rows

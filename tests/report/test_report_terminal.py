@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import copy
+
+import pytest
+
+from tests.report.factory import make_analysis, short, spiral
+from toolpath_stiff.report.comparison import compare_summaries
+from toolpath_stiff.report.terminal import WIDTH, comparison_table, terminal_table
+from toolpath_stiff.report.wording import duration, number
+
+
+@pytest.fixture(scope="module")
+def summary():
+    return spiral().summary()
+
+
+def test_the_table_shows_the_figures_of_the_summary(summary):
+    text = terminal_table(summary)
+    for name in ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm"):
+        assert number(summary[name]) in text
+    assert f"line {summary['weakest']['line']}" in text
+    assert summary["weakest"]["text"] in text
+    for row in summary["per_tool"]:
+        assert number(row["mean_N_per_mm"]) in text
+        assert row["remark"] in text
+
+
+def test_warnings_are_told_in_full_and_no_line_is_too_long():
+    warning = "the spindle stands still while the tool moves through the work " * 6
+    text = terminal_table(short(warnings=(warning,), name="n" * 300, source=["x" * 300] * 2).summary())
+    assert max(map(len, text.splitlines())) <= WIDTH
+    assert " ".join(text.split()).endswith(warning.strip())
+
+
+def test_a_program_cannot_steer_the_terminal():
+    text = terminal_table(short(name="a\x1b[2J\r.nc", source=["G1 (\x07\x1b]0;x\x07)"] * 2).summary())
+    assert all(c.isprintable() or c == "\n" for c in text)
+
+
+def test_missing_figures_are_a_dash_not_an_error(summary):
+    bare = {**summary, "weakest": None, "per_tool": []}
+    bare.update(dict.fromkeys(("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm")))
+    assert "mean - N/mm" in terminal_table(bare)
+
+
+def test_comparing_a_machine_with_itself_gives_no_difference(summary):
+    change = compare_summaries(summary, copy.deepcopy(summary))["difference_percent"]
+    assert set(change.values()) == {0.0}
+
+
+def test_half_as_stiff_is_minus_fifty_percent(summary):
+    half = {**summary, "mean_N_per_mm": summary["mean_N_per_mm"] / 2.0, "machine": "soft"}
+    assert compare_summaries(summary, half)["difference_percent"]["mean"] == -50.0
+    text = comparison_table(summary, half)
+    assert "-50.0 %" in text
+    assert "soft" in text
+
+
+def test_out_of_reach_is_told():
+    beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
+    assert "out of reach and left out" in terminal_table(beyond.summary())
+
+
+@pytest.mark.parametrize(("value", "text"), [(1234567.4, "1 234 567"), (-0.2, "0"), (None, "-"), (float("nan"), "-")])
+def test_numbers(value, text):
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(59.94, "59.9 s"), (61.0, "0:01:01"), (7384.6, "2:03:05")])
+def test_durations(seconds, text):
+    assert duration(seconds) == text

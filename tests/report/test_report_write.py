@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from tests.report.factory import make_analysis, short
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.report import page as page_module
+from toolpath_stiff.report.write import OWN_FILES, write_analysis
+
+PLOTS = {"samples.csv", "summary.json", "path.png", "profile.png", "report.html"}
+
+
+@pytest.fixture(scope="module")
+def analysis():
+    return short()
+
+
+def tree(folder):
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_all_files_are_written_and_nothing_else(analysis, tmp_path):
+    files = write_analysis(analysis, tmp_path / "deep" / "out")
+    assert {f.name for f in files} == PLOTS
+    assert set(tree(tmp_path)) == {f"deep/out/{name}" for name in PLOTS}
+    assert PLOTS | {"samples.parquet"} == set(OWN_FILES)
+
+
+def test_the_same_analysis_writes_the_same_bytes(analysis, tmp_path):
+    for name in ("a", "b"):
+        write_analysis(short(), tmp_path / name, required=5e7, other=analysis)
+    assert tree(tmp_path / "a") == tree(tmp_path / "b")
+
+
+def test_without_plots_matplotlib_is_not_imported(tmp_path):
+    code = (
+        "import sys; from tests.report.factory import short; from toolpath_stiff.report.write import write_analysis;"
+        f"print([p.name for p in write_analysis(short(), {str(tmp_path / 'o')!r}, plots=False)]);"
+        "print([m for m in ('matplotlib', 'pandas', 'pyarrow') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["['samples.csv', 'summary.json']", "[]"]
+
+
+def test_summary_is_json_without_nan_and_equals_the_analysis(analysis, tmp_path):
+    write_analysis(analysis, tmp_path / "o", plots=False, required=1e9, other=analysis)
+    text = (tmp_path / "o" / "summary.json").read_text()
+    read = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+    compare, required = read.pop("compare"), read.pop("required")
+    assert read == analysis.summary()
+    assert compare["mean_N_per_mm"] == read["mean_N_per_mm"]
+    assert [entry["line"] for entry in required["below"]] != []
+    assert required["required_N_per_mm"] == pytest.approx(1e6, rel=1e-12)  # 1e9 N/m; a division's rounding
+
+
+def test_out_of_reach_is_null_in_json_an_empty_cell_in_csv_and_a_null_in_parquet(tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet")
+    beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
+    write_analysis(beyond, tmp_path / "o", plots=False)
+    rows = list(csv.DictReader((tmp_path / "o" / "samples.csv").open()))
+    empty = [row["stiffness_N_per_mm"] == "" for row in rows]
+    assert np.array_equal(empty, ~beyond.at.reachable)
+    write_analysis(beyond, tmp_path / "o", plots=False, table="parquet")
+    table = pq.read_table(tmp_path / "o" / "samples.parquet")
+    assert table.column_names == list(rows[0])
+    assert table["stiffness_N_per_mm"].null_count == sum(empty)
+    assert not (tmp_path / "o" / "samples.csv").exists()  # of the earlier run: it would stand for this one
+
+
+def test_old_files_of_ours_go_and_foreign_ones_stay(analysis, tmp_path):
+    write_analysis(analysis, tmp_path)
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "summary.json").write_text("old")
+    write_analysis(analysis, tmp_path, plots=False)
+    assert set(tree(tmp_path)) == {"samples.csv", "summary.json", "notes.txt"}
+    assert json.loads((tmp_path / "summary.json").read_text())["samples"] == len(analysis.samples)
+
+
+@pytest.mark.parametrize("error", [RuntimeError("midway"), KeyboardInterrupt()])
+@pytest.mark.parametrize("exists", [False, True])
+def test_an_error_midway_leaves_everything_as_it_was(analysis, tmp_path, monkeypatch, error, exists):
+    out = tmp_path / "reports" / "part"
+    if exists:
+        write_analysis(analysis, out, plots=False)
+    before = tree(tmp_path)
+
+    def fail(*_args, **_kwargs):
+        raise error
+
+    monkeypatch.setattr(page_module, "page", fail)
+    with pytest.raises(type(error)):
+        write_analysis(analysis, out)
+    assert tree(tmp_path) == before
+    assert (tmp_path / "reports").exists() == exists
+
+
+def test_parquet_without_pyarrow_names_the_extra_and_leaves_nothing(analysis, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(InputError, match=r"toolpath-stiff\[parquet\]"):
+        write_analysis(analysis, tmp_path / "o", plots=False, table="parquet")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_the_place_of_the_folder_is_one_clear_error(analysis, tmp_path):
+    (tmp_path / "o").write_text("a file")
+    for folder in (tmp_path / "o", tmp_path / "o" / "below"):
+        with pytest.raises(InputError, match="cannot write"):
+            write_analysis(analysis, folder, plots=False)
+    assert tree(tmp_path) == {"o": b"a file"}
