@@ -14,7 +14,7 @@ from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath, read_parameters
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
-from toolpath_stiff.stiffness.effects.registry import find_effect
+from toolpath_stiff.stiffness.effects.registry import find_effect, known_effects
 
 FloatArray = NDArray[np.float64]
 
@@ -84,6 +84,8 @@ def build_model(
         An entry names an unknown effect or has wrong parameters, or an effect appears twice.
     """
     files = tuple(effect_files)
+    if files:
+        known_effects(files)  # a file that cannot be loaded is an error even if the machine names none of its effects
     acting = [_activate(machine, entry, files, instrument=False) for entry in machine.effects]
     reading = [_activate(machine, entry, files, instrument=True) for entry in machine.instruments]
     if np.isfinite(machine.platform_bar_stiffness):
