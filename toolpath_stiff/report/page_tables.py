@@ -19,9 +19,9 @@ def page_tables(summary: Mapping[str, Any], weakest: Sequence[int]) -> str:
     `weakest` holds the page's rows of the weakest places.
     """
     sections = [
+        ("Tools", _tools(summary["per_tool"]), True),
         ("Figures", _figures(summary), False),
         ("Weakest places", _places(summary["weakest_places"], weakest), False),
-        ("Tools", _tools(summary["per_tool"]), len(summary["per_tool"]) > 1),
     ]
     if "required" in summary:
         sections.append(("Required stiffness", _required(summary["required"]), False))

@@ -34,7 +34,7 @@ BoolArray = NDArray[np.bool_]
 WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
 CURVE_BLUE = "#2b59c3"
-MOST_TOOL_LABELS = 14
+MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
 
 
 def profile_picture(analysis: Analysis, *, other: Analysis | None = None, required: float | None = None) -> bytes:
@@ -148,10 +148,10 @@ def _levels(axes: Axes, analysis: Analysis, required: float | None) -> None:
 
 
 def _tool_changes(axes: Axes, analysis: Analysis) -> None:
-    """A dotted line where another tool takes over; labels while they are few."""
+    """A dotted line where another tool takes over, while they can be told apart; labels while they are few."""
     samples = analysis.samples
     changes = np.flatnonzero(np.diff(samples.tool) != 0) + 1
-    if not len(changes):
+    if not 0 < len(changes) <= MOST_TOOL_LINES:
         return
     s = mm_from_m(samples.s[changes])
     axes.vlines(s, 0, 1, transform=axes.get_xaxis_transform(), color=MUTED, linewidth=0.9, linestyle=":", zorder=2)

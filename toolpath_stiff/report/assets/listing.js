@@ -16,7 +16,8 @@ function drawListing() {
     label.className = "n";
     label.textContent = i + 1;
     const lowest = lowestOf.get(i + 1);
-    if (lowest !== undefined) label.style.borderLeftColor = colours[classOf(lowest)];
+    if (unreached.has(i + 1)) label.style.borderLeftColor = ink.bad;
+    else if (lowest !== undefined) label.style.borderLeftColor = colours[classOf(lowest)];
     row.append(label, document.createTextNode(source[i]));
     rows.push(row);
   }

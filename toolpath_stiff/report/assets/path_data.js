@@ -61,11 +61,12 @@ const segments = new Int32Array(starts[CLASSES + 2]);
   for (let i = 1; i < n; i++) if (segmentClass[i] !== 255) segments[next[segmentClass[i]]++] = i;
 }
 
-// First and last sample and lowest stiffness of every program line.
-const firstOf = new Map(), lowestOf = new Map();
+// First sample and lowest stiffness of every program line; the lines that leave the machine's reach.
+const firstOf = new Map(), lowestOf = new Map(), unreached = new Set();
 for (let i = 0; i < n; i++) {
   if (!firstOf.has(line[i])) firstOf.set(line[i], i);
   if (cutting(i) && !Number.isNaN(stiffness[i])) lowestOf.set(line[i], Math.min(stiffness[i], lowestOf.get(line[i]) ?? Infinity));
+  if (cutting(i) && kind[i] & OUT) unreached.add(line[i]);
 }
 
 // ---------------------------------------------------------------- what is pointed at

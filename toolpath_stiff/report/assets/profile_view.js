@@ -84,7 +84,7 @@ class Profile extends Stage {
       g.moveTo(left, this.y(value));
       g.lineTo(right, this.y(value));
       g.stroke();
-      g.fillText(group(value, up.digits), left - 6, this.y(value));
+      if (this.y(value) > top + 9) g.fillText(group(value, up.digits), left - 6, this.y(value));  // clear of the unit
     }
     g.textBaseline = "top";
     g.textAlign = "center";
