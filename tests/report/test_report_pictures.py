@@ -86,6 +86,7 @@ def test_any_file_name_can_head_a_picture(name):
         [{"end": (1e-6, 0.0, 0.0)}],  # a micrometre
         [{"end": (0.1, 0.0, 0.0)}] * 2,  # the second move goes nowhere
         [{"end": (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)}, {"end": (0.1, 0.0, 0.0, 0.1, 0.0, 0.0)}],  # rotary axis alone
+        [{"end": (0.0, 0.0, 0.0, 0.1, 0.0, 0.0)}],  # nothing else: no sample is in the statistics
     ],
 )
 def test_degenerate_paths_are_drawn(moves):

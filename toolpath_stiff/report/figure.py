@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.report.wording import number, plain, shortened
-from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,10 +76,8 @@ def png_bytes(figure: Figure) -> bytes:
 def add_heading(figure: Figure, analysis: Analysis) -> None:
     """Program, machine, load, mean and range above everything."""
     width, height = figure.get_size_inches()
-    counted = analysis.counted
-    stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness[counted])
-    weight = analysis.samples.weight[counted]
-    mean = float(stiffness @ weight / weight.sum())
+    figures = stiffness_figures(analysis, analysis.counted)
+    mean, low, high = (number(figures[name]) for name in ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm"))
     figure.text(
         0.35 / width,
         1.0 - 0.42 / height,
@@ -91,7 +89,7 @@ def add_heading(figure: Figure, analysis: Analysis) -> None:
         0.35 / width,
         1.0 - 0.70 / height,
         f"machine {shortened(plain(analysis.machine.name), 40)}   ·   load {analysis.load}   ·   "
-        f"mean {number(mean)} N/mm   ({number(float(stiffness.min()))} to {number(float(stiffness.max()))})",
+        f"mean {mean} N/mm   ({low} to {high})",
         fontsize=10.5,
         color=MUTED,
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.statistics import weakest_places
+from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report.profile_picture import extremes_by_column, profile_curve
 from toolpath_stiff.report.scale import CLASSES, legend_extend, scale_limits
@@ -44,8 +44,6 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
     margin, margin_range = _fractions(at.margin[rows])
     kind = samples.motion + OUT_OF_REACH * ~at.reachable[rows]
     tool_starts = np.flatnonzero(np.diff(samples.tool, prepend=-1) != 0)
-    counted = analysis.counted
-    mean = np.average(at.stiffness[counted], weights=analysis.samples.weight[counted])
     return {
         "machine": plain(analysis.machine.name),
         "source": list(analysis.program.source),
@@ -68,7 +66,7 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "extend": {"low": extend in ("min", "both"), "high": extend in ("max", "both")},
         "colours": _colours(0.0, 0.93),  # the lightest yellow does not show on white,
         "colours_dark": _colours(0.22, 1.0),  # nor the darkest violet on black
-        "mean": n_per_mm_from_n_per_m(float(mean)),
+        "mean": stiffness_figures(analysis, analysis.counted)["mean_N_per_mm"],
         "required": None if required is None else n_per_mm_from_n_per_m(required),
         "other": None if other is None else _other_curve(other),
     }

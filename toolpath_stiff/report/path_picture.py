@@ -166,7 +166,7 @@ def _legend(
     colour_bar = figure.colorbar(mappable, cax=bar, orientation="horizontal", extend=extend)
     colour_bar.set_label("stiffness along the load, N/mm")
     colour_bar.outline.set_visible(False)
-    bar.xaxis.set_major_locator(MaxNLocator(max(2, int(across / 0.9)), steps=[1, 2, 2.5, 5, 10]))
+    bar.xaxis.set_major_locator(MaxNLocator(max(2, int(across / 0.75)), steps=[1, 2, 2.5, 5, 10]))
     bar.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)))
     bar.grid(False)
     entries = []

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.statistics import weakest_places
+from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
 from toolpath_stiff.report.figure import (
     INK,
     MUTED,
@@ -137,10 +137,9 @@ def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) 
 
 
 def _levels(axes: Axes, analysis: Analysis, required: float | None) -> None:
-    counted = analysis.counted
-    weight = analysis.samples.weight[counted]
-    mean = n_per_mm_from_n_per_m(float(analysis.at.stiffness[counted] @ weight / weight.sum()))
-    axes.axhline(mean, color=INK, linewidth=1.0, linestyle=(0, (6, 3)), zorder=5, label=f"mean {number(mean)} N/mm")
+    mean = stiffness_figures(analysis, analysis.counted)["mean_N_per_mm"]
+    if mean is not None:
+        axes.axhline(mean, color=INK, linewidth=1.0, linestyle=(0, (6, 3)), zorder=5, label=f"mean {number(mean)} N/mm")
     if required is None:
         return
     level = n_per_mm_from_n_per_m(required)

@@ -26,10 +26,9 @@ def scale_limits(analysis: Analysis) -> tuple[float, float]:
     A few plunges, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
     that values lie beyond.
     """
-    counted = analysis.counted
-    stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness[counted])
+    stiffness, weight = _scaled_samples(analysis)
     order = np.argsort(stiffness, kind="stable")
-    length = np.cumsum(analysis.samples.weight[counted][order])
+    length = np.cumsum(weight[order])
     lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
     reach = FENCE * (upper - lower)
     inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
@@ -38,6 +37,17 @@ def scale_limits(analysis: Analysis) -> tuple[float, float]:
     if high - low < 1e-6 * high:  # a constant: keep the scale from collapsing
         low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
     return low, high
+
+
+def _scaled_samples(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
+    """Stiffness in N/mm and length of the samples in the statistics.
+
+    A program that only turns rotary axes has none: then every reachable cutting sample counts alike.
+    """
+    counted, weight = analysis.counted, analysis.samples.weight
+    if not counted.any():
+        counted, weight = analysis.samples.cutting & analysis.at.reachable, np.ones(len(weight))
+    return n_per_mm_from_n_per_m(analysis.at.stiffness[counted]), weight[counted]
 
 
 def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntArray:
@@ -55,6 +65,6 @@ def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntAr
 
 def legend_extend(analysis: Analysis, limits: tuple[float, float]) -> str:
     """Which ends of the scale values lie beyond: "neither", "min", "max" or "both" (matplotlib's words)."""
-    stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness[analysis.counted])
+    stiffness = _scaled_samples(analysis)[0]
     below, above = bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])
     return {(False, False): "neither", (True, False): "min", (False, True): "max"}.get((below, above), "both")

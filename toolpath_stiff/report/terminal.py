@@ -45,9 +45,9 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
     ]
     if len(summary["per_tool"]) > 1:
         lines += _tools(summary["per_tool"])
-    if summary["unsupported"]:
+    if count := len(summary["unsupported"]):
         words = ", ".join(sorted({str(entry["word"]) for entry in summary["unsupported"]}))
-        lines += _entry("not acted upon", f"{len(summary['unsupported'])} words (in summary.json): {words}")
+        lines += _entry("not acted upon", f"{count} word{'s' if count > 1 else ''} (in summary.json): {words}")
     lines += _entry("assumptions", f"{len(summary['assumptions'])}, listed in summary.json")
     for warning in summary["warnings"]:
         lines += _entry("warning", warning)

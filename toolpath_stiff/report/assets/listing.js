@@ -81,5 +81,5 @@ function addKey(kindOfLine, text) {
 }
 addKey("", data.machine);
 if (other) addKey("second-key", data.other.machine);
-addKey("mean-key", `mean ${group(data.mean)} N/mm`);
+if (data.mean !== null) addKey("mean-key", `mean ${group(data.mean)} N/mm`);
 if (data.required !== null) addKey("required-key", `required ${group(data.required)} N/mm`);

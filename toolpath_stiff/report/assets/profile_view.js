@@ -40,7 +40,7 @@ class Profile extends Stage {
     g.beginPath();
     g.rect(left, top, right - left, bottom - top);
     g.clip();
-    this.level(g, data.mean, ink.ink, [6, 4]);
+    if (data.mean !== null) this.level(g, data.mean, ink.ink, [6, 4]);
     if (data.required !== null) this.level(g, data.required, ink.bad, []);
     if (other) this.curve(g, other.s, other.k, ink.second);
     this.curve(g, s, this.k, ink.curve);
