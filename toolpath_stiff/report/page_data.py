@@ -48,6 +48,7 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "machine": plain(analysis.machine.name),
         "source": list(analysis.program.source),
         "count": len(rows),
+        "samples": len(analysis.samples),
         "motions": MOTION_NAMES,
         "frame": frame.tolist(),
         "box": np.stack([box.min(axis=0), box.max(axis=0)], axis=1).tolist(),

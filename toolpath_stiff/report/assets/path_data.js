@@ -97,7 +97,7 @@ function choose(number) {
   const i = firstOf.get(number);
   if (i !== undefined) point(i); else {
     here = -1;
-    status.textContent = `line ${number}: no motion`;
+    status.textContent = `line ${number}: ${n < data.samples ? "no sample of it in this thinned drawing" : "no motion"}`;
     showLine(number);
     view.drawOverlay();
     profile.drawOverlay();
