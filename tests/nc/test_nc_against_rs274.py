@@ -185,6 +185,67 @@ def test_random_programs(seed, tmp_path):
     assert_same_path(read_program(program, tool_table=table), canon)
 
 
+def cycle_program(seed: int) -> str:
+    """Runs of drilling cycles whose R, return mode, distance mode and code change on the way."""
+    r = random.Random(seed)
+    plane, first, second, normal = r.choice([("G17", *"XYZ"), ("G18", *"XZY"), ("G19", *"YZX")])
+    lines = [f"F100 G0 {normal}{r.choice([0, 5, 10, 20])}", plane]
+    running, incremental = False, False
+    for _ in range(r.randint(3, 10)):
+        if r.random() < 0.2:
+            move = f"G{r.choice([0, 1])} {first}{r.randint(0, 9)} {normal}{r.randint(0, 15)}"
+            lines.append(r.choice(["G80", move, f"G80 {move}"]))
+            running = False
+            continue
+        words = [r.choice(["", "", "G98", "G99"])]
+        if r.random() < 0.1:
+            incremental, running = not incremental, False
+            words.append("G91" if incremental else "G90")
+        if not running or r.random() < 0.3:
+            code = r.choice(["G81", "G82 P0.1", "G83 Q1.73", "G73 Q1.73", "G85", "G89 P0.1"])
+            words.append(f"{code} {normal}{-r.randint(4, 9)} R{r.randint(-2, 12)}")
+            running = True
+        elif r.random() < 0.3:
+            words.append(f"R{r.randint(-2, 12)}")
+        words += [r.choice(["", "", "", "L2"]), f"{first}{r.randint(1, 9)}"]
+        words.append(r.choice(["", f"{second}{r.randint(1, 9)}"]))
+        lines.append(" ".join(words))
+    return "\n".join([*lines, "G80", "G90 G1 X50 Y50", "M2", ""])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_runs_of_cycles(seed, tmp_path):
+    program = tmp_path / "cycles.ngc"
+    program.write_text(cycle_program(seed))
+    canon = rs274.run(program, tmp_path)
+    try:
+        read = read_program(program)
+    except TpsError as error:  # a hole above its R plane, which both refuse
+        assert "below the bottom" in str(error)
+        assert "R value" in canon.error or "R less" in canon.error, canon.error
+        return
+    assert not canon.error
+    assert_same_path(read, canon)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G0 G17 G40 G49 G80 G90\nF100 G80 G1 X5\nG81 G80 X3 Z-1 R2\nX7\nG0 G80 X4",
+        "F100 G0 X10\nG3 X0 Y10 I-10 A30 B5 Z3\nG18 G2 X5 Z8 R7 C20\nG91 G19 G3 Y2 Z2 J1 K1 A3",
+        "F100 G1 X5 Y5\nG91 G10 L2 P1 X3 Y4\nG1 X1 Y1\nG10 L2 P2 R30 X1\nG55 G1 X2\nG10 L20 P2 X7 Y1\nG90 X0 Y0",
+        "F100 G10 L2 P1 R25\nG1 X5 Y5\nG92 X1 Y1\nG1 X2 Y3\nG55 X1\nG54 X0\nG92.2 X9\nX1\nG92.3\nX1",
+        "G20 F10 G1 X1 Y1 Z1\nG53 G1 X2 Z3\nG10 L2 P1 X1\nG53 G0 Z0\nG1 X0 Y0 Z0",
+    ],
+)
+def test_chosen_programs(text, tmp_path):
+    program = tmp_path / "chosen.ngc"
+    program.write_text(text + "\nM2\n")
+    canon = rs274.run(program, tmp_path)
+    assert not canon.error
+    assert_same_path(read_program(program), canon)
+
+
 def debian_programs() -> list[Path]:
     """NC programs that Debian's linuxcnc-uspace installs and that run nothing."""
     if not rs274.AVAILABLE or shutil.which("dpkg") is None:

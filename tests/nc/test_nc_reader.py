@@ -174,6 +174,13 @@ def test_harmless_words_are_listed_not_dropped():
         (1, "M8"), (2, "G64"), (5, "M9"), (6, "M123"), (6, "P5"),
     ]  # fmt: skip
     assert any("not part of the program" in w for w in program.warnings)
+    assert any("M123" in w for w in program.warnings)
+    assert not any("M8" in w for w in program.warnings)
+
+
+def test_an_unknown_reference_point_is_an_assumption():
+    assert any("G28" in a for a in parse_program("G1 F100 X1\nG28\nG28 Z5\n").assumptions)
+    assert not any("G28" in a for a in parse_program("G1 F100 X1\nG28.1\nX2\nG28\n").assumptions)
 
 
 def test_program_end_and_tape_marks():

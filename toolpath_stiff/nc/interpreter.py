@@ -26,7 +26,7 @@ from toolpath_stiff.nc.codes import (
     WORK_OFFSETS,
     code_name,
 )
-from toolpath_stiff.nc.cycles import Drilling, strokes
+from toolpath_stiff.nc.cycles import SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, ToolUse, Unsupported
 from toolpath_stiff.nc.recorder import Arc, Recorder
@@ -62,9 +62,11 @@ class Interpreter:
         self.recorder = Recorder()
         self.unsupported: list[Unsupported] = []
         self.warnings: list[str] = []
+        self.assumptions: list[str] = []
         self.used_tools: dict[int, ToolUse] = {}
         self.motion: str | None = None
-        self.plane, self.feed_mode, self.retract = "G17", "G94", "G98"
+        self.plane, self.feed_mode = "G17", "G94"
+        self.retract: str | None = None  # G98 or G99, once said; LinuxCNC starts as in G99
         self.absolute, self.arc_absolute, self.inch = True, False, False
         self.feed: float | None = None
         self.speed = 0.0
@@ -137,7 +139,11 @@ class Interpreter:
             return
         if group in codes.groups:
             other = codes.groups[group][0]
-            raise self.fail(word, f"and {other} are both of the modal group {group!r}", "one of them in a block")
+            # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
+            if code == "G80" and other != "G80":
+                return
+            if other != "G80" or code == "G80":
+                raise self.fail(word, f"and {other} are both of the modal group {group!r}", "one of them in a block")
         codes.groups[group] = (code, word)
 
     def _collect_m(self, codes: Codes, word: Word) -> None:
@@ -153,8 +159,10 @@ class Interpreter:
                 raise self.fail(word, f"and {other} are both of the modal group {group!r}", "one of them in a block")
             codes.groups[key] = (code, word)
         if code not in M_QUIET:
-            reason = M_HARMLESS.get(code, "an M code without a meaning for the path, not acted upon")
+            reason = M_HARMLESS.get(code, "an M code of one control, not acted upon")
             self._note(word, reason)
+            if code not in M_HARMLESS:  # it may run anything, a change of kinematics included
+                self.warnings.append(f"line {self.block.line}: what {word.text} does on its control is not known")
             if group is None:  # its parameters, whatever they are, go with it
                 self.values_of_unknown(word)
 
@@ -166,6 +174,10 @@ class Interpreter:
 
     def _note(self, word: Word, reason: str) -> None:
         self.unsupported.append(Unsupported(self.block.line, word.column, word.text, reason))
+
+    def _assume(self, sentence: str) -> None:
+        if sentence not in self.assumptions:
+            self.assumptions.append(sentence)
 
     def take(self, letter: str) -> float | None:
         """The value of a word, which is thereby used; None if the block has none."""
@@ -375,6 +387,8 @@ class Interpreter:
         if words:
             self._straight(RAPID, self._target(words), set(words))
         home = self.frames.offsets.home_g28 if code == "G28" else self.frames.offsets.home_g30
+        if not any(home):
+            self._assume(f"the reference point of {code}, not given by any offsets file, is machine 0, 0, 0")
         going = set(words) or set(range(6))
         # Axis by axis in program coordinates, as LinuxCNC does: with a rotation in force it is not the same.
         frames = self.frames
@@ -620,11 +634,15 @@ class Interpreter:
         bottom = self.sticky["Z"] if self.absolute else retract + self.sticky["Z"]
         if retract < bottom:
             raise self.fail(None, f"{code}: R at {retract:g} mm is below the bottom at {bottom:g} mm", "R above it")
-        level = initial if self.retract == "G98" else here
-        if level < retract:
+        if self.retract is None:
+            self._assume("a drilling cycle before any G98 or G99 ends at its R plane (G99), as LinuxCNC starts")
+        # As measured on LinuxCNC: a run that began below R goes to R first; otherwise a tool at or below R goes to the
+        # level above the holes on its way to the next one.
+        if initial < retract:
             self._along_normal(normal, retract, RAPID)
-            level = retract
-        clear = retract if self.retract == "G99" else level
+            here = retract
+        clear = max(initial, retract) if self.retract == "G98" else retract
+        level = here if here > retract + SAME_HEIGHT_MM else clear
         hole = Drilling(code, bottom, retract, clear, self.sticky.get("Q", 0.0), self.sticky.get("P", 0.0))
         for _ in range(repeats):
             place = frames.to_program(frames.position)

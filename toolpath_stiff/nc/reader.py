@@ -108,7 +108,7 @@ def _read(
         origin_source=frames.source,
         unsupported=tuple(interpreter.unsupported),
         warnings=(*warnings, *interpreter.warnings),
-        assumptions=(START,),
+        assumptions=(START, *interpreter.assumptions),
         tools=tuple(interpreter.used_tools.values()),
     )
 
@@ -134,7 +134,7 @@ def _execute(interpreter: Interpreter, lines: tuple[str, ...], name: str, block_
 def _left_over(lines: tuple[str, ...], number: int, what: str) -> list[str]:
     """A warning if anything but tape marks follows the end."""
     rest = [line for line in lines[number:] if line.strip() not in ("", "%")]
-    return [f"{len(rest)} lines after {what} in line {number} are not part of the program"] if rest else []
+    return [f"what follows {what} in line {number} is not part of the program (lines: {len(rest)})"] if rest else []
 
 
 def _to_mm(origin: Iterable[float]) -> Pose:
