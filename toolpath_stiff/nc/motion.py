@@ -1,0 +1,269 @@
+"""Straight moves, arcs and drilling cycles, from the words of a block in the modes in force. mm, mm/min inside."""
+
+from __future__ import annotations
+
+import math
+
+from toolpath_stiff.nc import arcs
+from toolpath_stiff.nc.blocks import AXES, BlockReader
+from toolpath_stiff.nc.cycles import SAME_HEIGHT_MM, Drilling, strokes
+from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.moves import ARC, CYCLE, RAPID, ToolUse
+from toolpath_stiff.nc.recorder import Arc, Recorder
+from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.units import MM_PER_INCH, m_from_mm
+
+LINEAR = frozenset("XYZ")
+SECONDS_PER_DAY = 86400.0
+
+
+class Mover(BlockReader):
+    """The modal state, and the moves that it makes of words; `recorder` holds those found so far."""
+
+    def __init__(self, name: str, frames: Frames, tools: dict[int, ToolEntry] | None) -> None:
+        super().__init__(name)
+        self.frames, self.tools = frames, tools
+        self.recorder = Recorder()
+        self.used_tools: dict[int, ToolUse] = {}
+        self.motion: str | None = None
+        self.plane, self.feed_mode = "G17", "G94"
+        self.retract: str | None = None  # G98 or G99, once said; LinuxCNC starts as in G99
+        self.absolute, self.arc_absolute, self.inch = True, False, False
+        self.feed: float | None = None
+        self.speed = 0.0
+        self.tool, self.selected = 0, 0
+        self.tool_length = math.nan
+        self.sticky: dict[str, float] = {}
+
+    @property
+    def _scale(self) -> float:
+        """Millimetres of one length unit of the program."""
+        return MM_PER_INCH if self.inch else 1.0
+
+    def _axis_words(self) -> dict[int, float]:
+        """Axis index -> value of the block's axis words in mm and degrees; they are thereby used."""
+        found = {}
+        for index, letter in enumerate(AXES):
+            value = self.take(letter)
+            if value is not None:
+                found[index] = value * self._scale if letter in LINEAR else value
+        return found
+
+    def _target(self, words: dict[int, float]) -> list[float]:
+        """Control coordinates of the axis words' point in the distance mode in force."""
+        point = self.frames.to_program(self.frames.position)
+        for axis, value in words.items():
+            point[axis] = value if self.absolute else point[axis] + value
+        return self.frames.to_control(point)
+
+    def _straight(
+        self, motion: int, control: list[float], work: set[int], machine: set[int] | None = None, dwell: float = 0.0
+    ) -> None:
+        """A straight move to a point in control coordinates; `work`, `machine`: axes that were given in each."""
+        self._record(motion, control, work, machine or set(), None)
+        if dwell:
+            self.recorder.add_dwell(dwell)
+
+    def _record(self, motion: int, control: list[float], work: set[int], machine: set[int], arc: Arc | None) -> None:
+        frames = self.frames
+        start, was = frames.to_setup(frames.position), any(frames.from_machine)
+        for axis in work:
+            frames.from_machine[axis] = False
+        for axis in machine:
+            frames.from_machine[axis] = True
+        end = frames.to_setup(control)
+        # An axis that was not asked to move keeps its number to the last digit, whatever the frames' sums say.
+        for axis in range(6):
+            if abs(end[axis] - start[axis]) < 1e-12 * max(1.0, abs(start[axis])):
+                end[axis] = start[axis]
+        feed = math.nan if motion == RAPID else self._feed_of(start, end, arc)
+        added = self.recorder.add(
+            self.block.line,
+            motion,
+            start,
+            end,
+            feed,
+            self.tool,
+            self.tool_length,
+            (was, any(frames.from_machine)),
+            arc,
+        )
+        frames.position = control
+        if added and self.tool not in self.used_tools:
+            self._use_tool()
+
+    def _use_tool(self) -> None:
+        entry = (self.tools or {}).get(self.tool, ToolEntry(self.tool))
+        self.used_tools[self.tool] = ToolUse(
+            self.tool, m_from_mm(entry.length), m_from_mm(entry.diameter), entry.remark
+        )
+
+    def _feed_of(self, start: list[float], end: list[float], arc: Arc | None) -> float:
+        """Feed of a move in mm/min, or deg/min for one of the rotary axes alone."""
+        if self.feed is None:
+            words = [w for w in self.block.words if w.letter == "G"]
+            raise self.fail(
+                words[0] if words else self.block.words[0],
+                "is a feed move before any feed" if self.feed_mode != "G93" else "is a feed move without F under G93",
+                "F above 0",
+            )
+        linear = math.dist(start[:3], end[:3])
+        if arc is not None:
+            linear = max(linear, abs(arc.sweep) * math.dist(start[:3], arc.center))
+        turn = max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
+        if self.feed_mode == "G93":
+            feed, self.feed = self.feed, None  # every move needs its own
+            return feed * (linear if linear > 0.0 else turn)
+        if self.feed_mode == "G95":
+            if self.speed == 0.0:
+                raise self.fail(None, "feed per revolution (G95) with the spindle at S0", "S above 0")
+            return self.feed * self.speed
+        if linear == 0.0:
+            return self.feed / (MM_PER_INCH if self.inch else 1.0)  # degrees are degrees in inch programs too
+        return self.feed
+
+    # -- arcs --------------------------------------------------------------------------------------------------------
+
+    def _arc(self) -> None:
+        first, second, normal = arcs.PLANES[self.plane]
+        clockwise = self.motion == "G2"
+        frames = self.frames
+        here = frames.to_program(frames.position)
+        words = self._axis_words()
+        target = list(here)
+        for axis, value in words.items():
+            target[axis] = value if self.absolute else here[axis] + value
+        start, end = (here[first], here[second]), (target[first], target[second])
+        turns = self._turns()
+        try:
+            center = self._arc_center(start, end, clockwise, words, first, second, normal)
+            arcs.check_radii(start, end, center)
+        except arcs.ArcError as error:
+            raise self.fail(None, error.found, error.expected) from None
+        sweep = arcs.arc_sweep(start, end, center, clockwise, turns)
+        middle = list(here)
+        middle[first], middle[second] = center
+        axis_vector = [0.0, 0.0, 0.0]
+        axis_vector[normal] = 1.0
+        x, y, z = frames.to_setup(frames.to_control(middle))[:3]
+        turned = frames.turn_direction((axis_vector[0], axis_vector[1], axis_vector[2]))
+        self._record(ARC, frames.to_control(target), set(words), set(), Arc((x, y, z), turned, sweep))
+
+    def _turns(self) -> int:
+        turns = self.take("P")
+        if turns is None:
+            return 1
+        if turns != int(turns) or not 1 <= turns <= 10000:
+            raise self.fail(self.values["P"], "is no number of turns", "a whole number from 1")
+        return int(turns)
+
+    def _arc_center(
+        self,
+        start: arcs.Point2,
+        end: arcs.Point2,
+        clockwise: bool,
+        words: dict[int, float],
+        first: int,
+        second: int,
+        normal: int,
+    ) -> arcs.Point2:
+        radius = self.take("R")
+        off_plane = arcs.CENTER_WORDS[normal]
+        in_plane = (arcs.CENTER_WORDS[first], arcs.CENTER_WORDS[second])
+        if self.has(off_plane):
+            raise self.fail(self.values[off_plane], f"is off the plane {self.plane}", " and ".join(sorted(in_plane)))
+        offsets = [self.take(letter) for letter in in_plane]
+        if radius is not None:
+            if offsets != [None, None]:
+                raise self.fail(self.values["R"], "and a centre (I, J, K) are both given", "one of them")
+            if not {first, second} & words.keys():
+                raise arcs.ArcError("an arc with R and without an end point", "an axis word of the plane")
+            return arcs.center_from_radius(start, end, radius * self._scale, clockwise)
+        if offsets == [None, None]:
+            raise arcs.ArcError("an arc without a centre", f"{in_plane[0]}, {in_plane[1]} or R")
+        if self.arc_absolute:
+            if None in offsets:
+                raise arcs.ArcError("an absolute centre (G90.1) with one word", f"{in_plane[0]} and {in_plane[1]}")
+            center = [v * self._scale for v in offsets if v is not None]
+            middle = self.frames.to_program(self.frames.position)
+            middle[first], middle[second] = center
+            return (middle[first], middle[second])
+        return (start[0] + (offsets[0] or 0.0) * self._scale, start[1] + (offsets[1] or 0.0) * self._scale)
+
+    # -- cycles --------------------------------------------------------------------------------------------------------
+
+    def _cycle(self, given: bool) -> None:
+        """One block of a canned cycle: its holes, expanded."""
+        code = self.motion or ""
+        first, second, normal = arcs.PLANES[self.plane]
+        repeats = self._repeats()
+        for letter in "RQP":
+            value = self.take(letter)
+            if value is not None:
+                self.sticky[letter] = value if letter == "P" else value * self._scale
+        words = self._axis_words()
+        if not words and given:
+            raise self.fail(None, f"{code} without axis words", "X, Y, Z")
+        if any(axis > 2 for axis in words):
+            raise self.fail(None, f"{code} with rotary axes", "the rotary axes in a block before it")
+        if normal in words:
+            self.sticky["Z"] = words.pop(normal)
+        self._check_cycle(code, normal)
+        frames = self.frames
+        here = frames.to_program(frames.position)[normal]
+        # The level from which a run of cycles began: G91's R counts from it, G98 returns to it.
+        initial = self.sticky.setdefault("level", here)
+        retract = self.sticky["R"] if self.absolute else self.sticky["R"] + initial
+        bottom = self.sticky["Z"] if self.absolute else retract + self.sticky["Z"]
+        if retract < bottom:
+            raise self.fail(None, f"{code}: R at {retract:g} mm is below the bottom at {bottom:g} mm", "R above it")
+        if self.retract is None:
+            self._assume("a drilling cycle before any G98 or G99 ends at its R plane (G99), as LinuxCNC starts")
+        # As measured on LinuxCNC: a run that began below R goes to R first; otherwise a tool at or below R goes to the
+        # level above the holes on its way to the next one.
+        if initial < retract:
+            self._along_normal(normal, retract, RAPID)
+            here = retract
+        clear = max(initial, retract) if self.retract == "G98" else retract
+        level = here if here > retract + SAME_HEIGHT_MM else clear
+        hole = Drilling(code, bottom, retract, clear, self.sticky.get("Q", 0.0), self.sticky.get("P", 0.0))
+        for _ in range(repeats):
+            place = frames.to_program(frames.position)
+            for axis in (first, second):
+                if axis in words:
+                    place[axis] = words[axis] if self.absolute else place[axis] + words[axis]
+            place[normal] = level
+            self._straight(RAPID, frames.to_control(place), set(words))
+            level = clear
+            self._along_normal(normal, retract, RAPID)
+            for stroke in strokes(hole):
+                self._along_normal(normal, stroke.height, CYCLE if stroke.feed else RAPID, stroke.dwell)
+
+    def _repeats(self) -> int:
+        value = self.take("L")
+        if value is None:
+            return 1
+        if value != int(value) or not 1 <= value <= 10000:
+            raise self.fail(self.values["L"], "is no number of repeats", "a whole number from 1")
+        return int(value)
+
+    def _check_cycle(self, code: str, normal: int) -> None:
+        axis = AXES[normal]
+        for letter, what in (("Z", axis), ("R", "R")):
+            if letter not in self.sticky:
+                raise self.fail(None, f"{code} without {what}", f"{what} in the cycle's first block")
+        if code in ("G73", "G83") and not self.sticky.get("Q", 0.0) > 0.0:
+            raise self.fail(None, f"{code} without a peck", "Q above 0")
+        if code in ("G82", "G89"):
+            dwell = self.sticky.get("P")
+            if dwell is None or not 0.0 <= dwell <= SECONDS_PER_DAY:
+                raise self.fail(None, f"{code} without its dwell", "P with the seconds, 0 or more")
+
+    def _along_normal(self, normal: int, height: float, motion: int, dwell: float = 0.0) -> None:
+        frames = self.frames
+        place = frames.to_program(frames.position)
+        if place[normal] != height:
+            place[normal] = height
+            self._straight(motion, frames.to_control(place), {normal})
+        if dwell:
+            self.recorder.add_dwell(dwell)
