@@ -1,17 +1,42 @@
-"""Which route computes the tip compliance: the closed form, the compiled kernel, or the exact LAPACK route."""
+"""Which route computes the tip compliance: the exact LAPACK route, the closed form, or the compiled loops.
+
+For linear struts on a rigid platform all three give the same to rounding; the choice is made by the number of poses.
+Physical effects take the exact route. Poses at which the closed form is ill-conditioned go to the exact route, which
+pivots, by themselves.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness import closed_form, exact
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 
 FloatArray = NDArray[np.float64]
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
+CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2 ms a call is not earned back
+# Poses; numba takes about 0.5 s to import and load from its cache, which the closed form spends on 1.5 million.
+COMPILED_FROM = 1_500_000
+ROUTES = ("exact", "closed_form", "compiled")
+
+
+def is_closed_form(model: StiffnessModel) -> bool:
+    """Whether linear struts on a rigid platform are all there is, so that the closed form holds."""
+    return model.is_plain and bool(np.isinf(model.platform_bars))
+
+
+def choose_route(model: StiffnessModel, poses: int) -> str:
+    """One of `ROUTES` for so many poses."""
+    if poses < CLOSED_FORM_FROM or not is_closed_form(model):
+        return "exact"
+    if poses < COMPILED_FROM:
+        return "closed_form"
+    from toolpath_stiff.stiffness import compiled
+
+    return "compiled" if compiled.available() else "closed_form"
 
 
 def tip_compliance(
@@ -20,6 +45,7 @@ def tip_compliance(
     rotation: FloatArray | None = None,
     tool_length: FloatArray | float = np.nan,
     force: float = DEFAULT_FORCE,
+    route: str | None = None,
 ) -> FloatArray:
     """Compliance of the tool tip at n poses, load-dependent effects left out.
 
@@ -35,11 +61,62 @@ def tip_compliance(
         m, scalar or (n,); nan: the reference tool.
     force
         N, the size of the load.
+    route
+        One of `ROUTES`; chosen by the number of poses unless given.
 
     Returns
     -------
     (n, 3, 3) m/N; nan where the machine is singular.
     """
+    chosen = route or choose_route(model, len(position))
+    if chosen == "exact":
+        return _exact(model, position, rotation, tool_length, force)
+    lengths = np.asarray(tool_length, dtype=float)
+    if lengths.ndim == 0 or _all_equal(lengths):
+        one = float(lengths.flat[0]) if lengths.size else np.nan
+        return _fast(model, position, rotation, one, force, chosen)
+    compliance = np.empty((len(position), 3, 3))
+    for length in np.unique(lengths):  # nan counts as one value
+        rows = np.isnan(lengths) if np.isnan(length) else lengths == length
+        turn = None if rotation is None else rotation[rows]
+        compliance[rows] = _fast(model, position[rows], turn, float(length), force, chosen)
+    return compliance
+
+
+def _all_equal(lengths: FloatArray) -> bool:
+    return bool(np.isnan(lengths).all() or np.ptp(lengths) == 0.0)
+
+
+def _fast(
+    model: StiffnessModel,
+    position: FloatArray,
+    rotation: FloatArray | None,
+    tool_length: float,
+    force: float,
+    route: str,
+) -> FloatArray:
+    """Closed form or compiled loops for one tool length; doubtful poses go to the exact route."""
+    kernel = closed_form.prepare(model.machine, tool_length)
+    if route == "compiled":
+        from toolpath_stiff.stiffness import compiled
+
+        compliance, good = compiled.tip_compliance(kernel, position, rotation)
+    else:
+        compliance, good = closed_form.tip_compliance(kernel, position, rotation)
+    if not good.all():
+        bad = ~good
+        turn = None if rotation is None else rotation[bad]
+        compliance[bad] = _exact(model, position[bad], turn, tool_length, force)
+    return compliance
+
+
+def _exact(
+    model: StiffnessModel,
+    position: FloatArray,
+    rotation: FloatArray | None,
+    tool_length: FloatArray | float,
+    force: float,
+) -> FloatArray:
     compliance = np.empty((len(position), 3, 3))
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(position),))
     for start in range(0, len(position), BLOCK):

@@ -1,0 +1,197 @@
+"""The fast routes against equilibrium solved with pivoting, 40-digit arithmetic, symmetry, and random machines."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from toolpath_stiff.machine import Limits, Machine, StrutLaw, load_machine
+from toolpath_stiff.path.rotations import rotation_about_z, rotation_matrices
+from toolpath_stiff.stiffness import closed_form, compiled, core
+from toolpath_stiff.stiffness.model import build_model
+
+NIST = load_machine("nist")
+needs_numba = pytest.mark.skipif(not compiled.available(), reason="numba is not installed (extra: fast)")
+ROUTES = ["closed_form", pytest.param("compiled", marks=needs_numba)]
+
+
+def poses(n: int, seed: int = 0, tilt: float = 0.35):
+    rng = np.random.default_rng(seed)
+    position = np.column_stack([rng.uniform(-0.4, 0.4, (n, 2)), rng.uniform(0.3, 1.3, n)])
+    return position, rotation_matrices(rng.uniform(-tilt, tilt, (n, 3)))
+
+
+def by_equilibrium(machine: Machine, position, rotation) -> np.ndarray:
+    """Tip compliance from J^T f = w with a pivoted 6 x 6 solve, written out here again."""
+    result = []
+    for p, r in zip(position, rotation, strict=True):
+        arms = machine.platform_joints @ r.T
+        strut = p + arms - machine.frame_joints
+        length = np.linalg.norm(strut, axis=1)
+        u = strut / length[:, None]
+        force = np.linalg.solve(np.vstack([u.T, np.cross(arms, u).T]), np.eye(6)[:, :3])
+        law = machine.strut_law
+        k = np.interp(length, [0, 10], [law.intercept, law.intercept + 10 * law.slope])
+        result.append(force.T @ (force / k[:, None]))
+    return np.array(result)
+
+
+def worst(found, expected) -> float:
+    scale = np.abs(expected).max(axis=(1, 2))
+    return float((np.abs(found - expected).max(axis=(1, 2)) / scale).max())
+
+
+@pytest.mark.parametrize("route", ROUTES)
+@pytest.mark.parametrize("tilted", [False, True])
+def test_agrees_with_a_pivoted_solve(route, tilted):
+    position, rotation = poses(5000)
+    turn = rotation if tilted else None
+    found = core.tip_compliance(build_model(NIST), position, turn, route=route)
+    expected = by_equilibrium(NIST, position, rotation if tilted else np.broadcast_to(np.eye(3), rotation.shape))
+    assert worst(found, expected) < 1e-13  # 16 digits less the condition of the equilibrium, some hundreds
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_forty_digits(route):
+    mp = pytest.importorskip("mpmath")
+    mp.mp.dps = 40
+    position, rotation = poses(4, seed=3)
+    found = core.tip_compliance(build_model(NIST), position, rotation, route=route)
+    for p, r, c in zip(position, rotation, found, strict=True):
+        columns, compliances = [], []
+        for joint, frame in zip(NIST.platform_joints, NIST.frame_joints, strict=True):
+            arm = mp.matrix(r.tolist()) * mp.matrix(joint.tolist())
+            s = mp.matrix(p.tolist()) + arm - mp.matrix(frame.tolist())
+            length = mp.sqrt(sum(v * v for v in s))
+            u = s / length
+            moment = [arm[1] * u[2] - arm[2] * u[1], arm[2] * u[0] - arm[0] * u[2], arm[0] * u[1] - arm[1] * u[0]]
+            columns.append([*u, *moment])
+            compliances.append(1 / (mp.mpf(NIST.strut_law.intercept) + mp.mpf(NIST.strut_law.slope) * length))
+        system = mp.matrix(columns).T
+        forces = [mp.lu_solve(system, mp.matrix([1.0 if i == axis else 0.0 for i in range(6)])) for axis in range(3)]
+        exact = [
+            [float(sum(a * b * k for a, b, k in zip(x, y, compliances, strict=True))) for y in forces] for x in forces
+        ]
+        np.testing.assert_allclose(c, exact, rtol=0, atol=1e-14 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("route", ["exact", *ROUTES])
+def test_symmetry_of_120_degrees(route):
+    position, rotation = poses(500, seed=5)
+    third = rotation_about_z(2 * np.pi / 3)
+    model = build_model(NIST)
+    plain = core.tip_compliance(model, position, rotation, route=route)
+    turned = core.tip_compliance(model, position @ third.T, third @ rotation @ third.T, route=route)
+    assert worst(third.T @ turned @ third, plain) < 1e-12
+
+
+def random_machine(rng) -> Machine:
+    """Joints anywhere: no symmetry, no plane; often close to singular."""
+    frame = rng.uniform([-1, -1, 1.0], [1, 1, 2.0], (6, 3))
+    platform = rng.uniform([-0.4, -0.4, 0.0], [0.4, 0.4, 0.3], (6, 3))
+    law = StrutLaw(0.5, 4e7, 3.0, 2e7)
+    return Machine("random", "random", "", frame, platform, 0.1, law, limits=Limits())
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_random_machines_fall_back_where_the_closed_form_is_ill_conditioned(route):
+    rng = np.random.default_rng(11)
+    fell_back = 0
+    for _ in range(60):
+        machine = random_machine(rng)
+        position = rng.uniform(-0.3, 0.3, (200, 3))
+        rotation = rotation_matrices(rng.uniform(-0.6, 0.6, (200, 3)))
+        found = core.tip_compliance(build_model(machine), position, rotation, route=route)
+        expected = by_equilibrium(machine, position, rotation)
+        assert worst(found, expected) < 1e-9
+        _, good = closed_form.tip_compliance(closed_form.prepare(machine), position, rotation)
+        fell_back += int((~good).sum())
+    assert fell_back > 0  # the guard was needed, and used
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_a_block_with_singular_poses_keeps_the_good_ones(route):
+    # On its axis, an octahedral hexapod is singular at a yaw of 90 degrees (Fichter 1986).
+    vertices = 0.5 * (NIST.frame_joints[::2] + NIST.frame_joints[1::2])
+    machine = NIST.with_changes(frame_joints=np.repeat(vertices, 2, axis=0))
+    position = np.array([[0.0, 0.0, 0.8]] * 200)
+    rotation = np.broadcast_to(rotation_about_z(np.pi / 2), (200, 3, 3)).copy()
+    rotation[::2] = rotation_about_z(0.4)
+    found = core.tip_compliance(build_model(machine), position, rotation, route=route)
+    assert worst(found[::2], by_equilibrium(machine, position[::2], rotation[::2])) < 1e-9
+    singular = found[1::2]
+    assert (~np.isfinite(singular).all(axis=(1, 2)) | (np.abs(singular).max(axis=(1, 2)) > 1e6 * np.abs(found[0]).max())).all()
+
+
+@needs_numba
+def test_compliance_along_with_lengths_and_determinant():
+    from toolpath_stiff.machine import singularity_index, solve_struts
+    from toolpath_stiff.machine.kinematics import solve_struts_at
+
+    position, rotation = poses(1000, seed=9)
+    rng = np.random.default_rng(1)
+    direction = rng.normal(size=(1000, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    kernel = closed_form.prepare(NIST)
+    neutral = np.abs(np.linalg.det(solve_struts_at(NIST, NIST.limits.neutral_pose).jacobian[0]))
+    for turn in (None, rotation):
+        columns = None if turn is None else np.ascontiguousarray(turn.reshape(-1, 9).T)
+        along, determinant, lengths, good = compiled.compliance_along_columns(
+            kernel, np.ascontiguousarray(position.T), np.ascontiguousarray(direction.T), columns
+        )
+        tensor = core.tip_compliance(build_model(NIST), position, turn, route="exact")
+        np.testing.assert_allclose(along, np.einsum("ni,nij,nj->n", direction, tensor, direction), rtol=1e-12)
+        struts = solve_struts(NIST, position, turn)
+        np.testing.assert_allclose(lengths.T, struts.lengths, rtol=1e-14)
+        np.testing.assert_allclose(determinant / neutral, singularity_index(NIST, struts), rtol=1e-11)
+        assert good.all()
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_tools_of_several_lengths(route):
+    position, rotation = poses(600, seed=2)
+    lengths = np.where(np.arange(600) % 3 == 0, np.nan, np.where(np.arange(600) % 3 == 1, 0.12, 0.25))
+    model = build_model(NIST)
+    fast, plain = (core.tip_compliance(model, position, rotation, lengths, route=r) for r in (route, "exact"))
+    assert worst(fast, plain) < 1e-13
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_a_strut_law_beyond_zero_is_refused_on_every_route(route):
+    from toolpath_stiff.errors import InputError
+
+    position = np.zeros((200, 3))
+    position[7] = [0.0, 0.0, -3.0]  # struts of some 6 m; the law ends at 4.7 m
+    with pytest.raises(InputError):
+        core.tip_compliance(build_model(NIST), position, route=route)
+
+
+def test_routes_are_chosen_by_number_and_physics():
+    plain, soft = build_model(NIST), build_model(NIST.with_changes(platform_bar_stiffness=1e9))
+    assert core.choose_route(plain, 10) == "exact"
+    assert core.choose_route(plain, 10_000) == "closed_form"
+    assert core.choose_route(plain, 10_000_000) in ("compiled", "closed_form")
+    assert core.choose_route(soft, 10_000_000) == "exact"
+
+
+def test_memory_does_not_grow_with_the_poses():
+    kernel = closed_form.prepare(NIST)
+
+    def peak_above_output(n: int) -> float:
+        position, rotation = poses(n)
+        tracemalloc.start()
+        closed_form.tip_compliance(kernel, position, rotation)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return peak - n * (9 * 8 + 1)
+
+    small, large = peak_above_output(4 * closed_form.BLOCK), peak_above_output(40 * closed_form.BLOCK)
+    assert large < 1.2 * small
+
+
+def test_no_poses():
+    empty = np.empty((0, 3))
+    for route in ("exact", "closed_form"):
+        assert core.tip_compliance(build_model(NIST), empty, route=route).shape == (0, 3, 3)
