@@ -122,7 +122,9 @@ def test_a_block_with_singular_poses_keeps_the_good_ones(route):
     found = core.tip_compliance(build_model(machine), position, rotation, route=route)
     assert worst(found[::2], by_equilibrium(machine, position[::2], rotation[::2])) < 1e-9
     singular = found[1::2]
-    assert (~np.isfinite(singular).all(axis=(1, 2)) | (np.abs(singular).max(axis=(1, 2)) > 1e6 * np.abs(found[0]).max())).all()
+    assert (
+        ~np.isfinite(singular).all(axis=(1, 2)) | (np.abs(singular).max(axis=(1, 2)) > 1e6 * np.abs(found[0]).max())
+    ).all()
 
 
 @needs_numba
