@@ -14,8 +14,6 @@ from toolpath_stiff.stiffness.closed_form import SMALL_DETERMINANT, ClosedForm
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-BLOCK = 4096  # poses that are transposed at a time
-
 
 def available() -> bool:
     """Whether numba is installed; does not import it."""
@@ -35,18 +33,17 @@ def _trusted(kernel: ClosedForm, position: FloatArray, det: FloatArray, values: 
     """Where the determinants are large enough and every strut has a stiffness above zero."""
     small = SMALL_DETERMINANT
     good = (np.abs(det[0]) > small) & (np.abs(det[1]) > small * kernel.arm**3) & np.isfinite(values)
-    return np.asarray(good if _law_holds(kernel, position) else good & False)
+    box = np.array([position.min(axis=1), position.max(axis=1)]) if position.size else np.zeros((2, 3))
+    return np.asarray(good if _law_holds(kernel, box) else good & False)
 
 
-def _law_holds(kernel: ClosedForm, position: FloatArray) -> bool:
-    """Whether no strut can be so long or short that the law leaves it no stiffness; checked on the positions' box.
+def _law_holds(kernel: ClosedForm, box: FloatArray) -> bool:
+    """Whether no strut can be so long that the law leaves it no stiffness, for tips in a box (2, 3): low, high corner.
 
     A distance is largest at a corner of the box, and a strut is longer than that by an arm at the most. Where the box
     cannot tell, the answer is no: the exact route then looks at every pose.
     """
-    if not position.size:
-        return True
-    corners = np.stack(np.meshgrid(*zip(position.min(axis=1), position.max(axis=1), strict=True)), axis=-1)
+    corners = np.stack(np.meshgrid(*box.T), axis=-1)
     reach = np.linalg.norm(corners.reshape(-1, 1, 3) - kernel.frame.T, axis=-1).max()
     longest = reach + np.linalg.norm(kernel.platform, axis=0).max()
     return bool(kernel.intercept > 0.0 and kernel.intercept + kernel.slope * longest > 0.0)
@@ -87,15 +84,23 @@ def tip_compliance(
     kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None = None
 ) -> tuple[FloatArray, BoolArray]:
     """As `closed_form.tip_compliance`: (n, 3, 3) m/N and (n,) good, for position (n, 3) and rotation (n, 3, 3)."""
+    from toolpath_stiff.stiffness import compiled_loops
+
     n = len(position)
-    compliance, good = np.empty((n, 3, 3)), np.empty(n, dtype=bool)
-    for start in range(0, n, BLOCK):
-        rows = slice(start, min(start + BLOCK, n))
-        turn = None if rotation is None else np.ascontiguousarray(rotation[rows].reshape(-1, 9).T)
-        columns, good[rows] = tip_compliance_columns(kernel, np.ascontiguousarray(position[rows].T), turn)
-        for column, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
-            compliance[rows, i, j] = compliance[rows, j, i] = columns[column]
-    return compliance, good
+    compliance, good = np.empty((n, 9)), np.empty(n, dtype=bool)
+    box = np.array([[np.inf] * 3, [-np.inf] * 3])
+    arms, frame = _joints(kernel)
+    law = (kernel.intercept, kernel.slope)
+    smallest = (SMALL_DETERMINANT, SMALL_DETERMINANT * kernel.arm**3)
+    rows = np.ascontiguousarray(position)
+    if rotation is None:
+        compiled_loops.tensor_rows_vertical(rows, arms, frame, *law, smallest, compliance, good, box)
+    else:
+        turns = np.ascontiguousarray(rotation).reshape(n, 9)
+        compiled_loops.tensor_rows_tilted(rows, turns, arms, frame, *law, smallest, compliance, good, box)
+    if n and not _law_holds(kernel, box):
+        good[:] = False
+    return compliance.reshape(n, 3, 3), good
 
 
 def compliance_along_columns(

@@ -207,3 +207,61 @@ def directed_tilted(n, p, r, d, arms, frame, intercept, slope, out, det, lengths
         )
         load = (d[0, i], d[1, i], d[2, i])
         directed((p[0, i], p[1, i], p[2, i]), moved, frame, intercept, slope, load, out, det, lengths, i)
+
+
+ROWS = 256  # poses that are turned from rows to columns at a time: the work arrays then fit the first-level cache
+
+
+@inline
+def scatter(m, c, d, smallest, out, good, base):
+    """Six columns xx, yy, zz, xy, xz, yz to rows of nine, and whether the determinants d are large enough."""
+    for i in range(np.uint64(0), np.uint64(m)):
+        finite = abs(c[2, i]) < np.inf
+        good[base + i] = (abs(d[0, i]) > smallest[0]) & (abs(d[1, i]) > smallest[1]) & finite
+        out[base + i, 0] = c[0, i]
+        out[base + i, 4] = c[1, i]
+        out[base + i, 8] = c[2, i]
+        out[base + i, 1] = out[base + i, 3] = c[3, i]
+        out[base + i, 2] = out[base + i, 6] = c[4, i]
+        out[base + i, 5] = out[base + i, 7] = c[5, i]
+
+
+@inline
+def gather(m, position, base, p, box):
+    """Rows of positions to columns; widens the box (2, 3) that holds them all."""
+    for i in range(np.uint64(0), np.uint64(m)):
+        p[0, i] = position[base + i, 0]
+        p[1, i] = position[base + i, 1]
+        p[2, i] = position[base + i, 2]
+    for k in range(3):
+        low, high = box[0, k], box[1, k]
+        for i in range(np.uint64(0), np.uint64(m)):
+            low = min(low, p[k, i])
+            high = max(high, p[k, i])
+        box[0, k], box[1, k] = low, high
+
+
+@loop
+def tensor_rows_vertical(position, arms, frame, intercept, slope, smallest, out, good, box):
+    """As `tensor_vertical` with poses in rows: position (n, 3), out (n, 9); `smallest` determinants that are good."""
+    p, c, d = np.empty((3, ROWS)), np.empty((6, ROWS)), np.empty((2, ROWS))
+    for start in range(0, len(position), ROWS):
+        m, base = min(ROWS, len(position) - start), np.uint64(start)
+        gather(m, position, base, p, box)
+        tensor_vertical(m, p, arms, frame, intercept, slope, c, d)
+        scatter(m, c, d, smallest, out, good, base)
+
+
+@loop
+def tensor_rows_tilted(position, rotation, arms, frame, intercept, slope, smallest, out, good, box):
+    """As `tensor_tilted` with poses in rows: position (n, 3), rotation and out (n, 9)."""
+    p, r = np.empty((3, ROWS)), np.empty((9, ROWS))
+    c, d = np.empty((6, ROWS)), np.empty((2, ROWS))
+    for start in range(0, len(position), ROWS):
+        m, base = min(ROWS, len(position) - start), np.uint64(start)
+        gather(m, position, base, p, box)
+        for i in range(np.uint64(0), np.uint64(m)):
+            for k in range(9):
+                r[np.uint64(k), i] = rotation[base + i, np.uint64(k)]
+        tensor_tilted(m, p, r, arms, frame, intercept, slope, c, d)
+        scatter(m, c, d, smallest, out, good, base)

@@ -1,0 +1,1 @@
+"""Speed: ratios of two ways, measured side by side in one run. `python -m benchmarks`."""
