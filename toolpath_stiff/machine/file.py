@@ -19,12 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, Pose, StrutLaw
-from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, rad_from_deg
+from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, mm_from_m, rad_from_deg
 
 DEFAULT_MACHINE = "nist"
 INFINITY = math.inf
 FloatArray = NDArray[np.float64]
+# Smallest singular value of the six strut screws (arms in units of the platform's size) that is no singularity.
+SINGULAR = 1e-6
 
 
 @dataclass(frozen=True)
@@ -164,7 +167,7 @@ class _Reader:
         sections = self.sections(table)
         values = {name: self.section(name, content) for name, content in sections.items()}
         top = values[""]
-        return Machine(
+        machine = Machine(
             name=top["name"],
             title=top.get("title", top["name"]),
             source=top.get("source", ""),
@@ -181,6 +184,37 @@ class _Reader:
             effects=self.entries(table, "effect"),
             instruments=self.entries(table, "instrument"),
         )
+        self.check_law(machine)
+        self.check_neutral_pose(machine)
+        return machine
+
+    def check_law(self, machine: Machine) -> None:
+        """The struts must keep some stiffness over their whole travel."""
+        law = machine.strut_law
+        for key, length in zip(("min_mm", "max_mm"), machine.limits.strut_length, strict=True):
+            if np.isfinite(length) and law.intercept + law.slope * length <= 0.0:
+                vanishes = mm_from_m(-law.intercept / law.slope)
+                raise self.fail(
+                    "limits.strut_length",
+                    key,
+                    f" = {mm_from_m(length):g}: the strut law leaves no stiffness there",
+                    expected=f"a travel on this side of {vanishes:.1f} mm, where the law vanishes",
+                )
+
+    def check_neutral_pose(self, machine: Machine) -> None:
+        """Margins are counted from the neutral pose, so the machine must not be singular there."""
+        struts = solve_struts_at(machine, machine.limits.neutral_pose)
+        directions, arms = struts.directions[0], struts.arms[0] - struts.arms[0].mean(axis=0)
+        size = max(float(np.linalg.norm(arms, axis=1).mean()), 1e-9)
+        screws = np.concatenate([directions, np.cross(arms, directions) / size], axis=1)
+        if not np.isfinite(screws).all() or np.linalg.svd(screws)[1][-1] < SINGULAR:
+            raise self.fail(
+                "limits.joint_angle",
+                "neutral_pose_mm_deg",
+                ": the machine is singular there",
+                expected="a pose in the middle of the workspace",
+                hint="check the joints as well: similar hexagons without a twist are singular everywhere",
+            )
 
     def sections(self, table: dict[str, Any]) -> dict[str, dict[str, Any]]:
         """Split the file into the sections of the schema; unknown and missing ones are errors."""

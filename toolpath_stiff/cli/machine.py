@@ -1,0 +1,264 @@
+"""`tps machine`: list, show, check, make and import machine files; repeat the recovery of the NIST geometry."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.cli.arguments import pose_argument
+from toolpath_stiff.errors import InputError
+
+if TYPE_CHECKING:
+    from toolpath_stiff.machine import Machine
+
+EPILOG = """\
+examples:
+  tps machine show nist --out hexapod.png           figures with their origin; the machine at the paper's pose
+  tps machine new mine.toml                         a commented template to edit
+  tps machine check mine.toml
+  tps machine from-linuxcnc kinematics.hal -o mine.toml
+  tps machine recover                               the NIST geometry from the paper's Table 1, fitted anew
+"""
+# The pose of the paper's Figure 2 is the one to show the paper's machine in.
+FIGURE_2 = (-0.3, 0.3, 0.3, -0.5235987755982988, 0.0, 0.0)
+OUT_OF_REACH = 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of every action."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    listing = actions.add_parser("list", help="packaged machines")
+    listing.add_argument("--json", action="store_true", help="print JSON")
+    show = actions.add_parser("show", help="figures of a machine with their origin, and a picture of it")
+    show.add_argument("machine", metavar="NAME|FILE", nargs="?", default="nist")
+    show.add_argument("--pose", type=pose_argument, metavar="X,Y,Z[,A,B,C]", help="pose of the picture, mm and degrees")
+    show.add_argument("--out", metavar="FILE.png", help="the picture (default: reports/<name>.png)")
+    show.add_argument("--json", action="store_true", help="print JSON, draw nothing unless --out is given")
+    check = actions.add_parser("check", help="check a machine file")
+    check.add_argument("file", metavar="FILE")
+    new = actions.add_parser("new", help="write a commented template")
+    new.add_argument("file", metavar="FILE")
+    hal = actions.add_parser("from-linuxcnc", help="read the genhexkins pins of a LinuxCNC HAL file")
+    hal.add_argument("file", metavar="FILE.hal")
+    hal.add_argument("-o", "--out", metavar="FILE", help="machine file to write (default: standard output)")
+    hal.add_argument(
+        "--units", choices=("mm", "inch"), help="unit of the pins (default: LINEAR_UNITS of the ini beside)"
+    )
+    recover = actions.add_parser("recover", help="fit the NIST geometry to the paper's Table 1 anew")
+    recover.add_argument("--starts", type=int, default=20, metavar="N", help="scattered starting points (default: 20)")
+    recover.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the starting points (default: 1)")
+    recover.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do the chosen action."""
+    action = {
+        "list": _list,
+        "show": _show,
+        "check": _check,
+        "new": _new,
+        "from-linuxcnc": _from_linuxcnc,
+        "recover": _recover,
+    }[args.action]
+    return action(args)
+
+
+def _list(args: argparse.Namespace) -> int:
+    from toolpath_stiff.machine import load_machine, packaged_machines
+
+    rows = [(name, load_machine(name)) for name in packaged_machines()]
+    if args.json:
+        found = [{"name": name, "title": machine.title, "source": machine.source} for name, machine in rows]
+        json.dump(found, sys.stdout, indent=2)
+        print()
+        return 0
+    for name, machine in rows:
+        print(f"{name:<16} {machine.title}\n{'':<16} {machine.source}")
+    return 0
+
+
+def _show(args: argparse.Namespace) -> int:
+    import numpy as np
+
+    from toolpath_stiff.files import write_atomically
+    from toolpath_stiff.machine import load_machine, reach, solve_struts
+    from toolpath_stiff.path.rotations import rotation_matrices
+
+    machine = load_machine(args.machine)
+    paper = FIGURE_2 if machine.name == "nist" else machine.default_origin
+    pose = np.array(args.pose if args.pose is not None else paper)
+    turn = rotation_matrices(pose[3:])
+    struts = solve_struts(machine, pose[:3], turn)
+    stand = reach(machine, pose[:3], struts, turn[None])
+    rows = _figures(machine)
+    if args.json:
+        json.dump(
+            [dict(zip(("quantity", "value", "unit", "origin", "remark"), r, strict=True)) for r in rows],
+            sys.stdout,
+            indent=2,
+        )
+        print()
+    else:
+        print(f"{machine.title}\n{machine.source}\n")
+        width = max(len(row[0]) for row in rows)
+        for quantity, value, unit, origin, _ in rows:
+            print(f"  {quantity:<{width}}  {value} {unit}".rstrip() + f"  [{origin}]")
+        remarks = {row[4] for row in rows if row[4]}
+        for name, remark in machine.remarks.items():
+            if remark in remarks:
+                print(f"\n  {name}: {remark}", end="")
+        print(f"\n\n  at the pose drawn: {stand.describe(0)}")
+    if args.out or not args.json:
+        from toolpath_stiff.report.machine_picture import machine_picture
+
+        target = args.out or f"reports/{machine.name}.png"
+        write_atomically(target, machine_picture(machine, pose, struts))
+        if not args.json:
+            print(f"written:\n  {target}")
+    return 0 if stand.reachable[0] else OUT_OF_REACH
+
+
+def _figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
+    """Quantity, value, unit, origin, remark of a machine's figures, in the shop's units."""
+    from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
+
+    limits, law = machine.limits, machine.strut_law
+
+    def row(quantity: str, value: str, unit: str, section: str) -> tuple[str, str, str, str, str]:
+        return quantity, value, unit, machine.origins.get(section, "assumed"), machine.remarks.get(section, "")
+
+    def numbers(values: Any, decimals: int = 3) -> str:
+        return ", ".join(f"{round(float(v), decimals) + 0.0:g}" if abs(v) < 1e5 else f"{v:g}" for v in values)
+
+    rows = [
+        row(f"frame joint {i + 1}", numbers(mm_from_m(joint), 3), "mm", "frame_joints")
+        for i, joint in enumerate(machine.frame_joints)
+    ]
+    rows += [
+        row(f"platform joint {i + 1}", numbers(mm_from_m(joint), 3), "mm from the tool tip", "platform_joints")
+        for i, joint in enumerate(machine.platform_joints)
+    ]
+    pose = [*(mm_from_m(v) for v in limits.neutral_pose[:3]), *(deg_from_rad(v) for v in limits.neutral_pose[3:])]
+    origin = [
+        *(mm_from_m(v) for v in machine.default_origin[:3]),
+        *(deg_from_rad(v) for v in machine.default_origin[3:]),
+    ]
+    low, high = mm_from_m(limits.workspace)
+    return [
+        *rows,
+        row("reference tool length", f"{mm_from_m(machine.reference_tool_length):g}", "mm", "reference_tool"),
+        row(
+            "strut stiffness",
+            f"{law.stiffness_1 / 1e6:g} N/um at {mm_from_m(law.length_1):g} mm, "
+            f"{law.stiffness_2 / 1e6:g} N/um at {mm_from_m(law.length_2):g}",
+            "mm, linear",
+            "strut_law",
+        ),
+        row("platform bar stiffness", f"{machine.platform_bar_stiffness:g}", "N/m", "platform"),
+        row("strut length", numbers([mm_from_m(v) for v in limits.strut_length]), "mm", "limits.strut_length"),
+        row("frame joint angle up to", f"{deg_from_rad(limits.frame_joint_angle):g}", "deg", "limits.joint_angle"),
+        row(
+            "platform joint angle up to", f"{deg_from_rad(limits.platform_joint_angle):g}", "deg", "limits.joint_angle"
+        ),
+        row("neutral pose of the joints", numbers(pose), "mm, deg", "limits.joint_angle"),
+        row("workspace from", numbers(low), "mm", "limits.workspace"),
+        row("workspace to", numbers(high), "mm", "limits.workspace"),
+        row("singularity index at least", f"{limits.singularity:g}", "", "limits.singularity"),
+        row("default origin (program zero)", numbers(origin), "mm, deg", "setup"),
+        row("rapid feed", f"{mm_per_min_from_m_per_s(machine.rapid_feed):g}", "mm/min", "setup"),
+    ]
+
+
+def _check(args: argparse.Namespace) -> int:
+    """Load the file, build its model, look whether its default origin is within reach."""
+    import numpy as np
+
+    from toolpath_stiff.analysis.poses import evaluate_poses
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.stiffness.model import build_model
+
+    if not Path(args.file).is_file():
+        raise InputError(f"cannot read machine file {args.file!r}", hint="`tps machine new FILE` writes a template")
+    machine = load_machine(Path(args.file))
+    model = build_model(machine)
+    origin = np.array([machine.default_origin])
+    found = evaluate_poses(model, origin[:, :3], origin[:, 3:])
+    effects = ", ".join(active.effect.name for active in (*model.effects, *model.instruments)) or "none"
+    print(f"{args.file}: {machine.title}: the file is good\n  effects: {effects}")
+    if not found.reach.reachable[0]:
+        raise InputError(
+            f"the default origin is out of reach: {found.reach.describe(0)}",
+            hint="change default_origin_mm or the limits",
+            file=args.file,
+        )
+    kx, ky, kz = found.along_axes[0] / 1e3
+    print(f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; {found.reach.describe(0)}")
+    return 0
+
+
+def _new(args: argparse.Namespace) -> int:
+    from toolpath_stiff.files import write_atomically
+    from toolpath_stiff.machine import load_machine, machine_toml
+
+    target = Path(args.file)
+    if target.exists():
+        raise InputError(f"{args.file!r} exists already", hint="choose another name; nothing was written")
+    preamble = (
+        "A machine file for tps. Every section names the origin of its figures:\n"
+        "published, recovered (from published figures) or assumed. The figures below are those of the packaged\n"
+        "machine nist: replace them by your own, then run `tps machine check` on this file."
+    )
+    machine = load_machine("nist").with_changes(
+        name=target.stem, title=f"my hexapod ({target.stem})", source="say where the figures come from"
+    )
+    write_atomically(target, machine_toml(machine, preamble))
+    print(f"written:\n  {target}\nedit it, then: tps machine check {target}")
+    return 0
+
+
+def _from_linuxcnc(args: argparse.Namespace) -> int:
+    from toolpath_stiff.files import write_atomically
+    from toolpath_stiff.machine import machine_toml
+    from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
+
+    path = Path(args.file)
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise InputError(f"cannot read {args.file!r}: {error.strerror}") from None
+    units = args.units or units_of(path)
+    if units is None:
+        raise InputError(
+            "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)",
+            hint="give it with --units mm or --units inch",
+            file=args.file,
+        )
+    machine, notes = machine_from_hal(text, units, path.name)
+    content = machine_toml(machine, f"Made from {path.name}, pins in {units}.\n" + "\n".join(notes))
+    if args.out:
+        write_atomically(args.out, content)
+        print(f"written:\n  {args.out}")
+    else:
+        sys.stdout.write(content)
+    for note in notes:
+        print(f"tps: note: {note}", file=sys.stderr)
+    return 0
+
+
+def _recover(args: argparse.Namespace) -> int:
+    from toolpath_stiff.updating.geometry_recovery import recover_geometry, recovery_text
+
+    if not 1 <= args.starts <= 1000:
+        raise InputError(f"--starts {args.starts}", expected="1 to 1000")
+    found = recover_geometry(starts=args.starts, seed=args.seed)
+    if args.json:
+        json.dump(found, sys.stdout, indent=2)
+        print()
+    else:
+        print(recovery_text(found))
+    return 0

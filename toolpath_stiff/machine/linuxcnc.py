@@ -1,0 +1,155 @@
+"""Machines from LinuxCNC: the `genhexkins` pins of a HAL file, with the unit of the ini file beside it.
+
+genhexkins(9): `base.N.x|y|z` are the joints of the base, `platform.N.x|y|z` those of the platform in its own frame,
+`tool-offset` and `spindle-offset` lie along the platform's Z. `base-n`, `platform-n` and `screw-lead` correct the strut
+length for the turning of the screw in its joints; they do not change where the joints are.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.kinematics import solve_struts_at
+from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
+from toolpath_stiff.units import MM_PER_INCH, m_from_mm, rad_from_deg
+
+FloatArray = NDArray[np.float64]
+
+SETP = re.compile(r"^\s*setp\s+genhexkins\.(\S+?)\s*(?:=\s*|\s+)(\S+)\s*$")
+JOINT = re.compile(r"(base|platform)\.([0-5])\.([xyz])$")
+KNOWN = re.compile(
+    r"((base|platform)(-n)?\.[0-5]\.[xyz]|tool-offset|spindle-offset|screw-lead|"
+    r"convergence-criterion|limit-iterations|max-error|tool-offset)$"
+)
+UNITS_MM = {"mm": 1.0, "inch": MM_PER_INCH}
+# Struts of a screw about 40 mm thick; LinuxCNC knows no stiffness.
+ASSUMED_STIFFNESS = 50e6  # N/m
+
+
+def units_of(hal: Path) -> str | None:
+    """`mm` or `inch` from LINEAR_UNITS of the ini files beside a HAL file; None if they do not agree or say."""
+    found = set()
+    for ini in sorted(hal.parent.glob("*.ini")):
+        text = ini.read_text(encoding="utf-8", errors="replace")
+        for value in re.findall(r"^\s*LINEAR_UNITS\s*=\s*(\w+)", text, flags=re.MULTILINE):
+            found.add({"mm": "mm", "metric": "mm", "inch": "inch", "in": "inch", "imperial": "inch"}.get(value.lower()))
+    return found.pop() if len(found) == 1 else None
+
+
+def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tuple[Machine, list[str]]:
+    """A machine from the text of a HAL file.
+
+    Parameters
+    ----------
+    text
+        The file.
+    units
+        "mm" or "inch", of the pins' values.
+    file
+        For messages and the machine's source.
+
+    Returns
+    -------
+    machine, notes
+        The machine; sentences about what was assumed or left out.
+
+    Raises
+    ------
+    InputError
+        A pin is missing, set twice, unknown, or its value is no number.
+    """
+    scale = UNITS_MM[units]
+    values = _read_pins(text, file)
+    missing = [
+        f"genhexkins.{part}.{n}.{axis}"
+        for part in ("base", "platform")
+        for n in range(6)
+        for axis in "xyz"
+        if f"{part}.{n}.{axis}" not in values
+    ]
+    if missing:
+        raise InputError(
+            f"{len(missing)} joint pins are not set, first {missing[0]}",
+            expected="setp genhexkins.base.N.x|y|z and genhexkins.platform.N.x|y|z for N = 0 to 5",
+            file=file,
+        )
+
+    def joints(part: str) -> FloatArray:
+        rows = [[values[f"{part}.{n}.{axis}"] for axis in "xyz"] for n in range(6)]
+        return m_from_mm(np.array(rows) * scale)
+
+    offset = m_from_mm((values.get("tool-offset", 0.0) + values.get("spindle-offset", 0.0)) * scale)
+    notes = []
+    if offset:
+        notes.append(f"the tool tip lies {offset * 1e3:g} mm along the platform's Z (tool-offset plus spindle-offset)")
+    if any(name.startswith(("base-n", "platform-n")) or name == "screw-lead" for name in values):
+        notes.append("screw-lead and the joint normals correct strut lengths for the turning screw; left out")
+    platform = joints("platform") + np.array([0.0, 0.0, -offset])
+    machine, more = _with_assumptions(joints("base"), platform, file)
+    return machine, notes + more
+
+
+def _read_pins(text: str, file: str) -> dict[str, float]:
+    values: dict[str, float] = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        match = SETP.match(line.split("#")[0])
+        if not match:
+            continue
+        pin, raw = match.groups()
+        if not KNOWN.match(pin):
+            raise InputError(f"genhexkins has no pin {pin!r}", file=file, line=number)
+        if pin in values:
+            raise InputError(f"genhexkins.{pin} is set twice", file=file, line=number)
+        try:
+            values[pin] = float(raw)
+        except ValueError:
+            raise InputError(
+                f"genhexkins.{pin} = {raw!r}", expected="a number (variables are not read)", file=file, line=number
+            ) from None
+        if not np.isfinite(values[pin]):
+            raise InputError(f"genhexkins.{pin} = {raw!r}", expected="a finite number", file=file, line=number)
+    if not any(JOINT.match(pin) for pin in values):
+        raise InputError("sets no genhexkins joints", expected="a HAL file with setp genhexkins...", file=file)
+    return values
+
+
+def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> tuple[Machine, list[str]]:
+    """Limits and stiffness that LinuxCNC does not know, from the machine's own size."""
+    size = float(np.linalg.norm(frame[:, :2], axis=1).mean())
+    height = float(frame[:, 2].mean() + 0.87 * size)  # struts then lean by about 45 degrees
+    neutral = (0.0, 0.0, height, 0.0, 0.0, 0.0)
+    machine = Machine(
+        name=Path(file).stem,
+        title=f"hexapod of {Path(file).name}",
+        source=f"genhexkins pins of {Path(file).name}",
+        frame_joints=frame,
+        platform_joints=platform,
+        reference_tool_length=0.0,
+        strut_law=StrutLaw(0.5 * size, ASSUMED_STIFFNESS, 2.0 * size, ASSUMED_STIFFNESS),
+        limits=Limits(neutral_pose=neutral),
+        default_origin=neutral,
+    )
+    middle = float(solve_struts_at(machine, neutral).lengths.mean())
+    limits = Limits(
+        strut_length=(0.7 * middle, 1.4 * middle),
+        frame_joint_angle=rad_from_deg(45.0),
+        platform_joint_angle=rad_from_deg(45.0),
+        workspace=np.array([[-size, -size, height - 0.5 * size], [size, size, height + 0.5 * size]]),
+        singularity=0.1,
+        neutral_pose=neutral,
+    )
+    origins = {"frame_joints": "published", "platform_joints": "published"}
+    return machine.with_changes(
+        limits=limits,
+        strut_law=StrutLaw(0.7 * middle, ASSUMED_STIFFNESS, 1.4 * middle, ASSUMED_STIFFNESS),
+        origins=origins,
+        remarks={"strut_law": "LinuxCNC knows no stiffness; set your own"},
+    ), [
+        "strut stiffness, travel, joint angles, workspace, tool length and default origin are assumed from the "
+        "machine's size: edit them"
+    ]

@@ -1,0 +1,103 @@
+"""A machine at a pose, as the paper's Figure 2: the whole machine, and the platform in detail."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.machine.kinematics import Struts
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.report.figure import house_style, new_figure, png_bytes
+from toolpath_stiff.stiffness.platform_truss import HUB, TIP, platform_bars, platform_nodes
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+STRUT, PLATFORM, TOOL, FRAME = "#2457a6", "#5b6675", "#c2410c", "#9aa4b1"
+
+
+def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> bytes:
+    """PNG of the machine at one pose (6,) m and rad, with its struts there."""
+    joints = pose[:3] + struts.arms[0]
+    nodes = pose[:3] + platform_nodes(machine.platform_joints) @ rotation_matrices(pose[3:]).T
+    with house_style():
+        figure = new_figure(14.0, 8.0)
+        whole = figure.add_axes((-0.05, -0.07, 0.59, 0.92), projection="3d")
+        _draw_whole(whole, machine, mm_from_m(joints), mm_from_m(nodes), struts)
+        detail = figure.add_axes((0.51, -0.04, 0.46, 0.89), projection="3d")
+        _draw_platform(detail, machine, mm_from_m(nodes))
+        _heading(figure, machine, pose)
+        return png_bytes(figure)
+
+
+def _heading(figure: Figure, machine: Machine, pose: FloatArray) -> None:
+    x, y, z = (mm_from_m(float(v)) for v in pose[:3])
+    a, b, c = (deg_from_rad(float(v)) for v in pose[3:])
+    figure.text(0.02, 0.95, machine.title, fontsize=15, weight="bold")
+    figure.text(
+        0.02,
+        0.91,
+        f"tool tip at X{x:g} Y{y:g} Z{z:g} mm, roll {a:g}, pitch {b:g}, yaw {c:g} degrees   ·   lengths in mm",
+        fontsize=11,
+        color="#4b5563",
+    )
+
+
+def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArray, struts: Struts) -> None:
+    """Frame joints joined by the frame, struts with number, length and stiffness, platform, tool."""
+    frame = mm_from_m(machine.frame_joints)
+    order = np.argsort(np.arctan2(frame[:, 1], frame[:, 0]), kind="stable")
+    ring = frame[[*order, order[0]]]
+    axes.plot(*ring.T, color=FRAME, lw=2.0)
+    axes.scatter(*frame.T, color=FRAME, s=26, depthshade=False)
+    stiffness = n_per_mm_from_n_per_m(machine.strut_law.stiffness(struts.lengths[0]))
+    for i in range(6):
+        axes.plot(*np.array([frame[i], joints[i]]).T, color=STRUT, lw=2.2)
+        # The two struts of a vertex run close together: their labels sit at different heights.
+        at = frame[i] + (0.22 if i % 2 else 0.5) * (joints[i] - frame[i])
+        label = f"{i + 1}: {mm_from_m(struts.lengths[0, i]):.0f} mm, {stiffness[i] / 1e3:.1f} kN/mm"
+        axes.text(*at, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=_LABEL)
+    _truss(axes, machine, nodes, lw=1.2)
+    axes.scatter(*nodes[TIP], color=TOOL, s=30, depthshade=False)
+    axes.set_title("whole machine: struts with length and stiffness", fontsize=10, color="#374151")
+    _finish(axes, np.vstack([frame, nodes]))
+
+
+_LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
+
+
+def _draw_platform(axes: Any, machine: Machine, nodes: FloatArray) -> None:
+    """The truss of the platform with its nodes named."""
+    _truss(axes, machine, nodes, lw=2.0)
+    names = [*(f"joint {i + 1}" for i in range(6)), "hub", "tool tip"]
+    for node, name in zip(nodes, names, strict=True):
+        axes.scatter(*node, color=TOOL if name == "tool tip" else PLATFORM, s=30, depthshade=False)
+        axes.text(*node, f"  {name}", fontsize=8.5, color="#1f2937")
+    axes.set_title("platform: 19 bars, hub and tool", fontsize=10, color="#374151")
+    _finish(axes, nodes)
+
+
+def _truss(axes: Any, machine: Machine, nodes: FloatArray, lw: float) -> None:
+    for i, j in platform_bars(machine.platform_joints):
+        tool = {i, j} == {HUB, TIP}
+        axes.plot(*nodes[[i, j]].T, color=TOOL if tool else PLATFORM, lw=2 * lw if tool else lw)
+
+
+def _finish(axes: Any, points: FloatArray) -> None:
+    """Equal scales, quiet panes, axes named with their unit."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    span = np.maximum(high - low, 0.05 * (high - low).max())
+    for axis, lo, width in zip("xyz", low, span, strict=True):
+        getattr(axes, f"set_{axis}lim")(lo - 0.05 * width, lo + 1.05 * width)
+        getattr(axes, f"set_{axis}label")(f"{axis.upper()} mm", fontsize=9, color="#4b5563")
+        getattr(axes, f"{axis}axis").pane.set_facecolor("#f8fafc")
+    axes.set_box_aspect(1.1 * span)
+    axes.tick_params(labelsize=7.5, colors="#6b7280")
+    axes.locator_params(nbins=5)
+    axes.view_init(elev=18, azim=-62)

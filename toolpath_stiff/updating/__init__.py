@@ -1,0 +1,1 @@
+"""Measurements against the model: what the data say of machine and effects."""
