@@ -139,7 +139,7 @@ def test_forward_kinematics_undoes_inverse_kinematics(several):
 @pytest.mark.parametrize("name", list(packaged_machines()))
 def test_forward_kinematics_of_every_machine_from_a_near_start(name):
     machine = load_machine(name)
-    pose = np.array(machine.default_origin) + [0.02, -0.03, 0.02, 0.05, -0.04, 0.03]
+    pose = np.array(machine.default_origin) + np.array([0.02, -0.03, 0.02, 0.05, -0.04, 0.03])
     found = forward_kinematics(machine, solve_struts_at(machine, pose).lengths)
     np.testing.assert_allclose(found[0], pose, atol=1e-9)
 
