@@ -1,0 +1,1 @@
+"""Blind simulator of a measuring campaign on a machine that hides something; shares no code with the model."""

@@ -1,0 +1,242 @@
+"""The machine as assembled elements: a displacement method, solved row by row of a measuring campaign.
+
+Unknowns are the movements of the platform (a rigid body, or the eight nodes of its truss) and the give of every link
+that can give way: joints along their struts, frame vertices, spindle, table, set-up. Each element adds k b b^T, with b
+the row that turns unknowns into its deformation (Zienkiewicz, Taylor, The Finite Element Method, direct stiffness
+assembly). A link that does not give way has its unknown held, so nothing is stiff enough to spoil the solution.
+
+Joints whose stiffness depends on their load are solved by secant iteration: assemble with the secant stiffnesses of
+the last loads, solve, repeat. Newton's method would meet the infinite slope of a clearance at no load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+HUB, TIP = 6, 7  # nodes of the platform truss after its six joints
+SECANT_STEPS = 60
+SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two steps
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """True places of n rows, base axes, m.
+
+    Attributes
+    ----------
+    work_point
+        (n, 3) the tool tip, where the load acts.
+    rotation
+        (n, 3, 3) platform to base.
+    platform_joints, frame_joints
+        (n, 6, 3).
+    vertices
+        (6,) vertex of the frame that holds each strut.
+    """
+
+    work_point: FloatArray
+    rotation: FloatArray
+    platform_joints: FloatArray
+    frame_joints: FloatArray
+    vertices: IntArray
+
+
+@dataclass(frozen=True)
+class Links:
+    """How the links of n rows give way; SI. A compliance of zero is rigid.
+
+    Attributes
+    ----------
+    struts
+        (n, 6, 6) N/m; diagonal unless struts are coupled.
+    joints
+        Secant compliance (n, 6) m/N along the struts from strut forces (n, 6) N (tension positive).
+    moment
+        N m/rad, rotational spring at both ends of every strut.
+    bars
+        N/m, bars of the platform truss; inf is rigid.
+    spindle
+        (n, 3) m/N in platform axes.
+    vertices
+        (vertices, 2) m/N, radial and vertical.
+    table
+        (n, 3) m/N along base axes.
+    rocking
+        rad/(N m), of the table about the base frame's x and y axes through its origin.
+    setup
+        (n, 3) m/N along base axes.
+    """
+
+    struts: FloatArray
+    joints: Callable[[FloatArray], FloatArray]
+    moment: float
+    bars: float
+    spindle: FloatArray
+    vertices: FloatArray
+    table: FloatArray
+    rocking: float
+    setup: FloatArray
+
+
+def secant_compliance(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> FloatArray:
+    """(n,) m/N between tool and workpiece along unit vectors `direction` (n, 3) under loads `force` (n,) N."""
+    stretch, platform_springs, platform_dofs = _struts(place, links)
+    load = _load_vector(place, direction, platform_dofs)
+    give = _give(place, links)
+    n, size = load.shape
+    fixed = platform_springs + np.einsum("nai,nab,nbj->nij", stretch, links.struts, stretch)
+    first = platform_dofs
+    forces = np.zeros((n, 6))
+    compliance = np.zeros(n)
+    for _ in range(SECANT_STEPS):
+        give[:, :6] = links.joints(forces)
+        held = np.ones((n, size))
+        held[:, first:] = give > 0.0
+        springs = np.zeros((n, size))
+        np.divide(1.0, give, out=springs[:, first:], where=give > 0.0)
+        springs[:, first:][give <= 0.0] = 1.0  # any number: the unknown is held
+        stiffness = fixed * held[:, :, None] * held[:, None, :]
+        stiffness[:, range(size), range(size)] += springs
+        pull = load * held
+        moved = np.linalg.solve(stiffness, pull[:, :, None])[:, :, 0]
+        before, compliance = compliance, np.einsum("ni,ni->n", pull, moved)
+        forces = force[:, None] * np.einsum("nab,nbj,nj->na", links.struts, stretch * held[:, None, :], moved)
+        if np.abs(compliance - before).max() <= SECANT_TOLERANCE * compliance.max():
+            return np.asarray(compliance)
+    raise RuntimeError("the secant stiffnesses of the joints did not settle")
+
+
+def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]:
+    """Rows that turn unknowns into strut elongations, springs on the platform's own unknowns, and their number."""
+    n = len(place.work_point)
+    strut = place.platform_joints - place.frame_joints
+    length = np.linalg.norm(strut, axis=2)
+    unit = strut / length[:, :, None]
+    nodes = _nodes(place)
+    rigid = _rigid_motions(nodes - place.work_point[:, None, :])  # (n, 24, 6)
+    flexible = np.isfinite(links.bars)
+    motion = np.broadcast_to(np.eye(24), (n, 24, 24)) if flexible else rigid
+    dofs = motion.shape[2]
+    vertex_count = len(links.vertices)
+    size = dofs + _give_size(vertex_count)
+    # Displacement of the platform end minus that of the frame end, base axes, per unknown.
+    relative = np.zeros((n, 6, 3, size))
+    relative[..., :dofs] = motion[:, :18].reshape(n, 6, 3, dofs)
+    for i, vertex in enumerate(place.vertices):
+        column = dofs + 6 + 2 * int(vertex)
+        relative[:, i, :, column] = -_radial(place, int(vertex))
+        relative[:, i, 2, column + 1] = -1.0
+    stretch = np.einsum("nki,nkij->nkj", unit, relative)
+    stretch[:, range(6), range(dofs, dofs + 6)] = -1.0  # what the joints take is not left for the strut
+    springs = np.zeros((n, size, size))
+    if flexible:
+        springs[:, :dofs, :dofs] = links.bars * _truss(nodes)
+    if links.moment > 0.0:
+        # Rotation of the platform: the rigid motion that follows its joints best; exact when it is rigid.
+        follow = np.linalg.pinv(rigid[:, :18])[:, 3:]  # (n, 3, 18)
+        platform_turn = np.zeros((n, 3, size))
+        platform_turn[..., :dofs] = follow @ motion[:, :18]
+        springs += links.moment * _end_rotations(unit, length, relative, platform_turn)
+    return stretch, springs, dofs
+
+
+def _end_rotations(unit: FloatArray, length: FloatArray, relative: FloatArray, platform_turn: FloatArray) -> FloatArray:
+    """(n, N, N) for unit springs: sum of squares of the strut's rotations against frame and platform, spin left out.
+
+    A strut that stays straight turns by u x (displacement of its ends) / L; its spin about u meets no resistance.
+    """
+    strut_turn = np.cross(unit[..., None], relative, axis=2) / length[:, :, None, None]
+    across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
+    at_platform = strut_turn - across @ platform_turn[:, None]
+    return np.asarray(
+        np.einsum("nkci,nkcj->nij", strut_turn, strut_turn, optimize=True)
+        + np.einsum("nkci,nkcj->nij", at_platform, at_platform, optimize=True)
+    )
+
+
+def _nodes(place: Geometry) -> FloatArray:
+    """(n, 8, 3) m: joints, hub (on the tool axis at the joints' mean height) and tip; the paper's Figure 2b."""
+    axis = place.rotation[:, :, 2]
+    height = np.einsum("nki,ni->nk", place.platform_joints - place.work_point[:, None, :], axis).mean(axis=1)
+    hub = place.work_point + height[:, None] * axis
+    return np.concatenate([place.platform_joints, hub[:, None], place.work_point[:, None]], axis=1)
+
+
+def _truss(nodes: FloatArray) -> FloatArray:
+    """(n, 24, 24) stiffness of the platform's 19 bars of 1 N/m: rim, spokes, joints to tip, hub to tip."""
+    spread = nodes[0, :6] - nodes[0, HUB]
+    axis = nodes[0, TIP] - nodes[0, HUB]
+    axis = axis / np.linalg.norm(axis)
+    first = spread[0] - (spread[0] @ axis) * axis
+    around = np.argsort(np.arctan2(spread @ np.cross(axis, first), spread @ first * np.linalg.norm(axis)))
+    rim = [(around[i], around[(i + 1) % 6]) for i in range(6)]
+    bars = [*rim, *((i, HUB) for i in range(6)), *((i, TIP) for i in range(6)), (HUB, TIP)]
+    total = np.zeros((len(nodes), 24, 24))
+    for i, j in bars:
+        bar = nodes[:, j] - nodes[:, i]
+        unit = bar / np.linalg.norm(bar, axis=1, keepdims=True)
+        row = np.zeros((len(nodes), 24))
+        row[:, 3 * i : 3 * i + 3], row[:, 3 * j : 3 * j + 3] = -unit, unit
+        total += row[:, :, None] * row[:, None, :]
+    return total
+
+
+def _rigid_motions(arms: FloatArray) -> FloatArray:
+    """(n, 3 k, 6) displacements of k points at `arms` (n, k, 3) from unit translations and unit rotations."""
+    n, k = arms.shape[:2]
+    motion = np.zeros((n, k, 3, 6))
+    motion[..., :3] = np.eye(3)
+    for axis in range(3):
+        motion[..., 3 + axis] = np.cross(np.eye(3)[axis], arms)
+    return motion.reshape(n, 3 * k, 6)
+
+
+def _radial(place: Geometry, vertex: int) -> FloatArray:
+    """(n, 3) horizontal unit vector from the machine's axis to a vertex of the frame."""
+    outward = place.frame_joints[:, place.vertices == vertex].mean(axis=1) * np.array([1.0, 1.0, 0.0])
+    return np.asarray(outward / np.linalg.norm(outward, axis=1, keepdims=True))
+
+
+def _give_size(vertex_count: int) -> int:
+    """Unknowns beside the platform's: six joints, two a vertex, spindle 3, table 3 and rocking 2, set-up 3."""
+    return 6 + 2 * vertex_count + 3 + 3 + 2 + 3
+
+
+def _give(place: Geometry, links: Links) -> FloatArray:
+    """(n, .) compliances of those unknowns, in their order; the joints' are filled in during the iteration."""
+    n = len(place.work_point)
+    return np.concatenate(
+        [
+            np.zeros((n, 6)),
+            np.broadcast_to(links.vertices.ravel(), (n, links.vertices.size)),
+            links.spindle,
+            links.table,
+            np.full((n, 2), links.rocking),
+            links.setup,
+        ],
+        axis=1,
+    )
+
+
+def _load_vector(place: Geometry, direction: FloatArray, dofs: int) -> FloatArray:
+    """(n, N) what each unknown adds to the movement of tool against workpiece along `direction`."""
+    n = len(direction)
+    size = dofs + _give_size(int(place.vertices.max()) + 1)
+    vector = np.zeros((n, size))
+    # Tip of a rigid platform: the first three unknowns; node TIP of a truss: three of its last ones.
+    tip = 0 if dofs == 6 else 3 * TIP
+    vector[:, tip : tip + 3] = direction
+    end = size - 3 - 2 - 3 - 3
+    vector[:, end : end + 3] = np.einsum("ni,nij->nj", direction, place.rotation)  # spindle, platform axes
+    # The workpiece is pushed back: the load on it is -direction, so its give counts with the same sign.
+    vector[:, end + 3 : end + 6] = direction
+    vector[:, end + 6 : end + 8] = np.cross(place.work_point, direction)[:, :2]
+    vector[:, end + 8 : end + 11] = direction
+    return vector
