@@ -78,6 +78,7 @@ def describe(effect: Effect) -> dict[str, object]:
                 "bounds": [_json_number(value) for value in p.bounds],
                 "typical": [_json_number(value) for value in p.typical],
                 "neutral": _json_number(p.neutral),
+                "kind": p.kind,
                 "meaning": p.meaning,
                 "source": p.source,
             }
@@ -113,10 +114,11 @@ def details(effect: Effect) -> str:
     if effect.needs:
         lines.append(f"  needs      columns {', '.join(effect.needs)} in the measurements")
     for p in effect.parameters:
+        lines += ["", f"  {p.key}", f"    meaning  {p.meaning or p.name}"]
+        if p.discrete:
+            lines += [f"    value    {p.expected}; chosen, not fitted", f"    source   {p.source}"]
+            continue
         lines += [
-            "",
-            f"  {p.key}",
-            f"    meaning  {p.meaning or p.name}",
             f"    bounds   {_range(p.bounds, p)}",
             f"    typical  {_range(p.typical, p)}",
             f"    source   {p.source}",
@@ -124,7 +126,7 @@ def details(effect: Effect) -> str:
         ]
     kind = "instrument" if effect.is_instrument else "effect"
     lines += ["", "In a machine file:", f"  [[{kind}]]", f'  name = "{effect.name}"']
-    lines += [f"  {p.key} = {p.typical[0]:g}" for p in effect.parameters]
+    lines += [f'  {p.key} = ""' if p.kind == "text" else f"  {p.key} = {p.typical[0]:g}" for p in effect.parameters]
     return "\n".join(lines)
 
 

@@ -128,6 +128,7 @@ def load_path(
     setup: NDArray[np.str_] | None = None,
     time: FloatArray | None = None,
     temperature: FloatArray | None = None,
+    direction: FloatArray | None = None,
 ) -> LoadPath:
     """What the effects see at n poses; see `LoadPath` for shapes and units.
 
@@ -136,6 +137,10 @@ def load_path(
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     n = len(tip)
     length = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
+    for active in model.effects:
+        offset = active.effect.tip_offset(active.values)
+        if offset is not None:
+            tip = tip + (offset if rotation is None else np.asarray(rotation, dtype=float) @ offset)
     one_length = length[0] if n and (np.isnan(length).all() or np.ptp(length) == 0.0) else length
     struts = solve_struts(model.machine, tip, rotation, one_length)
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
@@ -146,6 +151,7 @@ def load_path(
         struts=struts,
         tool_extension=np.where(np.isnan(length), 0.0, length - model.machine.reference_tool_length),
         force=np.broadcast_to(np.asarray(force, dtype=float), (n,)),
+        direction=direction,
         setup=setup,
         time=time,
         temperature=temperature,

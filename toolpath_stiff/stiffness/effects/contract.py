@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,9 @@ class Parameter:
         The value (in `unit`) at which the effect vanishes; may be inf.
     meaning
         One line for the user.
+    kind
+        "real" numbers are fitted. What the effect acts on is chosen, never fitted: an "integer" within `bounds`
+        (which strut), a "text" (which set-up).
     """
 
     name: str
@@ -63,6 +66,22 @@ class Parameter:
     source: str
     neutral: float = 0.0
     meaning: str = ""
+    kind: Literal["real", "integer", "text"] = "real"
+
+    @property
+    def discrete(self) -> bool:
+        """Whether it names what the effect acts on; fits then compare the choices."""
+        return self.kind != "real"
+
+    @property
+    def expected(self) -> str:
+        """What a value must be, in words."""
+        if self.kind == "text":
+            return "a name in quotes"
+        low, high = self.bounds
+        if self.kind == "integer":
+            return f"a whole number from {low:g} to {high:g}"
+        return f"a number from {low:g} to {high:g} {self.unit}".rstrip()
 
     @property
     def key(self) -> str:
@@ -90,6 +109,8 @@ class LoadPath:
     strut_forces
         (n, 6) N, forces in the struts under that load, from equilibrium; None where no direction is given. Only
         effects that depend on the load (`load_dependent`) may ask for it.
+    direction
+        (n, 3) unit vectors, along which the load acts and the displacement is read; None where no direction is given.
     setup
         (n,) names of the clamping arrangement, or None.
     time, temperature
@@ -103,6 +124,7 @@ class LoadPath:
     tool_extension: FloatArray
     force: FloatArray
     strut_forces: FloatArray | None = None
+    direction: FloatArray | None = None
     setup: NDArray[np.str_] | None = None
     time: FloatArray | None = None
     temperature: FloatArray | None = None
@@ -155,6 +177,10 @@ class Effect:
         """(n, 6, 6) between platform and base about the tip, parallel to the struts, base axes."""
         return None
 
+    def tip_offset(self, p: Mapping[str, float]) -> FloatArray | None:
+        """(3,) m, platform axes: where the true tip lies, seen from the programmed one."""
+        return None
+
     def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
         """The machine with this effect's geometry."""
         return machine
@@ -169,8 +195,8 @@ class Effect:
         return self.link == "instrument"
 
 
-def read_parameters(effect: Effect, given: Mapping[str, object], where: str) -> dict[str, float]:
-    """SI values of an effect's parameters from a machine file's keys.
+def read_parameters(effect: Effect, given: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """SI values of an effect's parameters from a machine file's keys; choices as they are.
 
     Raises
     ------
@@ -184,19 +210,20 @@ def read_parameters(effect: Effect, given: Mapping[str, object], where: str) -> 
                 f"{where}: effect {effect.name}: unknown key {key}",
                 expected=f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance",
             )
-    values = {}
+    values: dict[str, Any] = {}
     for key, parameter in by_key.items():
         if key not in given:
-            raise InputError(
-                f"{where}: effect {effect.name}: {key} is missing",
-                expected=f"{parameter.bounds[0]:g} to {parameter.bounds[1]:g} {parameter.unit}".rstrip(),
-            )
+            raise InputError(f"{where}: effect {effect.name}: {key} is missing", expected=parameter.expected)
         value = given[key]
-        low, high = parameter.bounds
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise InputError(
-                f"{where}: effect {effect.name}: {key} = {value!r}",
-                expected=f"a number from {low:g} to {high:g} {parameter.unit}".rstrip(),
-            )
-        values[parameter.name] = float(value) * parameter.si
+        if not _is_valid(parameter, value):
+            raise InputError(f"{where}: effect {effect.name}: {key} = {value!r}", expected=parameter.expected)
+        values[parameter.name] = float(value) * parameter.si if parameter.kind == "real" else value
     return values
+
+
+def _is_valid(parameter: Parameter, value: object) -> bool:
+    if parameter.kind == "text":
+        return isinstance(value, str)
+    numbers = int if parameter.kind == "integer" else int | float
+    low, high = parameter.bounds
+    return isinstance(value, numbers) and not isinstance(value, bool) and low <= value <= high

@@ -149,6 +149,8 @@ def _check(effect: object, where: str) -> None:
         raise InputError(f"{where}: effect {label}: parameter {doubled.pop()} is declared twice")
     for parameter in effect.parameters:
         low, high = parameter.bounds
+        if parameter.kind == "text":
+            continue
         if not low < high or not low <= parameter.neutral <= high:
             raise InputError(
                 f"{where}: effect {label}: parameter {parameter.name}: bounds {parameter.bounds}, "

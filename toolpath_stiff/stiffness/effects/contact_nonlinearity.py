@@ -1,0 +1,49 @@
+"""Contact nonlinearity: joints whose contacts stiffen with their load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+
+FloatArray = NDArray[np.float64]
+
+REFERENCE_FORCE = 500.0  # N, force in the strut at which the compliance is given
+IDLE = 1e-3  # N: below, a strut adds nothing to the tip that could be measured, and the power law would diverge
+
+
+class ContactNonlinearity(Effect):
+    """Hertzian contacts at both ends of each strut, without preload.
+
+    Hertz: two spheres approach by (9 F^2 / (16 R E*^2))^(1/3), so that displacement over force, the secant
+    compliance, falls as F^(-1/3). Preload would flatten that; it is left out.
+    """
+
+    name = "contact_nonlinearity"
+    title = "contacts in the joints stiffen with load"
+    link = "joints"
+    equation = "c_i += c_0 (|F_i| / 500 N)^(-1/3), F_i = force in strut i"
+    source = "Hertz (1882), point contact: approach grows as F^(2/3)"
+    load_dependent = True
+    needs = ("force_N",)
+    parameters = (
+        Parameter(
+            name="compliance",
+            unit="nm/N",
+            si=1e-9,
+            bounds=(0.0, 200.0),
+            typical=(3.0, 20.0),
+            source="Hertz: 7.5 nm/N a joint at 500 N for steel, ball in socket of effective radius 0.2 m (assumed)",
+            meaning="secant compliance of one strut's contacts together, at 500 N in the strut",
+        ),
+    )
+
+    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """Secant compliance of the contacts under the present strut forces."""
+        if path.strut_forces is None:
+            return None
+        force = np.maximum(np.abs(path.strut_forces), IDLE)
+        return np.asarray(p["compliance"] * np.cbrt(REFERENCE_FORCE / force))

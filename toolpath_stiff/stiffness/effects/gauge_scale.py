@@ -1,0 +1,72 @@
+"""Gauge scale: the readings of one direction or one set-up are off by a factor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+
+FloatArray = NDArray[np.float64]
+
+ALONG = 0.999  # |d_axis| from which a reading counts as taken along that axis: 2.6 degrees, no one aligns better
+
+
+class GaugeScale(Effect):
+    """Readings multiplied by 1 + s where direction and set-up are the chosen ones.
+
+    A factor on all readings is a change of the strut law and cannot be seen beside it.
+    """
+
+    name = "gauge_scale"
+    title = "a gauge's readings are off by a factor"
+    link = "instrument"
+    equation = "k_read = (1 + s) k, for one direction, one set-up, or both"
+    source = "wrong range, unit or lever of a force gauge or indicator"
+    parameters = (
+        Parameter(
+            name="direction",
+            unit="",
+            si=1.0,
+            bounds=(0, 3),
+            typical=(1, 3),
+            source="direction of the measurements",
+            meaning="1, 2, 3: readings along X, Y, Z; 0: every direction",
+            kind="integer",
+        ),
+        Parameter(
+            name="setup",
+            unit="",
+            si=1.0,
+            bounds=(0, 0),
+            typical=(0, 0),
+            source="column setup of the measurements",
+            meaning='name of the set-up; "": every one',
+            kind="text",
+        ),
+        Parameter(
+            name="scale",
+            unit="%",
+            si=0.01,
+            bounds=(-20.0, 20.0),
+            typical=(-5.0, 5.0),
+            source="load cells: 0.02 to 0.1 % of full scale (senstech.co.kr, terms); a wrong range or lever: "
+            "engineering experience, no source",
+            meaning="how much too high the readings are",
+        ),
+    )
+
+    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, Any]) -> FloatArray:
+        """Scaled where the gauge was used."""
+        used = np.ones(len(stiffness), dtype=bool)
+        if p["direction"]:
+            if path.direction is None:
+                raise InputError("gauge_scale needs the direction of each reading")
+            used &= np.abs(path.direction[:, int(p["direction"]) - 1]) >= ALONG
+        if p["setup"]:
+            used &= path.setup == p["setup"] if path.setup is not None else False
+        return np.where(used, (1.0 + p["scale"]) * stiffness, stiffness)

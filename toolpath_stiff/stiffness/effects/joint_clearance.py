@@ -1,0 +1,48 @@
+"""Joint clearance: every strut loses some motion before it carries its load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+
+FloatArray = NDArray[np.float64]
+
+# N: a strut under less is idle. It would add less than g times this over F^2 to the tip's compliance, some 1e-14 m/N.
+IDLE = 1e-3
+
+
+class JointClearance(Effect):
+    """Lost motion g in each loaded strut: a displacement that does not grow with the load.
+
+    Secant compliance: the strut gives g + c F_i under its force F_i, that is g / |F_i| + c. Weight and preload, which
+    would close a gap for good, are left out.
+    """
+
+    name = "joint_clearance"
+    title = "lost motion in joints and nuts"
+    link = "joints"
+    equation = "c_i += g / |F_i|, F_i = force in strut i"
+    source = "secant through a gap, taken up in full by any load"
+    load_dependent = True
+    needs = ("force_N",)
+    parameters = (
+        Parameter(
+            name="lost_motion",
+            unit="um",
+            si=1e-6,
+            bounds=(0.0, 200.0),
+            typical=(1.0, 10.0),
+            source="engineering experience, no source",
+            meaning="motion of one strut to one side before it carries: half its total play",
+        ),
+    )
+
+    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """Secant compliance of the gaps under the present strut forces."""
+        if path.strut_forces is None:
+            return None
+        return np.asarray(p["lost_motion"] / np.maximum(np.abs(path.strut_forces), IDLE))

@@ -1,0 +1,42 @@
+"""Joint compliance: the joints at both ends of a strut, its nut and bearings, a constant in series with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+
+FloatArray = NDArray[np.float64]
+
+
+class JointCompliance(Effect):
+    """The same constant compliance in series with each strut.
+
+    Nut, thrust bearing and drive add to the same constant; tip stiffness cannot tell them from the joints.
+    """
+
+    name = "joint_compliance"
+    title = "joints give way along the struts"
+    link = "joints"
+    equation = "c_i += c_j"
+    source = "springs in series"
+    parameters = (
+        Parameter(
+            name="compliance",
+            unit="nm/N",
+            si=1e-9,
+            bounds=(0.0, 200.0),
+            typical=(3.0, 20.0),
+            source="two joints in series: 94 N/um each for a flexure joint (T. Dehaeze, test bench of flexible joints, "
+            "by finite elements), over 100 N/um for a kinematic coupling (Schouten, Rosielle, Schellekens 1997); "
+            "lower end: engineering experience, no source",
+            meaning="both joints, nut and bearings of one strut together",
+        ),
+    )
+
+    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """The constant, for every strut and pose."""
+        return np.full((len(path), 6), p["compliance"])

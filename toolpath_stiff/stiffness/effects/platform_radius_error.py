@@ -1,0 +1,43 @@
+"""Platform radius error: the platform joints sit on a larger circle than the machine file says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+
+
+class PlatformRadiusError(Effect):
+    """Every platform joint is moved outwards from the tool axis.
+
+    The pose is taken as programmed. A control with the wrong radius would miss it by about the error itself, which
+    changes the stiffness by a tenth of what the joints' new places do.
+    """
+
+    name = "platform_radius_error"
+    title = "platform radius differs from the drawing"
+    link = "geometry"
+    equation = "P_i += e (P_ix, P_iy, 0) / |(P_ix, P_iy)|"
+    source = "geometry"
+    parameters = (
+        Parameter(
+            name="error",
+            unit="mm",
+            si=1e-3,
+            bounds=(-60.0, 60.0),
+            typical=(-3.0, 3.0),
+            source="engineering experience, no source",
+            meaning="true radius less that of the machine file",
+        ),
+    )
+
+    def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
+        """Joints on the wider circle; one on the tool axis has no outward direction and stays."""
+        joints = machine.platform_joints.copy()
+        radius = np.hypot(joints[:, 0], joints[:, 1])
+        off_axis = radius > 0.0
+        joints[off_axis, :2] *= (1.0 + p["error"] / radius[off_axis])[:, None]
+        return machine.with_changes(platform_joints=joints)

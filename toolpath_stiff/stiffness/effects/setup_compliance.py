@@ -1,0 +1,56 @@
+"""Set-up compliance: a riser block or fixture that only one set-up has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+
+FloatArray = NDArray[np.float64]
+
+
+class SetupCompliance(Effect):
+    """Compliance along X, Y, Z in the rows of one set-up; elsewhere, and where no set-up is known, nothing."""
+
+    name = "setup_compliance"
+    title = "one set-up's riser or fixture gives way"
+    link = "table"
+    equation = "c += d^T diag(c_x, c_y, c_z) d where setup = s"
+    source = "springs in series, base axes; the paper measured its upper plane on a riser (Figure 6)"
+    needs = ("setup",)
+    parameters = (
+        Parameter(
+            name="setup",
+            unit="",
+            si=1.0,
+            bounds=(0, 0),
+            typical=(0, 0),
+            source="column setup of the measurements",
+            meaning="name of the set-up",
+            kind="text",
+        ),
+        *(
+            Parameter(
+                name=axis,
+                unit="nm/N",
+                si=1e-9,
+                bounds=(0.0, 200.0),
+                typical=(1.0, 10.0),
+                source="engineering experience, no source",
+                meaning=f"compliance of this set-up along {axis.upper()}",
+            )
+            for axis in "xyz"
+        ),
+    )
+
+    def load_compliance(self, path: LoadPath, p: Mapping[str, Any]) -> FloatArray | None:
+        """Quadratic form of the tip force in the rows of the set-up."""
+        if path.setup is None:
+            return None
+        form = np.zeros((len(path), 12, 12))
+        form[path.setup == p["setup"], 6:9, 6:9] = np.diag([p["x"], p["y"], p["z"]])
+        return form

@@ -1,0 +1,61 @@
+"""Table compliance: the workpiece's side of the loop gives way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+
+FloatArray = NDArray[np.float64]
+
+EXPERIENCE = "engineering experience, no source: machine beds are built for 100 to 500 N/um"
+
+
+class TableCompliance(Effect):
+    """The table shifts along X, Y, Z and rocks about X and Y through the base frame's origin.
+
+    The tip's force F at p acts on the table with the moment p x F about the origin; rocking by c_t (p x F) moves the
+    work at p by c_t (p x F) x p. For a horizontal force at height h on the axis that is h^2 c_t.
+    """
+
+    name = "table_compliance"
+    title = "the table gives way under the work"
+    link = "table"
+    equation = "c += d^T diag(c_x, c_y, c_z) d + c_t ((p x d)_x^2 + (p x d)_y^2)"
+    source = "springs in series, base axes"
+    parameters = (
+        *(
+            Parameter(
+                name=axis,
+                unit="nm/N",
+                si=1e-9,
+                bounds=(0.0, 200.0),
+                typical=(2.0, 10.0),
+                source=EXPERIENCE,
+                meaning=f"compliance of the table along {axis.upper()}",
+            )
+            for axis in "xyz"
+        ),
+        Parameter(
+            name="rocking",
+            unit="nrad/N/m",
+            si=1e-9,
+            bounds=(0.0, 500.0),
+            typical=(0.5, 10.0),
+            source=EXPERIENCE + " at a lever of about 1 m",
+            meaning="rotation about X and Y per moment",
+        ),
+    )
+
+    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """Quadratic form of the tip force, in base axes."""
+        x, y, z = path.position.T
+        moment = np.zeros((len(path), 2, 3))  # (p x F)_x and (p x F)_y per component of F
+        moment[:, 0, 1], moment[:, 0, 2] = -z, y
+        moment[:, 1, 0], moment[:, 1, 2] = z, -x
+        form = np.zeros((len(path), 12, 12))
+        form[:, 6:9, 6:9] = np.diag([p["x"], p["y"], p["z"]]) + p["rocking"] * np.swapaxes(moment, 1, 2) @ moment
+        return form

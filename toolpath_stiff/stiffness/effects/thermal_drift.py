@@ -1,0 +1,41 @@
+"""Thermal drift: the indicator wanders while the load is applied."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+
+FloatArray = NDArray[np.float64]
+
+
+class ThermalDrift(Effect):
+    """A displacement that grows with the time since the indicator was zeroed is read as deflection."""
+
+    name = "thermal_drift"
+    title = "the indicator drifts while it is read"
+    link = "instrument"
+    equation = "F / k_read = F / k + rate time"
+    source = "growth of the loop between work and tip at a constant rate"
+    needs = ("time_min",)
+    parameters = (
+        Parameter(
+            name="rate",
+            unit="um/min",
+            si=1e-6 / 60.0,
+            bounds=(-20.0, 20.0),
+            typical=(-1.0, 1.0),
+            source="engineering experience, no source: a steel strut of 3 m grows 35 um/K, rooms change by 1 K/h",
+            meaning="drift towards larger deflection",
+        ),
+    )
+
+    def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
+        """Force over the deflection as read; nan where drift against the load swallows the whole deflection."""
+        if path.time is None:
+            return stiffness
+        deflection = path.force / stiffness + p["rate"] * path.time
+        return np.where(deflection > 0.0, path.force / np.where(deflection > 0.0, deflection, 1.0), np.nan)

@@ -1,0 +1,52 @@
+"""Weak strut: one strut is softer than the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+
+FloatArray = NDArray[np.float64]
+
+
+class WeakStrut(Effect):
+    """The stiffness of one strut, after the machine's strut law, is multiplied by a factor."""
+
+    name = "weak_strut"
+    title = "one strut is weak"
+    link = "struts"
+    equation = "k_s(L) = factor k_linear(L) for strut s"
+    source = "worn nut, lost preload"
+    parameters = (
+        Parameter(
+            name="strut",
+            unit="",
+            si=1.0,
+            bounds=(1, 6),
+            typical=(1, 6),
+            source="number of the strut",
+            neutral=1,
+            meaning="which strut",
+            kind="integer",
+        ),
+        Parameter(
+            name="factor",
+            unit="",
+            si=1.0,
+            bounds=(0.3, 1.0),
+            typical=(0.4, 0.9),
+            source="engineering experience, no source",
+            neutral=1.0,
+            meaning="stiffness of this strut over that of the others",
+        ),
+    )
+
+    def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """What this strut's compliance is above the law's."""
+        more = np.zeros((len(path), 6))
+        which = int(p["strut"]) - 1
+        more[:, which] = (1.0 / p["factor"] - 1.0) / path.machine.strut_law.stiffness(path.struts.lengths[:, which])
+        return more
