@@ -30,7 +30,7 @@ class StrutLawCurvature(Effect):
             si=0.01,
             bounds=(-40.0, 40.0),
             typical=(-4.0, 4.0),
-            source="-3.2 % if compliance instead of stiffness is linear between the paper's 46.5 and 32.5 N/um",
+            source="-3.1 % if compliance instead of stiffness is linear between the paper's 46.5 and 32.5 N/um",
             meaning="how much stiffer a strut is midway between L_1 and L_2 than on the straight line",
         ),
     )
