@@ -1,0 +1,92 @@
+"""Stiffness maps: what the paper's Figures 8 and 9 say, the grid, the files, mistakes."""
+
+from __future__ import annotations
+
+import csv
+import json
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.analysis.poses import evaluate_poses
+from toolpath_stiff.analysis.stiffness_map import map_stiffness, turning_points
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.stiffness.model import build_model
+
+MODEL = build_model(load_machine("nist"))
+
+
+def test_three_maxima_and_three_minima_where_the_struts_meet_the_frame():
+    # The paper on Figure 8 (z = 1.2 m, radial load): "three stiffness maxima and three minima. These maxima
+    # correspond to the struts' intersection with the base space frame", which is at 60, 180 and 300 degrees.
+    for radius in (0.05, 0.10, 0.15):
+        found = turning_points(MODEL, radius, 1.2, parse_load("radial"))
+        # The two struts of a vertex differ in length, so the maximum lies a third of a degree beside it.
+        np.testing.assert_allclose(np.rad2deg(found["maxima"]), [60, 180, 300], atol=0.5)
+        np.testing.assert_allclose(np.rad2deg(found["minima"]), [0, 120, 240], atol=0.5)
+
+
+def test_map_is_the_pose_evaluation_on_a_grid():
+    found = map_stiffness(MODEL, (-0.1, 0.2), (-0.05, 0.1), [0.4, 0.9], parse_load("z"), points=7, abc=(0.1, 0.0, 0.0))
+    assert found.stiffness.shape == (2, 4, 7)
+    position = np.array([[found.x[5], found.y[2], found.z[1]]])
+    pose = evaluate_poses(MODEL, position, np.array([[0.1, 0.0, 0.0]]))
+    assert found.stiffness[1, 2, 5] == pytest.approx(pose.along_axes[0, 2], rel=1e-12)
+
+
+def test_z_map_is_threefold_symmetric():
+    angles = np.deg2rad(np.array([10.0, 130.0, 250.0]))
+    from toolpath_stiff.analysis.stiffness_map import around_axis
+
+    values = around_axis(MODEL, 0.15, 1.2, parse_load("z"), angles)
+    np.testing.assert_allclose(values, values[0], rtol=1e-12)
+
+
+def test_command_writes_table_picture_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["map", "--z", "1200", "--x", "-150:150", "--y", "-150:150", "--points", "11"]) == 0
+    assert "maxima at" in capsys.readouterr().out
+    out = tmp_path / "reports/map"
+    rows = list(csv.DictReader((out / "map.csv").open()))
+    assert list(rows[0]) == ["x_mm", "y_mm", "z_mm", "stiffness_N_per_mm", "reachable"] and len(rows) == 121
+    assert (out / "map.png").read_bytes().startswith(b"\x89PNG")
+    page = (out / "map.html").read_text()
+    HTMLParser().feed(page)
+    assert "http" not in page and "__DATA__" not in page
+    assert len(json.loads((out / "map.json").read_text())["slices"][0]["circle"]["maxima_deg"]) == 3
+
+
+def test_out_of_reach_is_marked(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["map", "--slices", "1200,400", "--x", "-900:900", "--y", "-900:900", "--points", "21", "--json"]
+    assert main([*arguments, "--no-plots"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert [s["z_mm"] for s in summary["slices"]] == [400, 1200]
+    assert 0 < summary["slices"][0]["reachable_share"] < 1
+    rows = list(csv.DictReader((tmp_path / "reports/map/map.csv").open()))
+    for row in rows:
+        assert (row["reachable"] == "1") == (row["stiffness_N_per_mm"] != "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--x", "150:-150"], "above the upper bound"),
+        (["--x", "5"], "no extent"),
+        (["--load", "tangential"], "needs a path"),
+        (["--z", "nan"], "not a finite number"),
+        (["--z", "9000"], "nothing of the map is within reach"),
+        (["--slices", "400,400"], "appears twice"),
+        (["--points", "1"], "2 to 2001"),
+        (["--tilt", "10,0"], "A,B,C"),
+        (["--x", "-1e9:1e9"], "100 m"),
+    ],
+)
+def test_mistakes(tmp_path, monkeypatch, capsys, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert main(["map", *arguments]) == 2
+    assert words in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,109 @@
+"""Stiffness maps as pictures: the paper's Figures 8 and 9, a slice a panel, joints and vertices marked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis.stiffness_map import StiffnessMap
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.wording import number
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+
+CONTOURS = 9
+ACROSS = 3  # panels in a row
+
+
+def map_picture(machine: Machine, found: StiffnessMap) -> bytes:
+    """PNG of every slice, one colour scale for all."""
+    slices = len(found.z)
+    columns, rows = min(slices, ACROSS), -(-slices // ACROSS)
+    wide = float(np.ptp(found.x)) / float(np.ptp(found.y))
+    side = 7.6 if slices == 1 else 4.6
+    width, height = columns * side * min(wide, 1.6) + 1.9, rows * side + 1.5
+    stiffness = n_per_mm_from_n_per_m(found.stiffness)
+    low, high = float(np.nanmin(stiffness)), float(np.nanmax(stiffness))
+    with house_style():
+        figure = new_figure(width, height)
+        top = 1.0 - 1.05 / height
+        grid = figure.add_gridspec(
+            rows,
+            columns,
+            left=0.75 / width,
+            right=1 - 1.5 / width,
+            bottom=0.6 / height,
+            top=top,
+            wspace=0.18,
+            hspace=0.22,
+        )
+        drawn = None
+        for i in range(slices):
+            axes = figure.add_subplot(grid[i // columns, i % columns])
+            drawn = _slice(axes, machine, found, i, stiffness[i], low, high)
+        bar = figure.add_axes((1 - 1.2 / width, 0.6 / height, 0.2 / width, top - 0.6 / height))
+        if drawn is not None:
+            figure.colorbar(drawn, cax=bar, label="stiffness along the load, N/mm")
+            bar.yaxis.set_major_formatter(lambda value, _: number(value))
+            bar.grid(visible=False)
+        figure.text(0.75 / width, 1 - 0.38 / height, f"Stiffness map, load {found.load}", fontsize=14, weight="bold")
+        a, b, c = (deg_from_rad(v) for v in found.abc)
+        tilt = f"   ·   roll {a:g}, pitch {b:g}, yaw {c:g} degrees" if any(found.abc) else ""
+        text = f"{machine.title}{tilt}   ·   {number(low)} to {number(high)} N/mm"
+        figure.text(0.75 / width, 1 - 0.68 / height, text, fontsize=10, color=MUTED)
+        return png_bytes(figure)
+
+
+def _slice(
+    axes: Axes, machine: Machine, found: StiffnessMap, i: int, stiffness: FloatArray, low: float, high: float
+) -> Any:
+    """One height: colours, contours, the edge of reach, the directions of the joints."""
+    x, y = mm_from_m(found.x), mm_from_m(found.y)
+    mesh = axes.pcolormesh(x, y, stiffness, cmap=COLOUR_MAP, vmin=low, vmax=high, shading="gouraud", rasterized=True)
+    if np.nanmax(stiffness) > np.nanmin(stiffness):
+        lines = axes.contour(x, y, stiffness, levels=CONTOURS, colors="white", linewidths=0.7, alpha=0.9)
+        axes.clabel(lines, fontsize=7, fmt=number)
+    if not found.reachable[i].all() and found.reachable[i].any():
+        axes.contour(x, y, found.reachable[i].astype(float), levels=[0.5], colors="#d64545", linewidths=1.5)
+    axes.set_facecolor("#eceff3")
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(y[0], y[-1])
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+    axes.set_title(f"z = {mm_from_m(found.z[i]):g} mm", fontsize=10)
+    axes.set_xlabel("X mm")
+    axes.set_ylabel("Y mm")
+    _directions(axes, mm_from_m(machine.frame_joints), x, y)
+    return mesh
+
+
+def _directions(axes: Axes, joints: FloatArray, x: FloatArray, y: FloatArray) -> None:
+    """Where the struts meet the frame: at their place, or as arrows at the rim if that is outside."""
+    seen: list[FloatArray] = []
+    for i, joint in enumerate(joints[:, :2]):
+        inside = x[0] <= joint[0] <= x[-1] and y[0] <= joint[1] <= y[-1]
+        unit = joint / max(float(np.hypot(*joint)), 1e-9)
+        if inside:
+            axes.plot(*joint, "^", color=INK, ms=6)
+            axes.annotate(f"strut {i + 1}", joint, fontsize=7, xytext=(4, 4), textcoords="offset points")
+            continue
+        if any(float(unit @ other) > 0.999 for other in seen):
+            continue
+        seen.append(unit)
+        same = [k + 1 for k in range(6) if float(joints[k, :2] @ unit) > 0.999 * float(np.hypot(*joints[k, :2]))]
+        middle = np.array([(x[0] + x[-1]) / 2, (y[0] + y[-1]) / 2])
+        half = np.array([(x[-1] - x[0]) / 2, (y[-1] - y[0]) / 2])
+        reach = float(np.min(half / np.maximum(np.abs(unit), 1e-9)))
+        tip, tail = middle + 0.985 * reach * unit, middle + 0.90 * reach * unit
+        axes.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.4})
+        label = "struts " + ", ".join(map(str, same)) if len(same) > 1 else f"strut {same[0]}"
+        at = middle + 0.84 * reach * unit
+        box = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.2}
+        axes.text(float(at[0]), float(at[1]), label, fontsize=7, ha="center", va="center", color=INK, bbox=box)
