@@ -38,7 +38,9 @@ COMMANDS = (
     Command("pose", "stiffness, softest and stiffest direction, strut lengths at single poses", "A machine"),
     Command("map", "stiffness over planes of the workspace: picture, table, 3-D page", "A machine"),
     Command("machine", "list, show, check, make and import machine files", "A machine"),
+    Command("case-study", "the paper's four regions: one path at two heights, displaced and turned", "A placement"),
     Command("effects", "physical effects that a machine can carry; write your own", "A machine"),
+    Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements"),
 )
 
 DESCRIPTION = "Stiffness of a hexapod (Stewart-platform) mill along a real NC program."
@@ -74,7 +76,9 @@ def build_parser(chosen: str | None) -> argparse.ArgumentParser:
         epilog=_command_list() + "\n" + EPILOG,
     )
     parser.add_argument("--version", action="version", version=f"tps {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", help=argparse.SUPPRESS, parser_class=Parser)
+    commands = parser.add_subparsers(
+        dest="command", metavar="COMMAND", help=argparse.SUPPRESS, parser_class=Parser, prog="tps"
+    )
     for command in COMMANDS:
         sub = commands.add_parser(command.name, description=command.help)
         if command.name == chosen:
@@ -116,7 +120,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"tps: error: {error}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("tps: interrupted, nothing was written", file=sys.stderr)
+        print("tps: interrupted; no file is half-written", file=sys.stderr)
         return 130
     except BrokenPipeError:
         # The reader of a pipe went away (`tps path ... | head`): not an error of ours.

@@ -1,0 +1,55 @@
+"""`tps case-study`: the paper's four regions."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from toolpath_stiff.cli.arguments import add_json_option, add_machine_options
+
+EPILOG = """\
+Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
+displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument(
+        "--out", default="reports/case_study", metavar="DIR", help="folder (default: reports/case_study)"
+    )
+    parser.add_argument("--no-plots", action="store_true", help="no pictures")
+    add_machine_options(parser)
+    add_json_option(parser, "print case_study.json to standard output and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Analyse the regions and write the files."""
+    from toolpath_stiff.files import write_atomically
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.placement.case_study import region_rows, run_case_study, study_text
+    from toolpath_stiff.stiffness.model import build_model
+
+    study = run_case_study(build_model(load_machine(args.machine), args.effects))
+    text = json.dumps(study.summary, indent=2) + "\n"
+    out = Path(args.out)
+    contents: dict[str, str | bytes] = {
+        "case_study.csv": region_rows(study),
+        "case_study.json": text,
+        "case_study.md": study_text(study),
+    }
+    if not args.no_plots:
+        from toolpath_stiff.report.case_study_picture import heights_picture, regions_picture
+
+        contents |= {"regions.png": regions_picture(study), "heights.png": heights_picture(study)}
+    files = [write_atomically(out / name, content) for name, content in contents.items()]
+    if args.json:
+        sys.stdout.write(text)
+        return 0
+    print(study_text(study))
+    print("\n".join(["written:", *(f"  {file}" for file in files)]))
+    return 0

@@ -1,0 +1,1 @@
+"""Where the work should sit: searching placements, and the case study of the paper."""
