@@ -1,0 +1,290 @@
+"""Rows of a measurement file: one measured stiffness each, every cell read and judged, in SI.
+
+A file is either long (one row a reading) or wide like the paper's Table 1 (one row a point, `measured_x_N_per_mm` and
+so on). A bad row is named with its line; all bad rows of a file are reported together.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
+
+AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+POSITION = ("x_mm", "y_mm", "z_mm")
+ANGLES = ("a_deg", "b_deg", "c_deg")
+VECTOR = ("dx", "dy", "dz")
+LABELS = ("setup", "clamp", "repeat", "point", "loop")
+WIDE = tuple(f"measured_{axis}_N_per_mm" for axis in "xyz")
+WIDE_MODEL = tuple(f"modeled_{axis}_N_per_mm" for axis in "xyz")
+OPTIONAL = ("force_N", "sd_N_per_mm", *LABELS, "time_min", "tool_extension_mm", "temperature_C")
+KNOWN = (*POSITION, *ANGLES, "direction", *VECTOR, "stiffness_N_per_mm", "displacement_um", *OPTIONAL)
+
+# N/mm: no machine is softer than 0.1 N/um or stiffer than 10 kN/um; beyond, the unit is not N/mm.
+SOFTEST, STIFFEST = 1e2, 1e7
+BOUNDS = {
+    **dict.fromkeys((*POSITION, "tool_extension_mm"), (-1e5, 1e5)),
+    **dict.fromkeys(ANGLES, (-360.0, 360.0)),
+    **dict.fromkeys(("stiffness_N_per_mm", *WIDE), (SOFTEST, STIFFEST)),
+    "sd_N_per_mm": (1e-6, STIFFEST),
+    "force_N": (1e-3, 1e7),
+    "displacement_um": (1e-3, 1e6),
+    "time_min": (0.0, 1e6),
+    "temperature_C": (-50.0, 200.0),
+}
+AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be their quotient, rounding allowed
+
+
+@dataclass(frozen=True)
+class Row:
+    """One reading. SI; a cell that is absent or empty is nan or "".
+
+    Attributes
+    ----------
+    position, angles
+        m; roll, pitch, yaw in rad.
+    direction
+        Unit vector of force and displacement.
+    stiffness, sd
+        N/m.
+    force
+        N, nan if not given.
+    time, temperature, tool_extension
+        s, degrees C, m.
+    labels
+        `LABELS` -> text.
+    extra
+        Further numeric columns, as they stand.
+    file, line
+        Where it was read.
+    """
+
+    position: tuple[float, ...]
+    angles: tuple[float, ...]
+    direction: tuple[float, ...]
+    stiffness: float
+    sd: float
+    force: float
+    time: float
+    temperature: float
+    tool_extension: float
+    labels: Mapping[str, str]
+    file: str
+    line: int
+    extra: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RowFile:
+    """Rows of a file, the known columns that it has, and what was not used, in words."""
+
+    rows: tuple[Row, ...]
+    columns: frozenset[str]
+    notes: tuple[str, ...]
+
+
+def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
+    """Read a measurement file.
+
+    Parameters
+    ----------
+    text, file
+        Content and name.
+    planned
+        Whether the stiffness may be left empty (a plan of measurements).
+
+    Raises
+    ------
+    InputError
+        No rows, columns missing, unknown or repeated.
+    InputErrors
+        Bad rows, all of them.
+    """
+    table = list(_cells(text))
+    if not table:
+        raise InputError("the file is empty", expected="a heading and rows of measurements", file=file)
+    (line, heading), body = table[0], table[1:]
+    heading = [name.strip() for name in heading]
+    _check_heading(heading, file, line, planned)
+    if not body:
+        raise InputError("no rows below the heading", expected="one row a measured stiffness", file=file, line=line)
+    known = {*KNOWN, *WIDE, *WIDE_MODEL}
+    more = [name for name in heading if name not in known and _all_numbers(body, heading.index(name))]
+    notes = [
+        f"{file}: column {name} holds text and is not used"
+        for name in heading
+        if name not in known and name not in more
+    ]
+    if any(name in WIDE_MODEL for name in heading):
+        notes.append(f"{file}: the printed model values (modeled_x_N_per_mm and so on) are not used")
+    rows: list[Row] = []
+    errors: list[InputError] = []
+    for line, cells in body:
+        try:
+            if len(cells) != len(heading):
+                raise InputError(f"row with {len(cells)} cells", expected=f"{len(heading)} as in the heading")
+            record = dict(zip(heading, (cell.strip() for cell in cells), strict=True))
+            rows += _rows_of(record, more, file, line, planned)
+        except InputError as error:
+            errors.append(InputError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+    errors += duplicates(rows)
+    if errors:
+        raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
+    columns = {name for name in heading if name in KNOWN}
+    return RowFile(tuple(rows), frozenset(columns), tuple(notes))
+
+
+def _cells(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of every line that is neither empty nor a comment."""
+    reader = csv.reader(text.splitlines())
+    for cells in reader:
+        if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
+            yield reader.line_num, cells
+
+
+def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:
+    def refuse(found: str, expected: str = "", hint: str = "") -> None:
+        raise InputError(found, expected=expected, hint=hint, file=file, line=line)
+
+    for name in heading:
+        if not name:
+            refuse("a column without a name")
+        if heading.count(name) > 1:
+            refuse(f"column {name} stands twice")
+        if name not in KNOWN and name not in WIDE and name not in WIDE_MODEL:
+            near = difflib.get_close_matches(name, (*KNOWN, *WIDE), n=1, cutoff=0.75)
+            if near:
+                refuse(f"unknown column {name}", hint=f"did you mean {near[0]}? Otherwise give it another name")
+    wide = any(name in heading for name in WIDE)
+    missing = [name for name in (POSITION + WIDE if wide else POSITION) if name not in heading]
+    if missing:
+        refuse(f"column {missing[0]} is missing", expected="x_mm,y_mm,z_mm,direction,stiffness_N_per_mm or more")
+    if wide and any(name in heading for name in ("direction", *VECTOR, "stiffness_N_per_mm", "displacement_um")):
+        refuse("columns of the wide layout beside those of the long one", hint="use one of the two")
+    for group in (ANGLES, VECTOR):
+        absent = [name for name in group if name not in heading]
+        if absent and len(absent) < len(group):
+            refuse(f"column {absent[0]} is missing", expected=f"all of {', '.join(group)} or none")
+    if wide:
+        return
+    if ("direction" in heading) == (VECTOR[0] in heading):
+        refuse("no direction" if "direction" not in heading else "two directions", expected="direction, or dx,dy,dz")
+    if not planned and "stiffness_N_per_mm" not in heading and not {"force_N", "displacement_um"} <= set(heading):
+        refuse("no measured stiffness", expected="stiffness_N_per_mm, or force_N with displacement_um")
+
+
+def _all_numbers(body: list[tuple[int, list[str]]], column: int) -> bool:
+    try:
+        return all(math.isfinite(float(cells[column])) for _, cells in body)
+    except (ValueError, IndexError):
+        return False
+
+
+def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, planned: bool) -> list[Row]:
+    """The one reading of a long row, the three of a wide one."""
+    position = tuple(m_from_mm(_number(record, name)) for name in POSITION)
+    angles = tuple(rad_from_deg(_number(record, name)) if name in record else 0.0 for name in ANGLES)
+    labels = {name: record.get(name, "") for name in LABELS}
+    force = _optional(record, "force_N")
+    rows = []
+    for direction, stiffness in _readings(record, force, planned):
+        rows.append(
+            Row(
+                position=position,
+                angles=angles,
+                direction=direction,
+                stiffness=n_per_m_from_n_per_mm(stiffness),
+                sd=n_per_m_from_n_per_mm(_optional(record, "sd_N_per_mm")),
+                force=force,
+                time=60.0 * _optional(record, "time_min"),
+                temperature=_optional(record, "temperature_C"),
+                tool_extension=m_from_mm(_optional(record, "tool_extension_mm")),
+                labels=labels,
+                file=file,
+                line=line,
+                extra={name: float(record[name]) for name in more},
+            )
+        )
+    return rows
+
+
+def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tuple[tuple[float, ...], float]]:
+    """Directions and stiffnesses in N/mm."""
+    if WIDE[0] in record:
+        return [(axis, _number(record, name)) for axis, name in zip(AXES.values(), WIDE, strict=True)]
+    printed = _optional(record, "stiffness_N_per_mm")
+    displacement = _optional(record, "displacement_um")
+    quotient = force / (displacement / 1e3)  # N/mm
+    if math.isnan(printed) and math.isnan(quotient) and not planned:
+        raise InputError("no stiffness", expected="stiffness_N_per_mm, or force_N and displacement_um")
+    if abs(quotient - printed) > AGREEMENT * printed:
+        raise InputError(
+            f"stiffness {printed:g} N/mm, but force over displacement is {quotient:.6g} N/mm",
+            hint="correct one of them or leave one out",
+        )
+    if not math.isnan(quotient) and not SOFTEST <= quotient <= STIFFEST:
+        raise InputError(
+            f"{force:g} N over {m_from_um(displacement) * 1e6:g} um is {quotient:.4g} N/mm",
+            expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm; is the unit right?",
+        )
+    return [(_direction(record), quotient if math.isnan(printed) else printed)]
+
+
+def _direction(record: Mapping[str, str]) -> tuple[float, ...]:
+    if "direction" in record:
+        name = record["direction"].upper().removeprefix("+").removeprefix("-")
+        if name not in AXES:
+            raise InputError(f"direction {record['direction']!r}", expected="X, Y or Z (others as dx,dy,dz)")
+        return AXES[name]
+    vector = [_number(record, name) for name in VECTOR]
+    size = math.hypot(*vector)
+    if size == 0.0:
+        raise InputError("direction 0,0,0", expected="a vector that points somewhere")
+    return tuple(component / size for component in vector)
+
+
+def _number(record: Mapping[str, str], name: str) -> float:
+    text = record[name]
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{name} = {text!r}", expected="a finite number")
+    low, high = BOUNDS.get(name, (-math.inf, math.inf))
+    if not low <= value <= high:
+        doubt = "; is the unit right?" if value > 0.0 else ""
+        raise InputError(f"{name} = {text}", expected=f"{low:g} to {high:g}{doubt}")
+    return value
+
+
+def _optional(record: Mapping[str, str], name: str) -> float:
+    """A number, or nan where the column is absent or the cell empty."""
+    return _number(record, name) if record.get(name) else math.nan
+
+
+def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
+    """Rows that say the same as an earlier one: all cells alike or, within a file, one repeat number twice."""
+    first: dict[tuple[str, ...], Row] = {}
+    errors = []
+    for row in rows:
+        # repr: nan differs from itself, its text does not.
+        at = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels)
+        numbered = bool(row.labels["repeat"]) and not across_files
+        key = tuple(repr(part) for part in (at if numbered else (*at, row.stiffness)))
+        seen = first.setdefault(key, row)
+        if seen is not row:
+            errors.append(
+                InputError(
+                    f"row repeats line {seen.line}" + (f" of {seen.file}" if seen.file != row.file else ""),
+                    hint="number repeated readings in a column repeat, or remove it",
+                    line=row.line,
+                    file=row.file,
+                )
+            )
+    return errors
