@@ -1,1 +1,30 @@
-"""Blind simulator of a measuring campaign on a machine that hides something; shares no code with the model."""
+"""Blind simulator of a measuring campaign on a machine that hides something.
+
+It judges the model and therefore shares no code with it but units, errors and files: its own machine reader, its own
+kinematics, its own mechanics (assembled elements, displacement method).
+
+>>> rows, truth = make_case(seed=7, layout="paper", hidden="weak_strut")
+>>> truth["hidden"], len(rows["stiffness_N_per_mm"])
+(['weak_strut'], 42)
+"""
+
+from toolpath_stiff.rig.case import Case, draw_case, make_case, testable
+from toolpath_stiff.rig.effects import CATALOGUE
+from toolpath_stiff.rig.exercise import measure_again, new_exercise, reveal
+from toolpath_stiff.rig.noise import Nuisances
+from toolpath_stiff.rig.outside import OUTSIDE
+from toolpath_stiff.rig.tables import csv_text
+
+__all__ = [
+    "CATALOGUE",
+    "OUTSIDE",
+    "Case",
+    "Nuisances",
+    "csv_text",
+    "draw_case",
+    "make_case",
+    "measure_again",
+    "new_exercise",
+    "reveal",
+    "testable",
+]

@@ -22,7 +22,6 @@ StrArray = NDArray[np.str_]
 
 HERTZ_LOAD = 500.0  # N, load at which contact_nonlinearity's compliance is quoted (assumed; effects catalogue)
 SLACK_LOAD = 0.1  # N, below which a joint's secant compliance is held: far below any load of a campaign
-OVERHANG_EXPONENT = 3  # a cantilever's compliance grows with the cube of its length (beam theory, c = l^3 / 3 E I)
 
 
 @dataclass(frozen=True)
@@ -72,13 +71,15 @@ class HiddenMachine:
     strut_factors
         (6,) on each strut's stiffness.
     curvature
-        N/m added to the strut law midway between its two lengths, as a parabola through both.
+        Logarithm of the factor on strut stiffness midway between the law's two lengths; a parabola, 0 at both.
     tip_error, radius_error
         m: the tool is longer, the circle of platform joints wider than the controller believes.
     bars
         N/m, bars of the platform truss.
     spindle
-        Radial and axial compliance m/N with the reference tool; the radial one grows with the overhang's cube.
+        Radial and axial compliance m/N at the tip with the reference tool.
+    overhang_exponent
+        Power of (tool length / reference length) with which the radial one grows; 3 for a cantilever, c = l^3 / 3 E I.
     joint, hertz, clearance
         m/N along each strut; m/N at 500 N, falling with the cube root of the load; m of lost motion along each strut.
     moment
@@ -105,6 +106,7 @@ class HiddenMachine:
     radius_error: float = 0.0
     bars: float = np.inf
     spindle: tuple[float, float] = (0.0, 0.0)
+    overhang_exponent: float = 0.0
     joint: float = 0.0
     hertz: float = 0.0
     clearance: float = 0.0
@@ -171,7 +173,8 @@ def _struts(nominal: Nominal, hidden: HiddenMachine, rows: Rows, lengths: FloatA
     """(n, 6, 6) N/m: the paper's law, linear in length (its equation 5), with curvature, spread and oddities."""
     (l1, l2), (k1, k2) = nominal.law_lengths, nominal.law_stiffnesses
     s = (lengths - l1) / (l2 - l1)
-    law = k1 + (k2 - k1) * s + hidden.curvature * 4.0 * s * (1.0 - s)
+    # The exponential keeps strongly curved laws positive beyond the two lengths.
+    law = (k1 + (k2 - k1) * s) * np.exp(hidden.curvature * 4.0 * s * (1.0 - s))
     return strut_block(hidden.oddity, law * hidden.strut_factors, lengths, rows)
 
 
@@ -191,7 +194,7 @@ def _spindle(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     radial, axial = hidden.spindle
     grown = np.ones(len(rows.force))
     if nominal.tool_length > 0.0:
-        grown = (1.0 + rows.extension / nominal.tool_length) ** OVERHANG_EXPONENT
+        grown = (1.0 + rows.extension / nominal.tool_length) ** hidden.overhang_exponent
     return np.stack([radial * grown, radial * grown, np.full(len(grown), axial)], axis=1)
 
 

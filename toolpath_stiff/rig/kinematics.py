@@ -27,13 +27,13 @@ def rotations(angles: FloatArray) -> FloatArray:
 def commanded_lengths(nominal: Nominal, tips: FloatArray, turned: FloatArray, extension: FloatArray) -> FloatArray:
     """(n, 6) m, strut lengths for tool tips (n, 3), rotations (n, 3, 3) and tools longer by `extension` (n,)."""
     joints = platform_points(nominal.platform_joints, tips, turned, extension)
-    return np.linalg.norm(joints - nominal.frame_joints, axis=2)
+    return np.asarray(np.linalg.norm(joints - nominal.frame_joints, axis=2))
 
 
 def platform_points(points: FloatArray, tips: FloatArray, turned: FloatArray, extension: FloatArray) -> FloatArray:
     """(n, k, 3) m in base axes: platform points (k, 3), given from the reference tool's tip."""
     raised = points + extension[:, None, None] * np.array([0.0, 0.0, 1.0])
-    return tips[:, None, :] + np.einsum("nij,nkj->nki", turned, raised)
+    return np.asarray(tips[:, None, :] + np.einsum("nij,nkj->nki", turned, raised))
 
 
 def true_poses(
@@ -75,7 +75,7 @@ def _turn(vector: FloatArray) -> FloatArray:
     # sin(t)/t and (1 - cos t)/t^2 through sinc, which is safe at 0.
     first = np.sinc(angle / np.pi)[:, None, None]
     second = 0.5 * np.sinc(angle / (2.0 * np.pi))[:, None, None] ** 2
-    return np.eye(3) + first * skew + second * (skew @ skew)
+    return np.asarray(np.eye(3) + first * skew + second * (skew @ skew))
 
 
 def reachable(nominal: Nominal, tips: FloatArray, angles: FloatArray, extension: FloatArray) -> BoolArray:

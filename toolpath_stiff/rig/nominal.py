@@ -61,11 +61,11 @@ class Nominal:
     neutral_pose: FloatArray
 
     @property
-    def vertices(self) -> FloatArray:
+    def vertices(self) -> NDArray[np.int64]:
         """(6,) number of the frame vertex that holds each strut, counted from 0 in the order of the struts."""
         azimuth = np.arctan2(self.frame_joints[:, 1], self.frame_joints[:, 0])
         found: list[float] = []
-        numbers = np.empty(6, dtype=int)
+        numbers = np.empty(6, dtype=np.int64)
         for strut, angle in enumerate(azimuth):
             turns = [abs(math.remainder(angle - other, 2.0 * math.pi)) for other in found]
             if not turns or min(turns) > VERTEX_WIDTH:

@@ -34,6 +34,7 @@ ODDITIES_IN_TIME = {
     "warming_leg": "one strut softens in the course of the campaign",
     "joint_friction": "sticking joints: stiffer at small loads",
 }
+OUTSIDE = (*ODDITIES, *ODDITIES_IN_TIME)
 
 
 @dataclass(frozen=True)
@@ -61,18 +62,18 @@ class Oddity:
 
 def strut_block(odd: Oddity | None, stiffness: FloatArray, lengths: FloatArray, rows: Rows) -> FloatArray:
     """(n, 6, 6) N/m from the struts' own stiffnesses (n, 6)."""
-    factor = np.ones_like(stiffness)
+    factor: FloatArray = np.ones(stiffness.shape)
     if odd is not None and odd.kind == "screw_pitch_error":
         factor += odd.size * np.sin(2.0 * np.pi * lengths / odd.wavelength + odd.phase)
     if odd is not None and odd.kind == "ball_screw_torsion":
-        # 1 at the left edge of the workspace, softer by `size` a half width to the right of the axis.
-        factor = 1.0 / (1.0 + odd.size * np.exp(rows.position[:, :1] / REACH) / np.e)
+        # Compliance greater by `size` at the right edge of the workspace, by less and less towards the left.
+        factor /= 1.0 + odd.size * np.exp(rows.position[:, :1] / REACH - 1.0)
     if odd is not None and odd.kind == "warming_leg":
         factor[:, odd.strut] = 1.0 / (1.0 + odd.size * rows.elapsed)
     block = (stiffness * factor)[:, :, None] * np.eye(6)
     if odd is not None and odd.kind == "strut_crosstalk":
         # Flexibility with an off-diagonal term; below 1 the block stays positive definite.
-        first, second = 0, 3
+        first, second = 0, 3  # struts 1 and 4
         coupled = odd.size * np.sqrt(1.0 / (stiffness[:, first] * stiffness[:, second]))
         flexibility = (1.0 / stiffness)[:, :, None] * np.eye(6)
         flexibility[:, first, second] = flexibility[:, second, first] = coupled

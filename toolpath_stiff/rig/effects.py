@@ -1,0 +1,169 @@
+"""The effects of the catalogue as the rig hides them: parameters in shop units, their draw, their place in the machine.
+
+Names, units and bounds are those of the issue that ordered the catalogue, so that a claim can be scored; the
+mechanics behind them is in `structure` and `hidden`. `strength` runs from 0 (nothing) to 1 (the bound).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from toolpath_stiff.rig.hidden import HiddenMachine
+from toolpath_stiff.rig.outside import Oddity
+from toolpath_stiff.units import m_from_mm, m_from_um
+
+Parameters = dict[str, Any]
+NM_PER_N = 1e-9  # m/N in nm/N
+SECONDS_PER_MINUTE = 60.0
+
+# Largest compliances that are tried, nm/N: far beyond 30 % of a tip that gives 8 to 31 nm/N.
+SOFT = 60.0
+
+
+# Sizes at strength 1: ratios, or m/N where the oddity is a compliance.
+ODDITY_LIMITS = {
+    "loose_preload": SOFT * NM_PER_N,
+    "cracked_bed": SOFT * NM_PER_N,
+    "saddle_overhang": SOFT * NM_PER_N,
+    "screw_pitch_error": 0.8,
+    "ball_screw_torsion": 1.0,
+    "strut_crosstalk": 0.95,
+    "cable_drag": 0.5,
+    "warming_leg": 1.0,
+    "joint_friction": 1.0,
+}
+
+
+def _signs(rng: Generator) -> float:
+    return float(rng.choice([-1.0, 1.0]))
+
+
+def _weights(rng: Generator, count: int) -> list[float]:
+    """Relative sizes of several components: one is 1, each other one is absent in a third of the cases."""
+    weights = np.where(rng.random(count) < 1.0 / 3.0, 0.0, rng.uniform(0.2, 1.0, count))
+    weights[rng.integers(count)] = 1.0
+    return [float(w) for w in weights]
+
+
+def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> Parameters:
+    """What is drawn beside the strength: which strut, which axis, which sign, which proportions."""
+    match name:
+        case "spindle_compliance":
+            radial, axial = _weights(rng, 2)
+            return {"radial": radial, "axial": axial}
+        case "frame_compliance":
+            radial, vertical = _weights(rng, 2)
+            # All vertices alike in half of the cases, else a single one.
+            vertex = 0 if rng.random() < 0.5 else int(rng.integers(1, vertices + 1))
+            return {"vertex": vertex, "radial": radial, "vertical": vertical}
+        case "table_compliance":
+            x, y, z, rocking = _weights(rng, 4)
+            return {"x": x, "y": y, "z": z, "rocking": rocking}
+        case "setup_compliance":
+            x, y, z = _weights(rng, 3)
+            return {"setup": str(rng.choice(setups)), "x": x, "y": y, "z": z}
+        case "weak_strut":
+            return {"strut": int(rng.integers(1, 7))}
+        case "gauge_scale":
+            target = str(rng.choice(["X", "Y", "Z", *(setups if len(setups) > 1 else [])]))
+            return {"target": target, "sign": _signs(rng)}
+        case "strut_law" | "tool_length_error" | "platform_radius_error" | "thermal_drift":
+            return {"sign": _signs(rng)}
+        case "screw_pitch_error":
+            return {"wavelength": float(rng.uniform(0.08, 0.4)), "phase": float(rng.uniform(0.0, 2.0 * np.pi))}
+        case "warming_leg":
+            return {"strut": int(rng.integers(0, 6))}
+        case "cable_drag" | "strut_crosstalk":
+            return {"sign": _signs(rng)}
+        case _:
+            return {}
+
+
+def at_strength(name: str, shape: Mapping[str, Any], strength: float) -> Parameters:
+    """Parameters in shop units, by the catalogue's names, for a strength in (0, 1]."""
+    soft, sign = SOFT * strength, float(shape.get("sign", 1.0))
+    match name:
+        case "spindle_compliance":
+            return {"radial": soft * shape["radial"], "axial": soft * shape["axial"]}
+        case "platform_flexibility":
+            return {"bar_stiffness": 1e8 / strength}
+        case "joint_compliance" | "contact_nonlinearity":
+            return {"compliance": soft}
+        case "joint_moment_stiffness":
+            return {"stiffness": 2e6 * strength}
+        case "joint_clearance":
+            return {"lost_motion": 50.0 * strength}
+        case "strut_law":
+            return {"curvature": 40.0 * strength * sign}
+        case "weak_strut":
+            return {"strut": shape["strut"], "factor": 1.0 - 0.7 * strength}
+        case "frame_compliance":
+            return {"vertex": shape["vertex"], "radial": soft * shape["radial"], "vertical": soft * shape["vertical"]}
+        case "table_compliance":
+            return {**{axis: soft * shape[axis] for axis in "xyz"}, "rocking": soft * shape["rocking"]}
+        case "setup_compliance":
+            return {"setup": shape["setup"], **{axis: soft * shape[axis] for axis in "xyz"}}
+        case "tool_length_error" | "platform_radius_error":
+            return {"error": 60.0 * strength * sign}
+        case "gauge_scale":
+            axis = shape["target"] in ("X", "Y", "Z")
+            return {
+                "direction": "XYZ".index(shape["target"]) + 1 if axis else 0,
+                "setup": "" if axis else shape["target"],
+                "scale": 20.0 * strength * sign,
+            }
+        case "thermal_drift":
+            return {"rate": 20.0 * strength * sign}
+        case _:
+            own = {key: value for key, value in shape.items() if key != "sign"}
+            return {**own, "size": ODDITY_LIMITS[name] * strength * sign}
+
+
+Change = Callable[[HiddenMachine, Mapping[str, Any]], dict[str, Any]]
+
+CATALOGUE: dict[str, Change] = {
+    "spindle_compliance": lambda h, p: {"spindle": (p["radial"] * NM_PER_N, p["axial"] * NM_PER_N)},
+    "platform_flexibility": lambda h, p: {"bars": p["bar_stiffness"]},
+    "joint_compliance": lambda h, p: {"joint": p["compliance"] * NM_PER_N},
+    "joint_moment_stiffness": lambda h, p: {"moment": p["stiffness"]},
+    "joint_clearance": lambda h, p: {"clearance": m_from_um(p["lost_motion"])},
+    "contact_nonlinearity": lambda h, p: {"hertz": p["compliance"] * NM_PER_N},
+    "strut_law": lambda h, p: {"curvature": p["curvature"] / 100.0},
+    "weak_strut": lambda h, p: {
+        "strut_factors": np.where(np.arange(1, 7) == p["strut"], p["factor"], 1.0) * h.strut_factors
+    },
+    "frame_compliance": lambda h, p: {
+        "vertices": np.where(
+            (np.arange(1, 7) == p["vertex"])[:, None] | (p["vertex"] == 0),
+            np.array([p["radial"], p["vertical"]]) * NM_PER_N,
+            0.0,
+        )
+    },
+    "table_compliance": lambda h, p: {
+        "table": np.array([p["x"], p["y"], p["z"]]) * NM_PER_N,
+        "rocking": p["rocking"] * NM_PER_N,
+    },
+    "setup_compliance": lambda h, p: {
+        "setup": p["setup"],
+        "setup_compliance": np.array([p["x"], p["y"], p["z"]]) * NM_PER_N,
+    },
+    "tool_length_error": lambda h, p: {"tip_error": m_from_mm(p["error"])},
+    "platform_radius_error": lambda h, p: {"radius_error": m_from_mm(p["error"])},
+    "gauge_scale": lambda h, p: {
+        "gauge_target": p["setup"] or "XYZ"[p["direction"] - 1],
+        "gauge_factor": 1.0 + p["scale"] / 100.0,
+    },
+    "thermal_drift": lambda h, p: {"drift": m_from_um(p["rate"]) / SECONDS_PER_MINUTE},
+}
+
+
+def with_effect(hidden: HiddenMachine, name: str, parameters: Mapping[str, Any]) -> HiddenMachine:
+    """The machine with one more effect; parameters in shop units by the catalogue's names."""
+    if name in CATALOGUE:
+        return dataclasses.replace(hidden, **CATALOGUE[name](hidden, parameters))
+    return dataclasses.replace(hidden, oddity=Oddity(kind=name, **parameters))
