@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
@@ -13,6 +13,8 @@ from toolpath_stiff.errors import InputError
 def write_atomically(path: str | Path, content: str | bytes | Iterable[str]) -> Path:
     """Write text (UTF-8, line feeds as they are), bytes or pieces of text; folders are made as needed.
 
+    A symbolic link is followed. A device or pipe (`/dev/stdout`) is written to, never replaced by a file.
+
     Raises
     ------
     InputError
@@ -20,25 +22,35 @@ def write_atomically(path: str | Path, content: str | bytes | Iterable[str]) -> 
     """
     target = Path(path)
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        if target.exists() and not target.is_file() and not target.is_dir():
+            with target.open("wb") as stream:
+                stream.writelines(_encoded(content))
+        else:
+            _write_then_rename(target.resolve(), content)
     except OSError as error:
         raise InputError(f"cannot write {str(path)!r}: {error.strerror}") from None
+    return target
+
+
+def _write_then_rename(target: Path, content: str | bytes | Iterable[str]) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
         with os.fdopen(handle, "wb") as stream:
-            if isinstance(content, bytes):
-                stream.write(content)
-            else:
-                for piece in [content] if isinstance(content, str) else content:
-                    stream.write(piece.encode("utf-8"))
+            stream.writelines(_encoded(content))
         Path(temporary).chmod(0o666 & ~_umask())
         Path(temporary).replace(target)
-    except BaseException as error:
+    except BaseException:
         Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise InputError(f"cannot write {str(path)!r}: {error.strerror}") from None
         raise
-    return target
+
+
+def _encoded(content: str | bytes | Iterable[str]) -> Iterator[bytes]:
+    if isinstance(content, bytes):
+        yield content
+    else:
+        for piece in [content] if isinstance(content, str) else content:
+            yield piece.encode("utf-8")
 
 
 def _umask() -> int:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.moves_factory import make_moves
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.path import move_lengths, place, sample_moves
+from toolpath_stiff.path import move_lengths, place, place_orientations, sample_moves
 from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 
 ROUNDING = 1e-12  # m: a few hundred units in the last place of a metre
@@ -167,3 +167,47 @@ def test_tilted_set_up_tilts_path_and_tool_axis():
     np.testing.assert_allclose(samples.position[-1], expected, atol=ROUNDING)
     axis = rotation_matrices(samples.abc[-1])[:, 2]
     np.testing.assert_allclose(axis, [0.0, np.sin(np.deg2rad(10)), np.cos(np.deg2rad(10))], atol=ROUNDING)
+
+
+@given(st.floats(0.01, 0.1), st.floats(0.01, 0.1), st.floats(0.5, 12.0), st.floats(-0.05, 0.05), st.floats(5e-4, 0.05))
+def test_no_step_is_exceeded_where_the_radii_of_an_arc_differ(start, end, sweep, climb, step):
+    moves = make_moves(
+        [{"start": [start, 0, 0], "end": [end * np.cos(sweep), end * np.sin(sweep), climb], "sweep": sweep}]
+    )
+    gaps = np.linalg.norm(np.diff(sample_moves(moves, step).position, axis=0), axis=1)
+    # A chord is never longer than its arc; the rest is the rounding of a whole number of steps.
+    assert gaps.max() <= step * (1 + 1e-9)
+
+
+@settings(max_examples=50)
+@given(point, st.tuples(angle, angle, angle), st.lists(point, min_size=1, max_size=5))
+def test_a_rigid_turn_keeps_lengths_times_and_weights(shift, turn, points):
+    moves = make_moves(
+        [
+            {"end": [0.9, 0.9, 0.9]},
+            *({"end": p} for p in points),
+            {"start": [0.05, 0, 0], "end": [0, 0.05, 0.01], "sweep": 2.5 * np.pi},
+        ]
+    )
+    origin = (*shift, *turn)
+    plain, turned = sample_moves(moves, 0.05), sample_moves(place(moves, origin), 0.05, origin=origin)
+    # A length next to a whole number of steps may gain or lose one by rounding; the totals may not.
+    assert turned.weight.sum() == pytest.approx(plain.weight.sum(), rel=1e-12)
+    assert turned.s[-1] == pytest.approx(plain.s[-1], rel=1e-12)
+    assert turned.t[-1] == pytest.approx(plain.t[-1], rel=1e-12)
+
+
+def test_three_turns_of_120_degrees_are_none():
+    third = (0.0, 0.0, 0.0, 0.0, 0.0, 2 * np.pi / 3)
+    moves = make_moves(
+        [
+            {"end": [0.1, 0.05, -0.02, 0.2, -0.1, 0.3]},
+            {"start": [0.05, 0, 0, 0.2, -0.1, 0.3], "end": [0, 0.05, 0.01, -0.1, 0.2], "sweep": np.pi / 2},
+        ]
+    )
+    plain = sample_moves(moves, 0.01)
+    placed, abc = moves, plain.abc
+    for _ in range(3):
+        placed, abc = place(placed, third), place_orientations(abc, third)
+    np.testing.assert_allclose(sample_moves(placed, 0.01).position, plain.position, atol=ROUNDING)
+    np.testing.assert_allclose(rotation_matrices(abc), rotation_matrices(plain.abc), atol=ROUNDING)

@@ -20,9 +20,9 @@ LOADS_HELP = "tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ"
 
 
 def finite_number(text: str) -> float:
-    """A number that is neither infinite nor nan."""
+    """A number that is neither infinite nor nan, in plain digits: Python would also read `1_000`."""
     try:
-        value = float(text)
+        value = math.nan if "_" in text else float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

@@ -83,7 +83,10 @@ def sample_moves(
     length = move_lengths(moves)
     turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0)
     # A length that is a whole number of steps up to rounding must not gain a step.
-    pieces = np.maximum(np.ceil(length / step - 1e-9), np.ceil(turn / ANGULAR_STEP - 1e-9))
+    pieces = np.maximum(
+        np.ceil(length * _fastest_part(moves) / step - 1e-9),
+        np.ceil(turn / ANGULAR_STEP - 1e-9),
+    )
     pieces = np.maximum(pieces, 1.0)
     total = float(pieces.sum()) + len(moves)
     if total > MOST_SAMPLES:
@@ -120,6 +123,19 @@ def sample_moves(
         weight=np.where(at_end, 0.5, 1.0) * piece_length,
         feed=moves.feed[move],
     )
+
+
+def _fastest_part(moves: Moves) -> FloatArray:
+    """(n,) greatest speed along a move over its mean speed: above 1 only where the radii of an arc differ."""
+    ratio = np.ones(len(moves))
+    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
+    if len(arcs):
+        frame = _arc_frame(moves, arcs)
+        radii = np.stack([frame.radius_start, frame.radius_end])
+        # Equal radii differ by rounding only; they must not gain a step either.
+        spiral = np.abs(radii[1] - radii[0]) > 1e-9 * radii.max(axis=0)
+        ratio[arcs[spiral]] = (radii.max(axis=0) / radii.mean(axis=0))[spiral]
+    return ratio
 
 
 def _along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
