@@ -1,0 +1,226 @@
+"""The command line itself: help, wrong usage, numbers with a minus, pipes, files that are whole or not there."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from toolpath_stiff.cli import path as path_command
+from toolpath_stiff.cli.arguments import pose_argument, range_argument
+from toolpath_stiff.cli.main import COMMANDS, main
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import write_atomically
+
+PROGRAM = "G21 G90 G0 X0 Y0 Z10\nG1 Z0 F600\nX100\nM30\n"
+
+
+@pytest.fixture
+def part(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "part.nc"
+    file.write_text(PROGRAM)
+    return file
+
+
+@pytest.mark.parametrize("command", [c.name for c in COMMANDS])
+def test_every_listed_command_exists_and_explains_itself(command, capsys):
+    assert main([command, "--help"]) == 0
+    assert capsys.readouterr().out.startswith(f"usage: tps {command}")
+
+
+def test_help_lists_every_command_with_examples(capsys):
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(c.name in text and c.help in text for c in COMMANDS)
+    assert "examples:" in text
+
+
+def test_without_a_command_the_help_is_shown(capsys):
+    assert main([]) == 2
+    assert "usage: tps" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("typed", "meant"), [("anlyze", "analyze"), ("analyse", "analyze"), ("pth", "path")])
+def test_a_mistyped_command_suggests_the_nearest(typed, meant, capsys):
+    assert main([typed, "part.nc"]) == 2
+    assert f"did you mean `tps {meant}`?" in capsys.readouterr().err
+
+
+def test_a_word_like_no_command_names_them_all(capsys):
+    assert main(["qqqq"]) == 2
+    error = capsys.readouterr().err
+    assert all(c.name in error for c in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--step", "0", "more than 0 and at most 1000 mm"),
+        ("--step", "-.5", "more than 0 and at most 1000 mm"),
+        ("--step", "1001", "more than 0 and at most 1000 mm"),
+        ("--step", "-1e-3", "more than 0 and at most 1000 mm"),
+        ("--step", "-inf", "'-inf' is not a finite number"),
+        ("--step", "-nan", "'-nan' is not a finite number"),
+        ("--step", "1_0", "'1_0' is not a finite number"),
+        ("--origin", "-1,2", "X,Y,Z or X,Y,Z,A,B,C"),
+        ("--origin", "-1,2,nan", "'nan' is not a finite number"),
+        ("--origin", "-1e6,0,0", "within +-100000 mm"),
+        ("--origin", "0,0,800,0,0,-361", "within +-360 degrees"),
+    ],
+)
+def test_wrong_values_end_with_usage_and_what_is_allowed(part, capsys, option, value, said):
+    assert main(["path", "part.nc", option, value]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("usage: tps path ") and f"tps path: error: argument {option}" in error
+    assert said in error
+
+
+@pytest.mark.parametrize("value", ["-10,0,800", "-.5,0,1", "-1e-3,1,0", "-10, 0, 800"])
+def test_values_that_begin_with_a_minus_need_no_equals_sign(part, capsys, value):
+    assert main(["path", "part.nc", "--origin", value]) == 0
+    first = capsys.readouterr().out.splitlines()[1].split(",")
+    # The program goes to Z10 first, where it starts from its own zero.
+    assert [float(cell) for cell in first[5:8]] == [float(part) for part in value.split(",")]
+
+
+def test_positional_values_may_begin_with_a_minus(capsys):
+    assert main(["pose", "-300", "300", "300", "-30", "0", "0", "--json"]) == 0
+    assert main(["pose", "-.5", "-1e-3", "800", "--json"]) == 0
+    assert main(["pose", "-inf", "0", "800", "--json"]) == 2
+    assert "-inf" in capsys.readouterr().err
+
+
+number = st.floats(-1e5, 1e5).map(lambda x: x + 0.0)
+
+
+@given(st.tuples(number, number, number))
+def test_origin_is_read_as_it_is_printed(xyz):
+    read = pose_argument(",".join(map(repr, xyz)))
+    assert [1e3 * value for value in read[:3]] == pytest.approx(list(xyz), rel=1e-15, abs=1e-300)
+    assert read[3:] == (0.0, 0.0, 0.0)
+
+
+@given(number, number)
+def test_ranges_are_read_in_order_or_refused(low, high):
+    if low <= high:
+        assert range_argument(f"{low!r}:{high!r}") == (low, high)
+    else:
+        with pytest.raises(Exception, match="above the upper bound"):
+            range_argument(f"{low!r}:{high!r}")
+
+
+def test_input_errors_are_one_line_without_traceback(part, capsys):
+    part.write_text("G1 X10\n")  # a feed move before any F
+    assert main(["path", "part.nc"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("tps: error: part.nc:1:") and captured.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), ValueError("a bug")])
+def test_interruption_is_130_and_a_bug_shows(part, monkeypatch, capsys, error):
+    def fail(_args):
+        raise error
+
+    monkeypatch.setattr(path_command, "run", fail)
+    if isinstance(error, KeyboardInterrupt):
+        assert main(["path", "part.nc"]) == 130
+        assert "Traceback" not in capsys.readouterr().err
+    else:
+        with pytest.raises(ValueError, match="a bug"):
+            main(["path", "part.nc"])
+
+
+def test_a_reader_that_goes_away_is_no_error(part):
+    command = [
+        sys.executable,
+        "-m",
+        "toolpath_stiff",
+        "path",
+        "part.nc",
+        "--step",
+        "0.001",
+    ]  # megabytes, no pipe's fill
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stderr is not None
+        assert process.stdout.readline().startswith(b"line,motion")
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
+def test_path_goes_to_standard_output_or_a_file_with_the_same_bytes(part, capsys):
+    assert main(["path", "part.nc"]) == 0
+    printed = capsys.readouterr().out
+    assert main(["path", "part.nc", "--csv"]) == 0
+    assert capsys.readouterr().out == printed
+    assert main(["path", "part.nc", "--out", "sub/path.csv"]) == 0
+    assert (part.parent / "sub" / "path.csv").read_text() == printed
+    assert main(["path", "part.nc", "--csv", "--out", "path.csv"]) == 2
+    assert not (part.parent / "path.csv").exists()
+
+
+def test_the_programs_own_origin_holds_unless_one_is_given(part, capsys):
+    part.write_text("G10 L2 P1 X-100 Y50 Z800\n" + PROGRAM)
+    assert main(["path", "part.nc"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].split(",")[5:8] == ["0.000000", "50.000000", "800.000000"]
+    assert main(["path", "part.nc", "--origin", "1,2,3"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[-1].split(",")[5:8] == ["101.000000", "2.000000", "3.000000"]
+    assert "tps: warning: part.nc" in captured.err
+
+
+def test_a_step_too_fine_says_which_would_do(part, capsys):
+    assert main(["path", "part.nc", "--step", "1e-6"]) == 2
+    error = capsys.readouterr().err
+    use = float(error.split("--step ")[1].split()[0])
+    assert 100 / 20e6 < use < 2 * 110 / 20e6  # 110 mm in 20 million samples
+
+
+def test_a_file_is_whole_or_not_there(tmp_path):
+    target = tmp_path / "out.csv"
+    target.write_text("before")
+
+    def pieces():
+        yield "half"
+        raise RuntimeError("stop")
+
+    with pytest.raises(RuntimeError):
+        write_atomically(target, pieces())
+    assert [p.name for p in tmp_path.iterdir()] == ["out.csv"] and target.read_text() == "before"
+    assert write_atomically(target, ["af", "ter\r\n", "µ"]) == target
+    assert target.read_bytes() == "after\r\nµ".encode()
+
+
+def test_what_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    for bad in (tmp_path, tmp_path / "file" / "below", tmp_path / ("x" * 300)):
+        with pytest.raises(InputError, match="cannot write"):
+            write_atomically(bad, "text")
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_symbolic_link_stays_a_link(tmp_path):
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_text("old")
+    link.symlink_to(target)
+    write_atomically(link, "new")
+    assert link.is_symlink() and target.read_text() == "new"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_pipe_is_written_to_and_stays_a_pipe(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    got: list[str] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_text()), daemon=True)
+    reader.start()
+    write_atomically(pipe, "through")
+    reader.join(timeout=10)
+    assert got == ["through"] and pipe.is_fifo()
