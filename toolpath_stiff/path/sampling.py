@@ -16,7 +16,7 @@ IntArray = NDArray[np.int64]
 
 RAPID_FEED = 10.0 / 60.0  # m/s, assumed where no machine says otherwise
 ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
-MOST_SAMPLES = 20_000_000  # some 6 GB of columns; beyond that the step is a mistake
+MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
 
 
 def move_lengths(moves: Moves) -> FloatArray:
