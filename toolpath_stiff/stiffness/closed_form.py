@@ -15,6 +15,7 @@ once and reused, so that memory does not grow with the number of poses.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -121,40 +122,99 @@ def tip_compliance(
     n = len(position)
     compliance = np.empty((n, 3, 3))
     good = np.empty(n, dtype=bool)
-    work = _Work(min(BLOCK, n))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for start in range(0, n, BLOCK):
-            rows = slice(start, min(start + BLOCK, n))
-            size = rows.stop - rows.start
-            if size != work.length.shape[1]:
-                work = _Work(size)
-            turn = None if rotation is None else np.ascontiguousarray(np.moveaxis(rotation[rows], 0, -1))
-            good[rows] = _block(kernel, np.ascontiguousarray(position[rows].T), turn, work, compliance[rows])
+        for rows, tip, turn, work in _blocks(position, rotation):
+            good[rows] = _tensor_block(kernel, tip, turn, work, compliance[rows])
     return compliance, good
 
 
-def _block(
+def compliance_along(
+    kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Compliance along one direction a pose, with what the limits ask for; cheaper than the whole tensor.
+
+    Parameters
+    ----------
+    kernel
+        From `prepare`.
+    position, direction
+        (n, 3) m and unit vectors.
+    rotation
+        (n, 3, 3); None: vertical spindle.
+
+    Returns
+    -------
+    compliance, determinant, lengths, good
+        (n,) m/N; (n,) |det J| in m^3 (`kinematics.singularity_index` is its ratio to the neutral pose's); (n, 6) m,
+        struts in the machine's order; (n,) as in `tip_compliance`.
+    """
+    n = len(position)
+    compliance, determinant, lengths = np.empty(n), np.empty(n), np.empty((n, 6))
+    good = np.empty(n, dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for rows, tip, turn, work in _blocks(position, rotation):
+            first, second = _eliminate(kernel, tip, turn, work)
+            lengths[rows, kernel.order] = work.length.T
+            force = _forces(work, np.ascontiguousarray(direction[rows].T))
+            law_holds = _strut_compliances(kernel, work)
+            np.multiply(force, force, out=force)
+            force *= work.six
+            force.sum(axis=0, out=compliance[rows])
+            np.abs(first * second, out=determinant[rows])
+            good[rows] = law_holds & well_conditioned(kernel, first, second) & np.isfinite(compliance[rows])
+    return compliance, determinant, lengths, good
+
+
+def well_conditioned(kernel: ClosedForm, first: FloatArray, second: FloatArray) -> BoolArray:
+    """Where neither of the determinants that the elimination divides by is small."""
+    small = SMALL_DETERMINANT
+    return np.asarray((np.abs(first) > small) & (np.abs(second) > small * kernel.arm**3))
+
+
+def _blocks(
+    position: FloatArray, rotation: FloatArray | None
+) -> Iterator[tuple[slice, FloatArray, FloatArray | None, _Work]]:
+    """Rows of each block, its position (3, m) and rotation (3, 3, m) or None, and work arrays that it may overwrite."""
+    n = len(position)
+    work = _Work(min(BLOCK, n))
+    for start in range(0, n, BLOCK):
+        rows = slice(start, min(start + BLOCK, n))
+        if rows.stop - start != work.length.shape[1]:
+            work = _Work(rows.stop - start)
+        turn = None if rotation is None else np.ascontiguousarray(np.moveaxis(rotation[rows], 0, -1))
+        yield rows, np.ascontiguousarray(position[rows].T), turn, work
+
+
+def _eliminate(
+    kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None, work: _Work
+) -> tuple[FloatArray, FloatArray]:
+    """Struts and the two inverses of the elimination into `work`; returns the two determinants (m,).
+
+    After it `work.w` [c, k] = (U_A^-1)[k, c], `work.t` = U_A^-1 U_B, `work.q` [d, j] = (S^-1)[j, d].
+    """
+    _strut_geometry(kernel, position, rotation, work)
+    u, m = work.directions, work.moments
+    first = _inverse_columns(u[:, :3], work.w, work.nine)
+    _products(work.w.swapaxes(0, 1), u[:, 3:], work.t, work.nine)
+    _products(m[:, :3], work.t, work.s, work.nine)
+    np.subtract(m[:, 3:], work.s, out=work.s)  # S = M_B - M_A T
+    second = _inverse_columns(work.s, work.q, work.nine)
+    return first, second
+
+
+def _tensor_block(
     kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None, work: _Work, out: FloatArray
 ) -> BoolArray:
     """One block: position (3, m), rotation (3, 3, m) or None; writes C to `out` (m, 3, 3)."""
-    _strut_geometry(kernel, position, rotation, work)
-    u, m = work.directions, work.moments
-    first = _inverse_columns(u[:, :3], work.w, work.nine)  # W[c, k] = (U_A^-1)[k, c]
-    w, t, n, s, q, nine = work.w, work.t, work.n, work.s, work.q, work.nine
-    _products(w.swapaxes(0, 1), u[:, 3:], t, nine)  # T = U_A^-1 U_B
-    _products(m[:, :3], w.swapaxes(0, 1), n, nine)  # N = M_A U_A^-1
-    _products(m[:, :3], t, s, nine)
-    np.subtract(m[:, 3:], s, out=s)  # S = M_B - M_A T
-    second = _inverse_columns(s, q, nine)  # Q[d, j] = (S^-1)[j, d]
-    _products(q.swapaxes(0, 1), n, s, nine)  # S^-1 N, in the room of S
+    first, second = _eliminate(kernel, position, rotation, work)
+    w, t, n, s, nine = work.w, work.t, work.n, work.s, work.nine
+    _products(work.moments[:, :3], w.swapaxes(0, 1), n, nine)  # N = M_A U_A^-1
+    _products(work.q.swapaxes(0, 1), n, s, nine)  # S^-1 N, in the room of S
     influence = work.influence
     np.negative(s, out=influence[3:])
     _products(t, s, n, nine)
     np.add(n, w.swapaxes(0, 1), out=influence[:3])  # U_A^-1 + T S^-1 N
-    np.multiply(work.length, kernel.slope, out=work.six)
-    work.six += kernel.intercept
-    law_holds = work.six.min(axis=0) > 0.0  # beyond, the exact route says what is wrong
-    np.divide(1.0, work.six, out=work.six)
+    law_holds = _strut_compliances(kernel, work)
     weighted = np.multiply(influence, work.six[:, None], out=work.arms.reshape(6, 3, -1))
     for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
         np.multiply(weighted[:, i], influence[:, j], out=work.inverse_length)
@@ -162,10 +222,35 @@ def _block(
         out[:, i, j] = entry
         if i != j:
             out[:, j, i] = entry
-    small = SMALL_DETERMINANT
-    return np.asarray(
-        law_holds & (np.abs(first) > small) & (np.abs(second) > small * kernel.arm**3) & np.isfinite(out[:, 2, 2])
-    )
+    return np.asarray(law_holds & well_conditioned(kernel, first, second) & np.isfinite(out[:, 2, 2]))
+
+
+def _forces(work: _Work, load: FloatArray) -> FloatArray:
+    """Strut forces (6, m) that balance forces (3, m) at the tip, after `_eliminate`; in `work.inverse_length`."""
+    force, nine, moment = work.inverse_length, work.nine, work.s[0]
+    a, b = force[:3], force[3:]
+    np.multiply(work.w, load[:, None], out=nine)
+    nine.sum(axis=0, out=a)  # U_A^-1 F
+    np.multiply(work.moments[:, :3], a[None], out=nine)
+    nine.sum(axis=1, out=moment)  # M_A U_A^-1 F
+    np.multiply(work.q, moment[:, None], out=nine)
+    nine.sum(axis=0, out=b)
+    np.multiply(work.t, b[None], out=nine)
+    a += nine.sum(axis=1, out=moment)
+    np.negative(b, out=b)
+    return force
+
+
+def _strut_compliances(kernel: ClosedForm, work: _Work) -> BoolArray:
+    """1 / k(L) into `work.six`; returns where every strut has a stiffness above zero.
+
+    Beyond that the exact route says what is wrong.
+    """
+    np.multiply(work.length, kernel.slope, out=work.six)
+    work.six += kernel.intercept
+    law_holds = work.six.min(axis=0) > 0.0
+    np.divide(1.0, work.six, out=work.six)
+    return np.asarray(law_holds)
 
 
 def _strut_geometry(kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None, work: _Work) -> None:

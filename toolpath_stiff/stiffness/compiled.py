@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.closed_form import SMALL_DETERMINANT, ClosedForm
+from toolpath_stiff.stiffness.closed_form import SMALL_DETERMINANT, ClosedForm, well_conditioned
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -29,24 +29,9 @@ def _joints(kernel: ClosedForm) -> tuple[tuple[tuple[float, ...], ...], tuple[tu
     return arms, frame
 
 
-def _trusted(kernel: ClosedForm, position: FloatArray, det: FloatArray, values: FloatArray) -> BoolArray:
-    """Where the determinants are large enough and every strut has a stiffness above zero."""
-    small = SMALL_DETERMINANT
-    good = (np.abs(det[0]) > small) & (np.abs(det[1]) > small * kernel.arm**3) & np.isfinite(values)
-    box = np.array([position.min(axis=1), position.max(axis=1)]) if position.size else np.zeros((2, 3))
-    return np.asarray(good if _law_holds(kernel, box) else good & False)
-
-
-def _law_holds(kernel: ClosedForm, box: FloatArray) -> bool:
-    """Whether no strut can be so long that the law leaves it no stiffness, for tips in a box (2, 3): low, high corner.
-
-    A distance is largest at a corner of the box, and a strut is longer than that by an arm at the most. Where the box
-    cannot tell, the answer is no: the exact route then looks at every pose.
-    """
-    corners = np.stack(np.meshgrid(*box.T), axis=-1)
-    reach = np.linalg.norm(corners.reshape(-1, 1, 3) - kernel.frame.T, axis=-1).max()
-    longest = reach + np.linalg.norm(kernel.platform, axis=0).max()
-    return bool(kernel.intercept > 0.0 and kernel.intercept + kernel.slope * longest > 0.0)
+def _trusted(kernel: ClosedForm, det: FloatArray, values: FloatArray) -> BoolArray:
+    """Where the determinants are large enough and every strut has a stiffness above zero (values are nan if not)."""
+    return np.asarray(well_conditioned(kernel, det[0], det[1]) & np.isfinite(values))
 
 
 def tip_compliance_columns(
@@ -66,7 +51,8 @@ def tip_compliance_columns(
     Returns
     -------
     compliance, good
-        (6, n) m/N: xx, yy, zz, xy, xz, yz; (n,) as in `closed_form.tip_compliance`.
+        (6, n) m/N: xx, yy, zz, xy, xz, yz, nan where a strut is so long that the law leaves it no stiffness; (n,) as in
+        `closed_form.tip_compliance`.
     """
     from toolpath_stiff.stiffness import compiled_loops
 
@@ -77,7 +63,7 @@ def tip_compliance_columns(
         compiled_loops.tensor_vertical(n, position, arms, frame, kernel.intercept, kernel.slope, out, det)
     else:
         compiled_loops.tensor_tilted(n, position, rotation, arms, frame, kernel.intercept, kernel.slope, out, det)
-    return out, _trusted(kernel, position, det, out[2])
+    return out, _trusted(kernel, det, out[2])
 
 
 def tip_compliance(
@@ -88,25 +74,22 @@ def tip_compliance(
 
     n = len(position)
     compliance, good = np.empty((n, 9)), np.empty(n, dtype=bool)
-    box = np.array([[np.inf] * 3, [-np.inf] * 3])
     arms, frame = _joints(kernel)
     law = (kernel.intercept, kernel.slope)
     smallest = (SMALL_DETERMINANT, SMALL_DETERMINANT * kernel.arm**3)
     rows = np.ascontiguousarray(position)
     if rotation is None:
-        compiled_loops.tensor_rows_vertical(rows, arms, frame, *law, smallest, compliance, good, box)
+        compiled_loops.tensor_rows_vertical(rows, arms, frame, *law, smallest, compliance, good)
     else:
         turns = np.ascontiguousarray(rotation).reshape(n, 9)
-        compiled_loops.tensor_rows_tilted(rows, turns, arms, frame, *law, smallest, compliance, good, box)
-    if n and not _law_holds(kernel, box):
-        good[:] = False
+        compiled_loops.tensor_rows_tilted(rows, turns, arms, frame, *law, smallest, compliance, good)
     return compliance.reshape(n, 3, 3), good
 
 
 def compliance_along_columns(
     kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Compliance along one direction a pose, with what the limits ask for; cheaper than the whole tensor.
+    """Compliance along one direction a pose, with what the limits ask for, in about the time of the tensor alone.
 
     Parameters
     ----------
@@ -135,4 +118,4 @@ def compliance_along_columns(
         compiled_loops.directed_tilted(n, position, rotation, direction, arms, frame, *law, out, det, lengths)
     in_order = np.empty_like(lengths)
     in_order[list(kernel.order)] = lengths
-    return out, np.abs(det[0] * det[1]), in_order, _trusted(kernel, position, det, out)
+    return out, np.abs(det[0] * det[1]), in_order, _trusted(kernel, det, out)

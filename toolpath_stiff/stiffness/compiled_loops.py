@@ -17,7 +17,14 @@ import numpy as np
 # No "nnan", no "ninf": singular poses must come out as such.
 FAST = {"contract", "nsz", "arcp", "reassoc"}
 inline = numba.njit(inline="always", fastmath=FAST)
-loop = numba.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
+
+
+def loop(function):
+    """Compile, and keep the result on disk; where no folder can be written, compile in every process anew."""
+    try:
+        return numba.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
+    except RuntimeError:  # numba looked beside this file and in the user's cache folder: "no locator available"
+        return numba.njit(nogil=True, fastmath=FAST, error_model="numpy")(function)
 
 
 @inline
@@ -70,11 +77,37 @@ def strut(tip, arm, frame):
 
 
 @inline
+def strut_lengths(tip, arms, frame):
+    return (
+        strut(tip, arms[0], frame[0])[2],
+        strut(tip, arms[1], frame[1])[2],
+        strut(tip, arms[2], frame[2])[2],
+        strut(tip, arms[3], frame[3])[2],
+        strut(tip, arms[4], frame[4])[2],
+        strut(tip, arms[5], frame[5])[2],
+    )
+
+
+@inline
 def turned(r, a):
     return (
         r[0] * a[0] + r[1] * a[1] + r[2] * a[2],
         r[3] * a[0] + r[4] * a[1] + r[5] * a[2],
         r[6] * a[0] + r[7] * a[1] + r[8] * a[2],
+    )
+
+
+@inline
+def turned_arms(r, arms, i):
+    """The six arms in base axes, by the rotation matrix in column i."""
+    turn = (r[0, i], r[1, i], r[2, i], r[3, i], r[4, i], r[5, i], r[6, i], r[7, i], r[8, i])
+    return (
+        turned(turn, arms[0]),
+        turned(turn, arms[1]),
+        turned(turn, arms[2]),
+        turned(turn, arms[3]),
+        turned(turn, arms[4]),
+        turned(turn, arms[5]),
     )
 
 
@@ -122,14 +155,11 @@ def six(a, b, c):
 
 @inline
 def compliances(lengths, intercept, slope):
-    return (
-        1.0 / (intercept + slope * lengths[0]),
-        1.0 / (intercept + slope * lengths[1]),
-        1.0 / (intercept + slope * lengths[2]),
-        1.0 / (intercept + slope * lengths[3]),
-        1.0 / (intercept + slope * lengths[4]),
-        1.0 / (intercept + slope * lengths[5]),
-    )
+    """1 / k(L) of the struts; the first is nan, and with it the result, unless all have a stiffness above zero."""
+    k0, k1, k2 = intercept + slope * lengths[0], intercept + slope * lengths[1], intercept + slope * lengths[2]
+    k3, k4, k5 = intercept + slope * lengths[3], intercept + slope * lengths[4], intercept + slope * lengths[5]
+    holds = (k0 > 0.0) & (k1 > 0.0) & (k2 > 0.0) & (k3 > 0.0) & (k4 > 0.0) & (k5 > 0.0)
+    return (1.0 / k0 if holds else np.nan, 1.0 / k1, 1.0 / k2, 1.0 / k3, 1.0 / k4, 1.0 / k5)
 
 
 @inline
@@ -150,19 +180,25 @@ def tensor(tip, arms, frame, intercept, slope, out, det, i):
 
 
 @inline
-def directed(tip, arms, frame, intercept, slope, load, out, det, lengths_out, i):
+def directed(tip, arms, frame, intercept, slope, load, out, det, i):
+    """Compliance along one direction and the determinants; returns the lengths."""
     w, t, moments, q, first, second, lengths = factors(tip, arms, frame)
     c = compliances(lengths, intercept, slope)
     f = forces(w, t, moments, q, load)
     out[i] = six(f, f, c)
     det[0, i] = first
     det[1, i] = second
-    lengths_out[0, i] = lengths[0]
-    lengths_out[1, i] = lengths[1]
-    lengths_out[2, i] = lengths[2]
-    lengths_out[3, i] = lengths[3]
-    lengths_out[4, i] = lengths[4]
-    lengths_out[5, i] = lengths[5]
+    return lengths
+
+
+@inline
+def store(lengths, out, i):
+    out[0, i] = lengths[0]
+    out[1, i] = lengths[1]
+    out[2, i] = lengths[2]
+    out[3, i] = lengths[3]
+    out[4, i] = lengths[4]
+    out[5, i] = lengths[5]
 
 
 @loop
@@ -174,42 +210,34 @@ def tensor_vertical(n, p, arms, frame, intercept, slope, out, det):
 @loop
 def tensor_tilted(n, p, r, arms, frame, intercept, slope, out, det):
     for i in range(np.uint64(0), np.uint64(n)):
-        turn = (r[0, i], r[1, i], r[2, i], r[3, i], r[4, i], r[5, i], r[6, i], r[7, i], r[8, i])
-        moved = (
-            turned(turn, arms[0]),
-            turned(turn, arms[1]),
-            turned(turn, arms[2]),
-            turned(turn, arms[3]),
-            turned(turn, arms[4]),
-            turned(turn, arms[5]),
-        )
+        moved = turned_arms(r, arms, i)
         tensor((p[0, i], p[1, i], p[2, i]), moved, frame, intercept, slope, out, det, i)
+
+
+ROWS = 256  # poses at a time for work arrays and for two passes: some 50 kB, which stay in the second-level cache
 
 
 @loop
 def directed_vertical(n, p, d, arms, frame, intercept, slope, out, det, lengths):
     for i in range(np.uint64(0), np.uint64(n)):
         load = (d[0, i], d[1, i], d[2, i])
-        directed((p[0, i], p[1, i], p[2, i]), arms, frame, intercept, slope, load, out, det, lengths, i)
+        tip = (p[0, i], p[1, i], p[2, i])
+        store(directed(tip, arms, frame, intercept, slope, load, out, det, i), lengths, i)
 
 
 @loop
 def directed_tilted(n, p, r, d, arms, frame, intercept, slope, out, det, lengths):
-    for i in range(np.uint64(0), np.uint64(n)):
-        turn = (r[0, i], r[1, i], r[2, i], r[3, i], r[4, i], r[5, i], r[6, i], r[7, i], r[8, i])
-        moved = (
-            turned(turn, arms[0]),
-            turned(turn, arms[1]),
-            turned(turn, arms[2]),
-            turned(turn, arms[3]),
-            turned(turn, arms[4]),
-            turned(turn, arms[5]),
-        )
-        load = (d[0, i], d[1, i], d[2, i])
-        directed((p[0, i], p[1, i], p[2, i]), moved, frame, intercept, slope, load, out, det, lengths, i)
-
-
-ROWS = 256  # poses that are turned from rows to columns at a time: the work arrays then fit the first-level cache
+    # Two passes, lengths apart: LLVM vectorises a loop only if at most 128 comparisons tell that no row written
+    # overlaps another row (its vectorize-memory-check-threshold). One pass reads 15 rows and writes 9, which needs
+    # 9 * 15 + 9 * 8 / 2 = 171: four times slower, and fast as soon as the threshold is 171.
+    for start in range(0, n, ROWS):
+        first, last = np.uint64(start), np.uint64(min(start + ROWS, n))
+        for i in range(first, last):
+            load = (d[0, i], d[1, i], d[2, i])
+            tip = (p[0, i], p[1, i], p[2, i])
+            directed(tip, turned_arms(r, arms, i), frame, intercept, slope, load, out, det, i)
+        for i in range(first, last):
+            store(strut_lengths((p[0, i], p[1, i], p[2, i]), turned_arms(r, arms, i), frame), lengths, i)
 
 
 @inline
@@ -227,39 +255,33 @@ def scatter(m, c, d, smallest, out, good, base):
 
 
 @inline
-def gather(m, position, base, p, box):
-    """Rows of positions to columns; widens the box (2, 3) that holds them all."""
+def gather(m, position, base, p):
+    """Rows of positions to columns."""
     for i in range(np.uint64(0), np.uint64(m)):
         p[0, i] = position[base + i, 0]
         p[1, i] = position[base + i, 1]
         p[2, i] = position[base + i, 2]
-    for k in range(3):
-        low, high = box[0, k], box[1, k]
-        for i in range(np.uint64(0), np.uint64(m)):
-            low = min(low, p[k, i])
-            high = max(high, p[k, i])
-        box[0, k], box[1, k] = low, high
 
 
 @loop
-def tensor_rows_vertical(position, arms, frame, intercept, slope, smallest, out, good, box):
+def tensor_rows_vertical(position, arms, frame, intercept, slope, smallest, out, good):
     """As `tensor_vertical` with poses in rows: position (n, 3), out (n, 9); `smallest` determinants that are good."""
     p, c, d = np.empty((3, ROWS)), np.empty((6, ROWS)), np.empty((2, ROWS))
     for start in range(0, len(position), ROWS):
         m, base = min(ROWS, len(position) - start), np.uint64(start)
-        gather(m, position, base, p, box)
+        gather(m, position, base, p)
         tensor_vertical(m, p, arms, frame, intercept, slope, c, d)
         scatter(m, c, d, smallest, out, good, base)
 
 
 @loop
-def tensor_rows_tilted(position, rotation, arms, frame, intercept, slope, smallest, out, good, box):
+def tensor_rows_tilted(position, rotation, arms, frame, intercept, slope, smallest, out, good):
     """As `tensor_tilted` with poses in rows: position (n, 3), rotation and out (n, 9)."""
     p, r = np.empty((3, ROWS)), np.empty((9, ROWS))
     c, d = np.empty((6, ROWS)), np.empty((2, ROWS))
     for start in range(0, len(position), ROWS):
         m, base = min(ROWS, len(position) - start), np.uint64(start)
-        gather(m, position, base, p, box)
+        gather(m, position, base, p)
         for i in range(np.uint64(0), np.uint64(m)):
             for k in range(9):
                 r[np.uint64(k), i] = rotation[base + i, np.uint64(k)]
