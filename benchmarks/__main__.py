@@ -15,6 +15,7 @@ for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 import argparse
 import platform
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 from benchmarks.routes import measure_routes
@@ -42,10 +43,19 @@ def main() -> int:
     """Measure and print; `--out FILE` also writes the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--rounds", type=int, default=7, help="interleaved rounds (default: 7)")
+    parser.add_argument("--quick", action="store_true", help="as --rounds 3")
     parser.add_argument("--out", help="write the table to this file as well")
     args = parser.parse_args()
-    route_lines, routes_pass = measure_routes(args.rounds)
-    startup_lines, startup_pass = measure_startup(args.rounds)
+    rounds = 3 if args.quick else args.rounds
+    if rounds < 1:
+        parser.error(f"--rounds {rounds}: at least 1 is needed")
+    missing = [name for name in ("numba", "openseespy") if find_spec(name) is None]
+    if missing:
+        parser.error(
+            f"{' and '.join(missing)} not installed; pip install 'toolpath-stiff[test]' brings all that is timed"
+        )
+    route_lines, routes_pass = measure_routes(rounds)
+    startup_lines, startup_pass = measure_startup(rounds)
     text = "\n".join(["# Benchmark", "", describe_machine(), "", *route_lines, "", *startup_lines, "", BARS, ""])
     print(text)
     if args.out:

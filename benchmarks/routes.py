@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import statistics
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine import Machine, load_machine
 from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core, reference
 from toolpath_stiff.stiffness.model import build_model
@@ -28,10 +30,9 @@ def poses(n: int, tilted: bool) -> tuple[np.ndarray, np.ndarray | None]:
     return position, rotation_matrices(np.deg2rad(rng.uniform(-20, 20, (n, 3)))) if tilted else None
 
 
-def opensees_compliance(machine, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+def opensees_compliance(machine: Machine, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """The same 25-bar truss built and solved in OpenSees, three load cases."""
-    import openseespy.opensees as ops
-
+    ops: Any = importlib.import_module("openseespy.opensees")  # its functions are unknown to a type checker
     nodes = position + platform_nodes(machine.platform_joints) @ rotation.T
     ops.wipe()
     ops.model("basic", "-ndm", 3, "-ndf", 3)
@@ -79,6 +80,9 @@ def methods(tilted: bool) -> list[Method]:
     kernel = closed_form.prepare(machine)
     columns = np.ascontiguousarray(position.T)
     turned = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
+    direction = np.random.default_rng(2).normal(size=(FAST_POSES, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    loads = np.ascontiguousarray(direction.T)
     few = slice(0, PLAIN_POSES)
 
     def plain() -> None:
@@ -97,8 +101,18 @@ def methods(tilted: bool) -> list[Method]:
         ("OpenSees, model rebuilt, pose by pose", PLAIN_POSES, opensees),
         ("exact route (batched LAPACK)", FAST_POSES, route("exact")),
         ("closed form (numpy), whole call", FAST_POSES, route("closed_form")),
+        (
+            "closed form (numpy), one direction and lengths",
+            FAST_POSES,
+            lambda: closed_form.compliance_along(kernel, position, direction, rotation),
+        ),
         ("compiled (numba), whole call", FAST_POSES, route("compiled")),
         ("compiled (numba), poses last", FAST_POSES, lambda: compiled.tip_compliance_columns(kernel, columns, turned)),
+        (
+            "compiled (numba), one direction and lengths, poses last",
+            FAST_POSES,
+            lambda: compiled.compliance_along_columns(kernel, columns, loads, turned),
+        ),
     ]
 
 
