@@ -105,7 +105,7 @@ def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
     InputErrors
         Bad rows, all of them.
     """
-    table = list(_cells(text))
+    table = list(table_lines(text))
     if not table:
         raise InputError("the file is empty", expected="a heading and rows of measurements", file=file)
     (line, heading), body = table[0], table[1:]
@@ -139,7 +139,7 @@ def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
     return RowFile(tuple(rows), frozenset(columns), tuple(notes))
 
 
-def _cells(text: str) -> Iterator[tuple[int, list[str]]]:
+def table_lines(text: str) -> Iterator[tuple[int, list[str]]]:
     """Line number and cells of every line that is neither empty nor a comment."""
     reader = csv.reader(text.splitlines())
     for cells in reader:
@@ -187,10 +187,10 @@ def _all_numbers(body: list[tuple[int, list[str]]], column: int) -> bool:
 
 def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, planned: bool) -> list[Row]:
     """The one reading of a long row, the three of a wide one."""
-    position = tuple(m_from_mm(_number(record, name)) for name in POSITION)
-    angles = tuple(rad_from_deg(_number(record, name)) if name in record else 0.0 for name in ANGLES)
+    position = tuple(m_from_mm(number(record, name)) for name in POSITION)
+    angles = tuple(rad_from_deg(number(record, name)) if name in record else 0.0 for name in ANGLES)
     labels = {name: record.get(name, "") for name in LABELS}
-    force = _optional(record, "force_N")
+    force = optional_number(record, "force_N")
     rows = []
     for direction, stiffness in _readings(record, force, planned):
         rows.append(
@@ -199,11 +199,11 @@ def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, p
                 angles=angles,
                 direction=direction,
                 stiffness=n_per_m_from_n_per_mm(stiffness),
-                sd=n_per_m_from_n_per_mm(_optional(record, "sd_N_per_mm")),
+                sd=n_per_m_from_n_per_mm(optional_number(record, "sd_N_per_mm")),
                 force=force,
-                time=60.0 * _optional(record, "time_min"),
-                temperature=_optional(record, "temperature_C"),
-                tool_extension=m_from_mm(_optional(record, "tool_extension_mm")),
+                time=60.0 * optional_number(record, "time_min"),
+                temperature=optional_number(record, "temperature_C"),
+                tool_extension=m_from_mm(optional_number(record, "tool_extension_mm")),
                 labels=labels,
                 file=file,
                 line=line,
@@ -216,9 +216,9 @@ def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, p
 def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tuple[tuple[float, ...], float]]:
     """Directions and stiffnesses in N/mm."""
     if WIDE[0] in record:
-        return [(axis, _number(record, name)) for axis, name in zip(AXES.values(), WIDE, strict=True)]
-    printed = _optional(record, "stiffness_N_per_mm")
-    displacement = _optional(record, "displacement_um")
+        return [(axis, number(record, name)) for axis, name in zip(AXES.values(), WIDE, strict=True)]
+    printed = optional_number(record, "stiffness_N_per_mm")
+    displacement = optional_number(record, "displacement_um")
     quotient = force / (displacement / 1e3)  # N/mm
     if math.isnan(printed) and math.isnan(quotient) and not planned:
         raise InputError("no stiffness", expected="stiffness_N_per_mm, or force_N and displacement_um")
@@ -232,23 +232,25 @@ def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tu
             f"{force:g} N over {m_from_um(displacement) * 1e6:g} um is {quotient:.4g} N/mm",
             expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm; is the unit right?",
         )
-    return [(_direction(record), quotient if math.isnan(printed) else printed)]
+    return [(direction_of(record), quotient if math.isnan(printed) else printed)]
 
 
-def _direction(record: Mapping[str, str]) -> tuple[float, ...]:
+def direction_of(record: Mapping[str, str]) -> tuple[float, ...]:
+    """Unit vector of `direction`, or of dx,dy,dz."""
     if "direction" in record:
         name = record["direction"].upper().removeprefix("+").removeprefix("-")
         if name not in AXES:
             raise InputError(f"direction {record['direction']!r}", expected="X, Y or Z (others as dx,dy,dz)")
         return AXES[name]
-    vector = [_number(record, name) for name in VECTOR]
+    vector = [number(record, name) for name in VECTOR]
     size = math.hypot(*vector)
     if size == 0.0:
         raise InputError("direction 0,0,0", expected="a vector that points somewhere")
     return tuple(component / size for component in vector)
 
 
-def _number(record: Mapping[str, str], name: str) -> float:
+def number(record: Mapping[str, str], name: str) -> float:
+    """A cell that must hold a finite number within `BOUNDS`."""
     text = record[name]
     try:
         value = float(text)
@@ -263,9 +265,9 @@ def _number(record: Mapping[str, str], name: str) -> float:
     return value
 
 
-def _optional(record: Mapping[str, str], name: str) -> float:
+def optional_number(record: Mapping[str, str], name: str) -> float:
     """A number, or nan where the column is absent or the cell empty."""
-    return _number(record, name) if record.get(name) else math.nan
+    return number(record, name) if record.get(name) else math.nan
 
 
 def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:

@@ -1,0 +1,100 @@
+"""`tps reduce`: raw records of force and displacement to measured stiffnesses."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.cli.arguments import add_json_option
+from toolpath_stiff.errors import InputError
+
+if TYPE_CHECKING:
+    from toolpath_stiff.updating.raw_records import Loop, LoopFigures
+
+EPILOG = """\
+columns of RAW.csv:
+  x_mm,y_mm,z_mm,direction     where and along what (X, Y, Z; or dx,dy,dz), optionally a_deg,b_deg,c_deg
+  jog_um                       how far the machine was told to move from zero
+  force_N,displacement_um      gauge and indicator, positive the way the jog counts
+  point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
+
+Records in the order taken, jogging 0, +200, -200, 0 um as ASME B5.54 and the paper do; those of one point, direction,
+set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's equation 12).
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument("raw", metavar="RAW.csv", help="raw records")
+    parser.add_argument(
+        "--out", metavar="FILE", help="measurement file to write (default: <name>_measurements.csv); loops go beside it"
+    )
+    parser.add_argument("--no-plots", action="store_true", help="do not draw the loops")
+    add_json_option(parser, "print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Reduce, write, print."""
+    from toolpath_stiff.files import read_text, write_atomically
+    from toolpath_stiff.updating.raw_records import measurement_csv, read_raw, reduce_loops
+
+    loops = read_raw(read_text(args.raw, "raw records"), args.raw)
+    figures = reduce_loops(loops, args.raw)
+    out = Path(args.out or f"{Path(args.raw).stem}_measurements.csv")
+    if out.exists() and out.samefile(args.raw):
+        raise InputError(f"--out {str(out)!r} is the raw file itself", hint="name another file")
+    picture = None if args.no_plots else out.with_name(f"{out.stem}_loops.png")
+    png = b""
+    if picture is not None:
+        from toolpath_stiff.report.loops_picture import loops_png
+
+        png = loops_png(loops, figures, Path(args.raw).name)
+    write_atomically(out, measurement_csv(loops, figures))
+    if picture is not None:
+        write_atomically(picture, png)
+    written = [str(path) for path in (out, picture) if path is not None]
+    if args.json:
+        print(json.dumps({"loops": describe(loops, figures), "files": written}, indent=2, ensure_ascii=False))
+    else:
+        print(table(loops, figures))
+        print(f"\nwrote {' and '.join(written)}")
+    return 0
+
+
+def describe(loops: list[Loop], figures: list[LoopFigures]) -> list[dict[str, Any]]:
+    """One dictionary a loop in the shop's units; what a loop cannot say is null."""
+    from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
+    from toolpath_stiff.updating.raw_records import shop_figures
+
+    found = []
+    for loop, one in zip(loops, figures, strict=True):
+        numbers = {
+            "stiffness_N_per_mm": n_per_mm_from_n_per_m(one.stiffness),
+            "force_N": one.force,
+            "deflection_um": um_from_m(one.deflection),
+            **shop_figures(one),
+        }
+        shown = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
+        found.append({"loop": loop.title, "line": loop.line, **shown})
+    return found
+
+
+def table(loops: list[Loop], figures: list[LoopFigures]) -> str:
+    """The figures for people."""
+    heading = ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
+    rows = [heading]
+    for one in describe(loops, figures):
+        cells = [one["loop"], f"{one['stiffness_N_per_mm']:.0f}", f"{one['force_N']:.0f}"]
+        for name in ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um"):
+            cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")
+        rows.append(tuple(cells))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    )
