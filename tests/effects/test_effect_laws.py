@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -164,3 +165,17 @@ def test_choices_are_never_fitted():
         ("gauge_scale", "setup"),
     }
     assert all("riser" in neutral_values(e).values() for n, e in all_effects().items() if (n, "setup") in chosen)
+
+
+def test_the_catalogue_page_lists_every_effect_parameter_and_bound():
+    page = (Path(__file__).parents[2] / "docs" / "effects_catalogue.md").read_text("utf-8")
+    rows = {line.split("`")[1]: line for line in page.splitlines() if line.startswith("| `")}
+    assert tuple(rows) == CATALOGUE
+    for name, effect in all_effects().items():
+        cells = rows[name].split(" | ")
+        assert cells[1] == effect.link
+        for p in effect.parameters:
+            assert f"`{p.name}`" in rows[name]
+            if not p.discrete:
+                low, high = (f"{bound:g}".replace("e+0", "e") for bound in p.bounds)
+                assert f"{low} to {high}" in rows[name]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -273,3 +275,11 @@ def test_effects_whose_column_is_missing_do_nothing(write):
     plain = model_stiffness(model_with(), data)
     for name, values in (("thermal_drift", {"rate": 1e-6}), ("setup_compliance", {"x": 1e-8})):
         assert np.array_equal(model_stiffness(model_with(name, **values), data), plain)
+
+
+def test_the_walk_through_of_the_documentation_works():
+    page = (Path(__file__).parents[2] / "docs" / "measurements.md").read_text("utf-8")
+    code = page.split("```python\n")[1].split("```")[0]
+    told: dict[str, np.ndarray] = {}
+    exec(code, told)
+    assert f"{100 * np.abs(told['error']).mean():.2f} %" in code
