@@ -8,7 +8,7 @@ kinematics, its own mechanics (assembled elements, displacement method).
 (['weak_strut'], 42)
 """
 
-from toolpath_stiff.rig.case import Case, draw_case, make_case, testable
+from toolpath_stiff.rig.case import Case, draw_case, effects_of_layout, make_case
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import measure_again, new_exercise, reveal
 from toolpath_stiff.rig.noise import Nuisances
@@ -22,9 +22,9 @@ __all__ = [
     "Nuisances",
     "csv_text",
     "draw_case",
+    "effects_of_layout",
     "make_case",
     "measure_again",
     "new_exercise",
     "reveal",
-    "testable",
 ]

@@ -62,7 +62,7 @@ class Case:
     nuisances: Nuisances
 
 
-def testable(layout: str) -> tuple[str, ...]:
+def effects_of_layout(layout: str) -> tuple[str, ...]:
     """Effects of the catalogue that a layout has the columns for; the paper's has no `time_min`."""
     return tuple(name for name in CATALOGUE if layout != "paper" or name != "thermal_drift")
 
@@ -211,7 +211,7 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
     """Names of what is hidden."""
     if hidden is None:
         hidden = str(rng.choice(list(BLIND), p=list(BLIND.values())))
-    known = testable(layout)
+    known = effects_of_layout(layout)
     if hidden == "none":
         return ()
     if hidden == "one":

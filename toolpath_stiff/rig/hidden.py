@@ -7,7 +7,7 @@ rows of a campaign into stiffnesses, `readings` adds what the instruments do to 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from toolpath_stiff.rig.outside import Oddity, extra_joint, extra_table, reading
 from toolpath_stiff.rig.structure import Geometry, Links, secant_compliance
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 StrArray = NDArray[np.str_]
 
 HERTZ_LOAD = 500.0  # N, load at which contact_nonlinearity's compliance is quoted (assumed; effects catalogue)
@@ -54,6 +55,10 @@ class Rows:
     time: FloatArray
     elapsed: FloatArray
     setup: StrArray
+
+    def take(self, index: IntArray) -> Rows:
+        """Some of the rows."""
+        return Rows(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
 def _zeros(*shape: int) -> FloatArray:
@@ -131,6 +136,24 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
 
 def true_stiffness(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m, secant stiffness between tool and workpiece along the load."""
+    first, which = _distinct(hidden, rows)
+    return np.asarray(_stiffness_row_by_row(nominal, hidden, rows.take(first))[which])
+
+
+def _distinct(hidden: HiddenMachine, rows: Rows) -> tuple[IntArray, IntArray]:
+    """First row of each mechanical state and the state of each row: repeats are solved once."""
+    states = [rows.position, rows.angles, rows.direction, rows.extension[:, None]]
+    states.append(np.unique(rows.setup, return_inverse=True)[1].reshape(-1, 1).astype(float))
+    odd = hidden.oddity.kind if hidden.oddity else ""
+    if hidden.hertz or hidden.clearance:
+        states.append(rows.force[:, None])
+    if odd == "warming_leg":
+        states.append(rows.elapsed[:, None])
+    _, first, which = np.unique(np.concatenate(states, axis=1), axis=0, return_index=True, return_inverse=True)
+    return first, which.ravel()
+
+
+def _stiffness_row_by_row(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     turned = rotations(rows.angles)
     lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
     place = _true_geometry(nominal, hidden, rows, turned, lengths)

@@ -77,7 +77,7 @@ def strut_block(odd: Oddity | None, stiffness: FloatArray, lengths: FloatArray, 
         coupled = odd.size * np.sqrt(1.0 / (stiffness[:, first] * stiffness[:, second]))
         flexibility = (1.0 / stiffness)[:, :, None] * np.eye(6)
         flexibility[:, first, second] = flexibility[:, second, first] = coupled
-        block = np.linalg.inv(flexibility)
+        return np.asarray(np.linalg.inv(flexibility))
     return block
 
 
