@@ -63,8 +63,9 @@ class Case:
 
 
 def effects_of_layout(layout: str) -> tuple[str, ...]:
-    """Effects of the catalogue that a layout has the columns for; the paper's has no `time_min`."""
-    return tuple(name for name in CATALOGUE if layout != "paper" or name != "thermal_drift")
+    """Effects of the catalogue that a layout has the columns for: the paper's has neither `force_N` nor `time_min`."""
+    lacking = ("joint_clearance", "contact_nonlinearity", "thermal_drift") if layout == "paper" else ()
+    return tuple(name for name in CATALOGUE if name not in lacking)
 
 
 def make_case(
@@ -172,7 +173,7 @@ def measure(
         measured[name] = values
         if name in ("direction", "dz") and "stiffness_N_per_mm" not in measured:
             measured["stiffness_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
-            if stated_sd:
+            if stated_sd and max(nuisances.repeat, nuisances.clamping) > 0.0:
                 measured["sd_N_per_mm"] = np.round(n_per_mm_from_n_per_m(reading_sd(stiffness, nuisances)))
     return measured
 

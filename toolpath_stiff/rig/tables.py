@@ -12,7 +12,7 @@ import numpy as np
 
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import read_text
-from toolpath_stiff.rig.campaign import AXES, POSE, Table
+from toolpath_stiff.rig.campaign import AXES, DEFAULT_SETUP, POSE, Table
 from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.units import m_from_mm, rad_from_deg
@@ -27,7 +27,8 @@ NUMBERS: dict[str, tuple[float, float, float | None]] = {
     "tool_extension_mm": (-1e4, 1e4, 0.0),
     "temperature_C": (-50.0, 100.0, 20.0),
 }
-WHOLE = ("clamp", "repeat", "point")
+WHOLE = ("clamp",)
+LABELS = ("repeat", "point")  # any text
 WORDS = ("setup", "loop")
 RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm")
 TIP_LOOPS = ("", "tip")  # the rig's only indicator: tool tip against workpiece
@@ -69,7 +70,7 @@ def read_plan(file: str, nominal: Nominal) -> Table:
                 values.append(_value(name, cell))
             except ValueError as error:
                 errors.append(InputError(f"{name} {cell!r}", expected=str(error), file=file, line=line))
-        table[name] = values if name in (*WORDS, "direction") else np.array(values)
+        table[name] = values if name in (*LABELS, *WORDS, "direction") else np.array(values)
     if errors:
         raise InputErrors(errors)
     _check_rows(table, [line for line, _ in body], nominal, file)
@@ -78,7 +79,7 @@ def read_plan(file: str, nominal: Nominal) -> Table:
 
 
 def _check_heading(heading: list[str], file: str, line: int) -> None:
-    known = (*NUMBERS, *WHOLE, *WORDS, *RESULTS, "direction")
+    known = (*NUMBERS, *WHOLE, *LABELS, *WORDS, *RESULTS, "direction")
     for name in heading:
         if name not in known or heading.count(name) > 1:
             wrong = "unknown column" if name not in known else "column given twice:"
@@ -101,8 +102,10 @@ def _value(name: str, cell: str) -> float | int | str:
         if cell not in TIP_LOOPS:
             raise ValueError("an empty cell or 'tip': the rig has its indicator at the tool tip alone")
         return cell
-    if name in WORDS:
-        return cell or "table"
+    if name in LABELS:
+        return cell
+    if name == "setup":
+        return cell or DEFAULT_SETUP
     if name in WHOLE:
         if not cell.isdecimal():
             raise ValueError("a whole number")
