@@ -114,10 +114,34 @@ def test_a_longer_tool_leaves_the_struts_and_moves_the_tip():
 
 
 def test_platform_radius_as_written_in_the_machine_file():
+    """The wider machine, standing where struts of the lengths of the nominal one put it."""
     wider = parse_machine(NIST_TEXT.replace("[304.77,", "[306.77,"), "wider.toml")
-    pose = random_poses(6, 36)
-    found = tip_compliance(model_with("platform_radius_error", error=0.002), *pose)
-    assert found == pytest.approx(tip_compliance(build_model(wider), *pose), rel=1e-12)
+    position, rotation = random_poses(6, 36)
+    model = model_with("platform_radius_error", error=0.002)
+    path = load_path(model, position, rotation)
+    nominal = solve_struts(nist(), position, rotation)
+    assert path.struts.lengths == pytest.approx(nominal.lengths, abs=1e-10)  # a hundred times Newton's tolerance
+    missed = np.linalg.norm(path.position - position, axis=1)
+    assert (missed > 1e-4).all() and (missed < 0.02).all()
+    expected = tip_compliance(build_model(wider), path.position, path.rotation)
+    assert tip_compliance(model, position, rotation) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["tool_length_error", "platform_radius_error"])
+@pytest.mark.parametrize("error", [-0.060, 0.060])
+def test_geometry_at_its_bounds_still_has_a_pose(name, error):
+    position, rotation = random_poses(60, 38, tilt_deg=15.0)
+    assert np.isfinite(tip_compliance(model_with(name, error=error), position, rotation)).all()
+
+
+def test_geometry_unknown_to_the_control_with_tools_of_two_lengths():
+    position, rotation = random_poses(4, 39)
+    lengths = np.array([np.nan, 0.3, 0.15, 0.3])
+    model = model_with("tool_length_error", error=0.02)
+    found = tip_compliance(model, position, rotation, lengths)
+    for i in range(4):
+        one = tip_compliance(model, position[i : i + 1], rotation[i : i + 1], float(lengths[i]))
+        assert found[i] == pytest.approx(one[0], rel=1e-9)
 
 
 def test_a_joint_on_the_tool_axis_stays_there():

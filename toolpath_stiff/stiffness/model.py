@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.forward import forward_kinematics
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath, read_parameters
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.stiffness.effects.registry import find_effect, known_effects
@@ -39,11 +41,14 @@ class StiffnessModel:
         Effects that act on the machine, platform bars included.
     instruments
         Effects that act on readings; only comparisons with measurements use them.
+    control
+        The machine that the control computes with, where effects make the true one differ unknown to it; else None.
     """
 
     machine: Machine
     effects: tuple[ActiveEffect, ...] = ()
     instruments: tuple[ActiveEffect, ...] = ()
+    control: Machine | None = None
 
     @property
     def load_dependent(self) -> bool:
@@ -100,9 +105,13 @@ def build_model(
                 f"machine {machine.name}: effect {name} is given twice",
                 hint="keep one of them (finite platform bars count as platform_flexibility)",
             )
+    control = machine
     for active in acting:
         machine = active.effect.geometry(machine, active.values)
-    return StiffnessModel(machine, tuple(acting), tuple(reading))
+        if not active.effect.unknown_to_control:
+            control = active.effect.geometry(control, active.values)
+    deceived = any(active.effect.unknown_to_control for active in acting)
+    return StiffnessModel(machine, tuple(acting), tuple(reading), control if deceived else None)
 
 
 def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
@@ -137,11 +146,9 @@ def load_path(
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     n = len(tip)
     length = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    for active in model.effects:
-        offset = active.effect.tip_offset(active.values)
-        if offset is not None:
-            tip = tip + (offset if rotation is None else np.asarray(rotation, dtype=float) @ offset)
     one_length = length[0] if n and (np.isnan(length).all() or np.ptp(length) == 0.0) else length
+    if model.control is not None and n:
+        tip, rotation = _where_control_goes(model, tip, rotation, length)
     struts = solve_struts(model.machine, tip, rotation, one_length)
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     return LoadPath(
@@ -156,3 +163,20 @@ def load_path(
         time=time,
         temperature=temperature,
     )
+
+
+def _where_control_goes(
+    model: StiffnessModel, position: FloatArray, rotation: ArrayLike | None, tool_length: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """True tips and orientations: the struts get the lengths that the control computes for the programmed poses.
+
+    Raises `InputError` where the true machine has no pose with these lengths near the programmed one.
+    """
+    assert model.control is not None
+    turn = np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (len(position), 3, 3))
+    lengths = solve_struts(model.control, position, turn, tool_length).lengths
+    poses = np.concatenate([position, roll_pitch_yaw(turn)], axis=1)
+    for tool in np.unique(tool_length):  # nan, the reference tool, counts as one value
+        rows = np.isnan(tool_length) if np.isnan(tool) else tool_length == tool
+        poses[rows] = forward_kinematics(model.machine, lengths[rows], poses[rows], float(tool))
+    return poses[:, :3], rotation_matrices(poses[:, 3:])

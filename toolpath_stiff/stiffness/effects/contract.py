@@ -150,6 +150,9 @@ class Effect:
         Columns of the measurements without which it cannot be tested.
     load_dependent
         Whether the compliance depends on the size of the load; it is then the secant one.
+    unknown_to_control
+        Of a geometry effect: whether the control computes with the geometry before it. The struts then get the
+        lengths of the programmed pose on that geometry, and the platform goes where they put it.
     """
 
     name: ClassVar[str]
@@ -160,6 +163,7 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]]
     needs: ClassVar[tuple[str, ...]] = ()
     load_dependent: ClassVar[bool] = False
+    unknown_to_control: ClassVar[bool] = False
 
     def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
         """(n, 6) m/N in series with each strut. `p`: parameter name -> SI value."""
@@ -175,10 +179,6 @@ class Effect:
 
     def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
         """(n, 6, 6) between platform and base about the tip, parallel to the struts, base axes."""
-        return None
-
-    def tip_offset(self, p: Mapping[str, float]) -> FloatArray | None:
-        """(3,) m, platform axes: where the true tip lies, seen from the programmed one."""
         return None
 
     def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:

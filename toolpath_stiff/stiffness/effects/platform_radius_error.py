@@ -11,10 +11,10 @@ from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 
 
 class PlatformRadiusError(Effect):
-    """Every platform joint is moved outwards from the tool axis.
+    """Every platform joint is moved outwards from the tool axis, unknown to the control.
 
-    The pose is taken as programmed. A control with the wrong radius would miss it by about the error itself, which
-    changes the stiffness by a tenth of what the joints' new places do.
+    The platform then misses the programmed pose, a little with a vertical spindle, and so much when it is tilted that
+    this changes the stiffness as strongly as the joints' places themselves.
     """
 
     name = "platform_radius_error"
@@ -22,6 +22,7 @@ class PlatformRadiusError(Effect):
     link = "geometry"
     equation = "P_i += e (P_ix, P_iy, 0) / |(P_ix, P_iy)|"
     source = "geometry"
+    unknown_to_control = True
     parameters = (
         Parameter(
             name="error",

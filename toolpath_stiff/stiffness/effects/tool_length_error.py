@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
-
-FloatArray = NDArray[np.float64]
 
 
 class ToolLengthError(Effect):
@@ -21,6 +18,7 @@ class ToolLengthError(Effect):
     link = "geometry"
     equation = "r_i += R (0, 0, e), tip -= R (0, 0, e): the struts stay, their arms about the tip grow"
     source = "geometry"
+    unknown_to_control = True
     parameters = (
         Parameter(
             name="error",
@@ -32,10 +30,6 @@ class ToolLengthError(Effect):
             meaning="true tool length less the entered one",
         ),
     )
-
-    def tip_offset(self, p: Mapping[str, float]) -> FloatArray | None:
-        """The true tip lies below the programmed one."""
-        return np.array([0.0, 0.0, -p["error"]])
 
     def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
         """Platform joints further above the tip."""

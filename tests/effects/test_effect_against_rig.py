@@ -1,0 +1,71 @@
+"""The catalogue against the rig: a displacement method with nodes, kinematics and machine reader of its own.
+
+They share the physics by name and no code (`test_layers.py` forbids it), so that agreement is not of one's own making.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.effects.cases import CATALOGUE, all_effects, model_with
+from tests.stiffness.cases import nist
+from toolpath_stiff.rig.campaign import rows_of, tilted_campaign
+from toolpath_stiff.rig.effects import with_effect
+from toolpath_stiff.rig.hidden import HiddenMachine, readings
+from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model
+from toolpath_stiff.updating.measurements import model_stiffness, read_measurements
+
+SIZES = {
+    "spindle_compliance": {"radial": 5.0, "axial": 2.0},
+    "platform_flexibility": {"bar_stiffness": 3e8},
+    "joint_compliance": {"compliance": 3.0},
+    "joint_moment_stiffness": {"stiffness": 4e5},
+    "joint_clearance": {"lost_motion": 2.0},
+    "contact_nonlinearity": {"compliance": 3.0},
+    "strut_law": {"curvature": 10.0},
+    "weak_strut": {"strut": 3, "factor": 0.7},
+    "frame_compliance": {"vertex": 2, "radial": 6.0, "vertical": 4.0},
+    "table_compliance": {"x": 3.0, "y": 2.0, "z": 1.0, "rocking": 2.0},
+    "setup_compliance": {"setup": "riser", "x": 3.0, "y": 2.0, "z": 1.0},
+    "tool_length_error": {"error": 20.0},
+    "platform_radius_error": {"error": 2.0},
+    "gauge_scale": {"direction": 3, "setup": "", "scale": 8.0},
+    "thermal_drift": {"rate": 0.02},
+}
+# Relative. Node springs and rigid penalties cost the assembly some digits, no more.
+EXACT = 1e-6
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """The rig's tilted layout: its own rows, and the same read back from a measurement file."""
+    nominal = load_nominal("nist")
+    table = tilted_campaign(nominal, np.random.default_rng(5))
+    columns = {name: values for name, values in table.items() if name != "stiffness_N_per_mm"}
+    lines = [",".join(columns)] + [",".join(str(cell) for cell in row) for row in zip(*columns.values(), strict=True)]
+    file = tmp_path_factory.mktemp("rig") / "plan.csv"
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return nominal, rows_of(table), read_measurements(file, nist(), planned=True)
+
+
+def ours(name: str) -> StiffnessModel:
+    effect = all_effects()[name]
+    values = {p.name: SIZES[name][p.name] * (p.si if not p.discrete else 1) for p in effect.parameters}
+    return build_model(nist(), extra=[ActiveEffect(effect, values)])
+
+
+def test_without_an_effect(campaign):
+    nominal, rows, data = campaign
+    assert model_stiffness(model_with(), data) == pytest.approx(readings(nominal, HiddenMachine(), rows), rel=EXACT)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_the_same_effect_in_both(campaign, name):
+    nominal, rows, data = campaign
+    expected = readings(nominal, with_effect(HiddenMachine(), name, SIZES[name]), rows)
+    found = model_stiffness(ours(name), data)
+    plain = readings(nominal, HiddenMachine(), rows)
+    assert np.abs(expected / plain - 1.0).max() > 5e-3  # it is there
+    assert np.abs(found / expected - 1.0).max() < EXACT
