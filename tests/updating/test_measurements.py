@@ -14,6 +14,7 @@ from tests.stiffness.cases import nist, table_1_positions, table_1_stiffness
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.stiffness.effects import find_effect, known_effects
 from toolpath_stiff.updating.measurements import model_stiffness, read_measurements
+from toolpath_stiff.updating.raw_records import read_raw
 
 SHORT = "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm\n"
 FULL = (
@@ -190,6 +191,7 @@ def test_all_bad_rows_are_named_none_dropped(write):
     ("text", "message"),
     [
         ("", "the file is empty"),
+        (SHORT + '"' + "0" * 200_000, "not a CSV file"),
         (SHORT, "no rows below the heading"),
         ("x_mm,y_mm,z_mm,direction\n0,0,800,X\n", "no measured stiffness"),
         ("x_mm,y_mm,direction,stiffness_N_per_mm\n0,0,X,40000\n", "column z_mm is missing"),
@@ -283,3 +285,25 @@ def test_the_walk_through_of_the_documentation_works():
     told: dict[str, np.ndarray] = {}
     exec(code, told)
     assert f"{100 * np.abs(told['error']).mean():.2f} %" in code
+
+
+CELLS = st.sampled_from(
+    ["0", "800", "-1", "1e400", "nan", "", "X", '"', "#", "\x00", "40000", "\ufeff", "4,5", "ä", "1_0"]
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(rows=st.lists(st.lists(CELLS, min_size=4, max_size=6), max_size=4), long=st.booleans())
+def test_whatever_stands_in_a_file_is_read_or_refused(tmp_path_factory, rows, long):
+    """Nothing but an input error, with its file, comes out of a broken file."""
+    heading = SHORT if long else "x_mm,y_mm,z_mm,direction,jog_um,force_N,displacement_um\n"
+    text = heading + "\n".join(",".join(row) for row in rows)
+    file = tmp_path_factory.mktemp("m") / "data.csv"
+    file.write_text(text, encoding="utf-8")
+    try:
+        if long:
+            assert len(read_measurements(file, nist())) >= 1
+        else:
+            assert len(read_raw(text, "data.csv")) >= 1
+    except (InputError, InputErrors) as error:
+        assert "data.csv" in str(error)

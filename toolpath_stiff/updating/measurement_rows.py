@@ -105,7 +105,7 @@ def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
     InputErrors
         Bad rows, all of them.
     """
-    table = list(table_lines(text))
+    table = list(table_lines(text, file))
     if not table:
         raise InputError("the file is empty", expected="a heading and rows of measurements", file=file)
     (line, heading), body = table[0], table[1:]
@@ -139,12 +139,15 @@ def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
     return RowFile(tuple(rows), frozenset(columns), tuple(notes))
 
 
-def table_lines(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Line number and cells of every line that is neither empty nor a comment."""
+def table_lines(text: str, file: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of every line that is neither empty nor a comment. Raises `InputError`."""
     reader = csv.reader(text.splitlines())
-    for cells in reader:
-        if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
-            yield reader.line_num, cells
+    try:
+        for cells in reader:
+            if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
+                yield reader.line_num, cells
+    except csv.Error as error:  # a quote that never ends, say
+        raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
 
 
 def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:

@@ -121,7 +121,7 @@ def read_raw(text: str, file: str) -> list[Loop]:
     InputErrors
         Bad records, all of them.
     """
-    table = list(table_lines(text))
+    table = list(table_lines(text, file))
     if not table:
         raise InputError("the file is empty", expected="a heading and raw records", file=file)
     (line, heading), body = table[0], table[1:]
