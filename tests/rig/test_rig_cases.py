@@ -13,6 +13,7 @@ from toolpath_stiff.rig.campaign import clamp_of, rows_of
 from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.noise import disturb_readings
 from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.size import Covariance
 
 NIST = load_nominal("nist")
 
@@ -108,6 +109,16 @@ def test_two_percent_of_the_readings_are_outliers():
     # Beyond four standard deviations: 6e-5 of a normal, 2 Q(1) = 31.7 % of the wide ones; three sampling errors.
     expected = 0.02 * 0.3173 + 0.98 * 6.3e-5
     assert (np.abs(logs) > 4.0).mean() == pytest.approx(expected, abs=3.0 * np.sqrt(expected / 100_000))
+
+
+def test_whitened_length_against_the_dense_covariance():
+    rng = np.random.default_rng(4)
+    clamps = np.unique(rng.integers(0, 20, 100), return_inverse=True)[1]
+    spread, x = rng.normal(size=(100, 8)), rng.normal(size=100)
+    dense = 0.02**2 * np.eye(100) + 0.01**2 * (clamps[:, None] == clamps) + spread @ spread.T
+    expected = np.sqrt(x @ np.linalg.solve(dense, x))
+    # The dense matrix has a condition number of 1e6.
+    assert Covariance(clamps, spread, Nuisances()).length(x) == pytest.approx(expected, rel=1e-8)
 
 
 def test_strut_spread_and_joint_errors_over_many_machines():
