@@ -76,6 +76,13 @@ def test_blind_sizes_reach_from_just_detectable_to_30_percent():
     assert 3.5 < seen.min() < 6.0
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_a_strength_that_grows_faster_than_in_proportion_still_ends_at_30_percent(seed):
+    """A weak strut's compliance grows without bound as its stiffness falls."""
+    effect = make_case(seed, "paper", "weak_strut", size=0.3)[1]["effects"][0]
+    assert effect["size"] < 0.30 * 1.025  # the search stops within 2 %, parameters are rounded to four digits
+
+
 def test_two_effects_and_blind_draws():
     _, truth = make_case(11, "tilted", "two")
     assert len(set(truth["hidden"])) == 2

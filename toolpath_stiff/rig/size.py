@@ -23,6 +23,7 @@ from toolpath_stiff.rig.nominal import Nominal
 FloatArray = NDArray[np.float64]
 
 LARGEST = 0.30  # rms change of ln stiffness
+LARGEST_SINGLE = 1.0  # change of one reading: whoever reads nearly three times the others throws it away (assumed)
 # Whitened length of an effect's signature, beside strut law and nuisances, that is found with 80 % power at 5 %
 # among some twenty candidates: z(1 - 0.0025/2) + z(0.8) = 3.02 + 0.84 (normal quantiles, Bonferroni).
 DETECTABLE = 3.9
@@ -40,11 +41,12 @@ class Scale:
         self.covariance = Covariance(clamps, _spread(self, nuisances), nuisances)
 
     def change(self, machine: HiddenMachine) -> FloatArray:
-        """(n,) change of ln stiffness; infinite where an indicator would run backwards."""
+        """(n,) change of ln stiffness; infinite beyond `LARGEST_SINGLE`, or where an indicator would run backwards."""
         shown = readings(self.nominal, machine, self.rows)
         with np.errstate(invalid="ignore", divide="ignore"):
             logs = np.log(shown)
-        return np.where(np.isfinite(logs), logs - self.base, math.inf)
+        change = np.where(np.isfinite(logs), logs - self.base, math.inf)
+        return np.where(np.abs(change) <= LARGEST_SINGLE, change, math.inf)
 
     def draw(self, name: str, size: float | None, rng: Generator) -> tuple[dict[str, Any], dict[str, float]]:
         """Parameters, and their size and detectability."""
@@ -68,17 +70,17 @@ class Scale:
 
         The change grows about in proportion to the strength, so scaling the strength by what is missing converges.
         """
-        low, high, strength = 0.0, 1.0, start
+        low, high, strength = 0.0, math.inf, start
         change = np.zeros(len(self.base))
-        for _ in range(12):
+        for _ in range(25):
             change = self.change(with_effect(HiddenMachine(), name, at_strength(name, shape, strength)))
             rms = _rms(change)
             if abs(rms - size) <= 0.02 * size or (rms < size and strength == 1.0):
                 break
             low, high = (strength, high) if rms < size else (low, strength)
-            wanted = strength * size / rms if 0.0 < rms < math.inf else 0.5 * strength
-            # Where the last step overshot the bracket, halve it.
-            strength = min(wanted, 1.0) if low < wanted < high or high == 1.0 else 0.5 * (low + high)
+            wanted = min(strength * size / rms, 1.0) if 0.0 < rms < math.inf else 0.5 * strength
+            # A step that leaves the bracket is replaced by halving the bracket.
+            strength = wanted if low < wanted < high else 0.5 * (low + min(high, 1.0))
         return strength, change
 
     def _detectability(self, change: FloatArray) -> float:
