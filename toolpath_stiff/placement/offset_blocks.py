@@ -1,0 +1,94 @@
+"""A placement as offsets to key in at the control: LinuxCNC's `G10 L2` and, for Fanuc-style controls, G54 with G68.
+
+Both turn X and Y alone, about the vertical. So they express a placement of vertical tools in an untilted set-up, and
+nothing else; for the rest the program itself has to be rewritten.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpath_stiff.machine.model import Pose
+from toolpath_stiff.nc.codes import WORK_OFFSETS, code_name
+from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.words import read_block
+from toolpath_stiff.units import deg_from_rad, mm_from_m
+
+OTHER_OFFSETS = WORK_OFFSETS[1:]
+VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
+USE_WRITE = "use --write, which transforms the program itself"
+
+
+@dataclass(frozen=True)
+class OffsetBlocks:
+    """What to key in, "" where the control cannot express the placement; the reason is then beside it."""
+
+    linuxcnc: str
+    fanuc: str
+    linuxcnc_reason: str = ""
+    fanuc_reason: str = ""
+
+
+def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> OffsetBlocks:
+    """Offset blocks that put a program at a placement.
+
+    Parameters
+    ----------
+    program
+        The program; its own G10 and its work offsets decide whether a G54 of the operator's suffices.
+    placement
+        x, y, z in m, A, B, C in rad: where program zero shall sit, as `--origin` takes it.
+    decimals
+        Of the numbers, in mm and degrees.
+
+    Notes
+    -----
+    `G10 L2 P1 R` turns X and Y about G54's zero (LinuxCNC manual, "G10 L2"); it goes before the first motion. `G68 X0
+    Y0 R` turns the G17 plane about program zero (Fanuc's manuals, "Coordinate system rotation"); it goes after G54 and
+    G17, and holds until G69. The numbers of G54 are millimetres.
+    """
+    reason = _not_about_z(program, placement) or _not_g54_alone(program)
+    if reason:
+        return OffsetBlocks("", "", reason, reason)
+    x, y, z = (_number(mm_from_m(v), decimals) for v in placement[:3])
+    turn = _number(deg_from_rad(placement[5]), decimals)
+    linuxcnc = f"G21 G10 L2 P1 X{x} Y{y} Z{z} R{turn}"
+    if turn == "0":
+        return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}")
+    upright = np.abs(program.moves.arc_normal[:, :2]).max(initial=0.0) < VERTICAL
+    if not upright:
+        return OffsetBlocks(linuxcnc, "", "", f"G68 does not turn arcs of G18 and G19: {USE_WRITE}")
+    return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}\nG17 G54 G68 X0 Y0 R{turn}")
+
+
+def _not_about_z(program: Program, placement: Pose) -> str:
+    """Why a turn of X and Y cannot express the placement, or ""."""
+    if max(abs(placement[3]), abs(placement[4])) > VERTICAL:
+        return f"the set-up is tilted, and work offsets turn X and Y alone: {USE_WRITE}"
+    moves = program.moves
+    tilted = np.flatnonzero(np.abs(np.concatenate([moves.start, moves.end], axis=1)[:, [3, 4, 5, 9, 10, 11]]).max(1))
+    if placement[5] and len(tilted):
+        line = moves.line[tilted[0]]
+        return f"the tool is tilted (line {line}), and work offsets turn X and Y, not its axis: {USE_WRITE}"
+    return ""
+
+
+def _not_g54_alone(program: Program) -> str:
+    """Why setting G54 would not move the whole program, or ""."""
+    for number, text in enumerate(program.source, 1):
+        if "5" not in text and "10" not in text:
+            continue  # neither a work offset nor G10
+        for word in read_block(text, number, program.name).words:
+            code = code_name(word.letter, word.value)
+            if code in OTHER_OFFSETS:
+                return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"
+            if code == "G10":
+                return f"the program sets offsets itself (G10, line {number}): {USE_WRITE}"
+    return ""
+
+
+def _number(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
+    return "0" if text in ("-0", "") else text
