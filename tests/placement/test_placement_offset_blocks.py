@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from tests.nc import rs274
 from toolpath_stiff.analysis import path_analysis
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.path import place
 from toolpath_stiff.placement.offset_blocks import offset_blocks
 
 PROGRAMS = Path(__file__).parents[2] / "programs"
@@ -64,3 +67,17 @@ def test_arcs_off_the_plane_are_none_for_g68():
     blocks = offset_blocks(read_program(PROGRAMS / "arcs_in_planes.nc"), PLACEMENT)
     assert blocks.linuxcnc
     assert "G18" in blocks.fanuc_reason
+
+
+@pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
+def test_linuxcnc_itself_places_it_there(tmp_path):
+    program = read_program(PROGRAMS / "pocket.nc")
+    lines = list(program.source)
+    lines.insert(1, offset_blocks(program, PLACEMENT, decimals=6).linuxcnc)
+    (tmp_path / "keyed_in.ngc").write_text("\n".join(lines) + "\n")
+    canon = rs274.run(tmp_path / "keyed_in.ngc", tmp_path, "T1 P1 Z0 D10\n")
+    assert canon.error == ""
+    wanted = 1e3 * place(program.moves, PLACEMENT).end[:, :3]
+    found = np.array([end[:3] for _, _, end, _ in canon.moves])
+    # rs274 prints four decimals, and its coordinates pass through the offset once more.
+    np.testing.assert_allclose(found[-len(wanted) + 1 :], wanted[1:], atol=2e-4)
