@@ -99,6 +99,7 @@ def evaluate(
     n = len(position)
     load = load or Load()
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
+    route = core.choose_route(model, n)  # by all poses, not by those of a block
     result = PoseStiffness(
         stiffness=np.empty(n),
         direction=np.empty((n, 3)),
@@ -112,7 +113,7 @@ def evaluate(
     )
     for start in range(0, n, BLOCK):
         rows = slice(start, min(start + BLOCK, n))
-        _evaluate_block(model, rows, position, abc, tangent, lengths, load, force, result)
+        _evaluate_block(model, rows, position, abc, tangent, lengths, load, force, route, result)
         if progress:
             progress(rows.stop, n)
     return result
@@ -127,6 +128,7 @@ def _evaluate_block(
     tool_length: FloatArray,
     load: Load,
     force: float,
+    route: str,
     result: PoseStiffness,
 ) -> None:
     machine = model.machine
@@ -137,7 +139,7 @@ def _evaluate_block(
     within = stand.reachable
     compliance = np.full((len(tip), 3, 3), np.nan)
     turned = None if rotation is None else rotation[within]
-    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force)
+    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, route)
     direction, substituted = load_directions(load, compliance, tip, rotation, tangent[rows])
     along = np.full(len(tip), np.nan)
     if model.load_dependent:
