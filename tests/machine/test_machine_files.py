@@ -65,6 +65,7 @@ BAD_FILES = [
     (changed("default_origin_mm = [0.0, 0.0, 800.0]", "default_origin_mm = [0.0, 0.0]"), "3 or 6 numbers"),
     (changed("neutral_pose_mm_deg = [0.0, 0.0, 800.0, 0.0, 0.0, 0.0]", "neutral_pose_mm_deg = [0, 0]"), "6 numbers"),
     ("effect = 3\n" + NIST, "write [[effect]]"),
+    (NIST + '\n[[effect]]\nname = "x"\nprovenance = "campaign 3"\n', "[effect] provenance = 'campaign 3'"),
     (NIST + "\n[[effect]]\nbar_stiffness_N_per_m = 1e9\n", "name is missing"),
 ]
 
@@ -182,7 +183,9 @@ HAL = "".join(
 def test_from_linuxcnc_reads_pins_and_says_what_it_assumed():
     machine, notes = machine_from_hal(HAL + "setp genhexkins.tool-offset 50\n# setp genhexkins.bogus 1\n", "mm")
     assert np.hypot(*machine.frame_joints[:, :2].T) == pytest.approx(0.5)
-    assert machine.platform_joints[:, 2] == pytest.approx(-0.05)
+    # genhexkins.c adds the offset to Z of base and platform joints alike.
+    assert machine.platform_joints[:, 2] == pytest.approx(0.05)
+    assert machine.frame_joints[:, 2] == pytest.approx(0.05)
     assert any("tool-offset" in note for note in notes) and any("assumed" in note for note in notes)
     inch, _ = machine_from_hal(HAL, "inch")
     assert np.hypot(*inch.frame_joints[:, :2].T) == pytest.approx(0.5 * 25.4)

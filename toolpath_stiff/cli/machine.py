@@ -189,13 +189,13 @@ def _check(args: argparse.Namespace) -> int:
     origin = np.array([machine.default_origin])
     found = evaluate_poses(model, origin[:, :3], origin[:, 3:])
     effects = ", ".join(active.effect.name for active in (*model.effects, *model.instruments)) or "none"
-    print(f"{args.file}: {machine.title}: the file is good\n  effects: {effects}")
     if not found.reach.reachable[0]:
         raise InputError(
             f"the default origin is out of reach: {found.reach.describe(0)}",
             hint="change default_origin_mm or the limits",
             file=args.file,
         )
+    print(f"{args.file}: {machine.title}: the file is good\n  effects: {effects}")
     kx, ky, kz = found.along_axes[0] / 1e3
     print(f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; {found.reach.describe(0)}")
     return 0

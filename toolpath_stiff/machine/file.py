@@ -341,6 +341,8 @@ class _Reader:
             given["frame_joint_angle"] = rad_from_deg(angles["frame_max_deg"])
             given["platform_joint_angle"] = rad_from_deg(angles["platform_max_deg"])
             given["neutral_pose"] = _pose(angles["neutral_pose_mm_deg"])
+        else:  # joints without limits: the neutral pose only serves the singularity index
+            given["neutral_pose"] = _pose(values.get("setup", {}).get("default_origin_mm", np.zeros(3)))
         if "limits.singularity" in values:
             given["singularity"] = values["limits.singularity"]["min_index"]
         return Limits(**given)
@@ -359,8 +361,10 @@ class _Reader:
             if not isinstance(name, str) or not name:
                 raise self.fail(kind, "name", " is missing" if name is None else f" = {name!r}", "an effect's name")
             provenance = row.get("provenance", {})
+            if not isinstance(provenance, dict):
+                raise self.fail(kind, "provenance", f" = {_shorten(provenance)}", f"a table [{kind}.provenance]")
             parameters = {k: v for k, v in row.items() if k not in ("name", "provenance")}
-            entries.append(EffectEntry(name, parameters, provenance if isinstance(provenance, dict) else {}))
+            entries.append(EffectEntry(name, parameters, provenance))
         return tuple(entries)
 
 

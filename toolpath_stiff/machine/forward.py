@@ -48,9 +48,11 @@ def forward_kinematics(
     Raises
     ------
     InputError
-        Lengths that no pose near the start has; the message names the row.
+        Not six finite lengths above 0 in each row, or lengths that no pose near the start has; the message names the
+        row.
     """
     wanted = np.atleast_2d(np.asarray(lengths, dtype=float))
+    _check_lengths(wanted)
     first = np.asarray(machine.limits.neutral_pose if start is None else start, dtype=float)
     poses = np.broadcast_to(first, (len(wanted), 6))
     position, rotation = poses[:, :3].copy(), rotation_matrices(poses[:, 3:])
@@ -74,6 +76,17 @@ def forward_kinematics(
             hint="check the lengths, or give a start nearer to the pose",
         )
     return np.concatenate([position, roll_pitch_yaw(rotation)], axis=1)
+
+
+def _check_lengths(lengths: FloatArray) -> None:
+    """One bad row must not be blamed on another: rows are solved together."""
+    if lengths.ndim != 2 or lengths.shape[1] != 6:
+        raise InputError(f"strut lengths of shape {lengths.shape}", expected="(n, 6) or (6,)")
+    bad = np.flatnonzero(~(np.isfinite(lengths) & (lengths > 0.0)).all(axis=1))
+    if len(bad):
+        row = int(bad[0])
+        shown = ", ".join(f"{mm_from_m(v):.3f}" for v in lengths[row])
+        raise InputError(f"row {row + 1}: strut lengths {shown} mm", expected="six finite lengths above 0")
 
 
 def _newton_step(jacobian: FloatArray, missing: FloatArray) -> FloatArray:

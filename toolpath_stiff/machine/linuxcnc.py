@@ -1,7 +1,8 @@
 """Machines from LinuxCNC: the `genhexkins` pins of a HAL file, with the unit of the ini file beside it.
 
 genhexkins(9): `base.N.x|y|z` are the joints of the base, `platform.N.x|y|z` those of the platform in its own frame,
-`tool-offset` and `spindle-offset` lie along the platform's Z. `base-n`, `platform-n` and `screw-lead` correct the strut
+`tool-offset` and `spindle-offset` are added to Z of both, so that no joint moves while the platform is level
+(genhexkins.c, genhex_read_hal_pins). `base-n`, `platform-n` and `screw-lead` correct the strut
 length for the turning of the screw in its joints; they do not change where the joints are.
 """
 
@@ -86,11 +87,11 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
     offset = m_from_mm((values.get("tool-offset", 0.0) + values.get("spindle-offset", 0.0)) * scale)
     notes = []
     if offset:
-        notes.append(f"the tool tip lies {offset * 1e3:g} mm along the platform's Z (tool-offset plus spindle-offset)")
+        notes.append(f"{offset * 1e3:g} mm (tool-offset plus spindle-offset) are added to Z of all joints")
     if any(name.startswith(("base-n", "platform-n")) or name == "screw-lead" for name in values):
         notes.append("screw-lead and the joint normals correct strut lengths for the turning screw; left out")
-    platform = joints("platform") + np.array([0.0, 0.0, -offset])
-    machine, more = _with_assumptions(joints("base"), platform, file)
+    shift = np.array([0.0, 0.0, offset])
+    machine, more = _with_assumptions(joints("base") + shift, joints("platform") + shift, file)
     return machine, notes + more
 
 

@@ -49,7 +49,8 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
         "platform": {"bar_stiffness_N_per_m": _number(machine.platform_bar_stiffness)},
         "limits.strut_length": {
             "min_mm": _number(mm_from_m(limits.strut_length[0])),
-            "max_mm": _number(mm_from_m(limits.strut_length[1])),
+            # A file needs a longest strut: 100 m stands for none.
+            "max_mm": _number(min(mm_from_m(limits.strut_length[1]), 1e5)),
         },
         "limits.joint_angle": {
             "frame_max_deg": _number(deg_from_rad(limits.frame_joint_angle)),

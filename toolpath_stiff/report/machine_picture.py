@@ -30,7 +30,7 @@ def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> bytes
         figure = new_figure(14.0, 8.0)
         whole = figure.add_axes((-0.05, -0.07, 0.59, 0.92), projection="3d")
         _draw_whole(whole, machine, mm_from_m(joints), mm_from_m(nodes), struts)
-        detail = figure.add_axes((0.51, -0.04, 0.46, 0.89), projection="3d")
+        detail = figure.add_axes((0.53, -0.04, 0.45, 0.89), projection="3d")
         _draw_platform(detail, machine, mm_from_m(nodes))
         _heading(figure, machine, pose)
         return png_bytes(figure)
@@ -60,7 +60,7 @@ def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArr
     for i in range(6):
         axes.plot(*np.array([frame[i], joints[i]]).T, color=STRUT, lw=2.2)
         # The two struts of a vertex run close together: their labels sit at different heights.
-        at = frame[i] + (0.22 if i % 2 else 0.5) * (joints[i] - frame[i])
+        at = frame[i] + (0.3 if i % 2 else 0.55) * (joints[i] - frame[i])
         label = f"{i + 1}: {mm_from_m(struts.lengths[0, i]):.0f} mm, {stiffness[i] / 1e3:.1f} kN/mm"
         axes.text(*at, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=_LABEL)
     _truss(axes, machine, nodes, lw=1.2)
