@@ -38,6 +38,7 @@ COMMANDS = (
     Command("pose", "stiffness, softest and stiffest direction, strut lengths at single poses", "A machine"),
     Command("map", "stiffness over planes of the workspace: picture, table, 3-D page", "A machine"),
     Command("machine", "list, show, check, make and import machine files", "A machine"),
+    Command("place", "where the work should sit: Pareto front and one recommended placement", "A placement"),
     Command("case-study", "the paper's four regions: one path at two heights, displaced and turned", "A placement"),
     Command("effects", "physical effects that a machine can carry; write your own", "A machine"),
     Command("reduce", "raw force and displacement records to measured stiffnesses, lost motion, loops", "Measurements"),

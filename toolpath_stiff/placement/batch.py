@@ -187,8 +187,13 @@ class Evaluator:
         direction = np.ascontiguousarray(turned(path.tangent).reshape(3, -1))
         along, determinant, lengths, good = compiled.compliance_along_columns(self.kernel, position, direction)
         margin = self._margins(position, lengths, determinant / self.neutral_determinant)
-        margin[~good] = np.minimum(margin[~good], -1.0)  # so near a singularity that limits without one do not matter
-        return self._summary(1.0 / along.reshape(k, m), margin.reshape(k, m), position.reshape(3, k, m), path)
+        found = self._summary(1.0 / along.reshape(k, m), margin.reshape(k, m), position.reshape(3, k, m), path)
+        doubtful = np.flatnonzero(~good.reshape(k, m).all(axis=1) & (found.margin >= 0.0))
+        if len(doubtful):  # within reach, but ill-conditioned for the closed form: the pivoted route decides
+            pivoted = self._plain(path, placements[doubtful])
+            for column in fields(PlacementFigures):
+                getattr(found, column.name)[doubtful] = getattr(pivoted, column.name)
+        return found
 
     def _margins(self, position: FloatArray, lengths: FloatArray, index: FloatArray) -> FloatArray:
         """(n,) smallest margin to any limit, as `machine.limits.reach` has it, for vertical poses with poses last."""

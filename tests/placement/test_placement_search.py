@@ -1,0 +1,164 @@
+"""Placement: the batch against plain analysis, the search against brute force, symmetry, errors, repeatability."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from toolpath_stiff.analysis import analyse, parse_load
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.placement import search
+from toolpath_stiff.placement.batch import Evaluator, Keepout, PlacementFigures, telling_path, work_path
+from toolpath_stiff.placement.search import Bounds, search_placements
+from toolpath_stiff.stiffness.model import build_model
+
+ROOT = Path(__file__).parent.parent.parent
+MODEL = build_model(load_machine("nist"))
+TANGENTIAL = parse_load("tangential")
+BOUNDS = Bounds(np.array([-0.2, -0.2, 0.5, 0, 0, 0]), np.array([0.2, 0.2, 1.2, 0, 0, 2 * np.pi]))
+
+
+def program_of(name: str):
+    return read_program(ROOT / "programs" / f"{name}.nc", tool_table=ROOT / "programs" / "tools.tbl")
+
+
+@pytest.mark.parametrize("name", ["pocket", "tilted_five_axis", "three_tools"])
+def test_batch_is_the_plain_analysis(name):
+    program = program_of(name)
+    placements = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7], [-0.1, 0.05, 1.0, 0, 0, 4.0]])
+    found = Evaluator(MODEL, work_path(program, 2e-3), TANGENTIAL, 1000.0).figures(placements)
+    for i, placement in enumerate(placements):
+        figures = analyse(MODEL, program, origin=tuple(placement), step=2e-3).summary()
+        assert found.mean[i] / 1e3 == pytest.approx(figures["mean_N_per_mm"], rel=1e-9)
+        assert found.spread[i] / 1e3 == pytest.approx(figures["range_N_per_mm"], rel=1e-9)
+        assert found.lowest[i] / 1e3 == pytest.approx(figures["min_N_per_mm"], rel=1e-9)
+        assert found.margin[i] == pytest.approx(figures["min_margin"], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["pocket", "tilted_five_axis"])
+def test_turning_the_placement_by_120_degrees_changes_nothing(name):
+    third = 2 * np.pi / 3
+    at = np.array([0.08, -0.05, 0.8, 0, 0, 0.4])
+    x, y = at[:2]
+    c, s = np.cos(third), np.sin(third)
+    turned = np.array([c * x - s * y, s * x + c * y, 0.8, 0, 0, 0.4 + third])
+    found = Evaluator(MODEL, work_path(program_of(name), 5e-3), TANGENTIAL, 1000.0).figures(np.vstack([at, turned]))
+    for values in (found.mean, found.spread, found.lowest):
+        assert values[1] == pytest.approx(values[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["case_study", "pocket", "drilling", "inch_bracket", "tilted_five_axis"])
+def test_no_placement_of_a_grid_is_better(name):
+    path = telling_path(work_path(program_of(name), 5e-3), 60)  # a short path keeps brute force quick
+    axes = [np.linspace(BOUNDS.low[i], BOUNDS.high[i], 4) for i in (0, 1, 2)]
+    axes.append(np.linspace(0, 2 * np.pi, 5, endpoint=False))
+    x, y, z, c = (g.ravel() for g in np.meshgrid(*axes, indexing="ij"))
+    grid = np.column_stack([x, y, z, 0 * x, 0 * x, c])
+    brute = Evaluator(MODEL, path, TANGENTIAL, 1000.0).figures(grid)
+    found = search_placements(MODEL, path, TANGENTIAL, BOUNDS)
+    best = float(np.nanmax(brute.mean - brute.spread))
+    ours = float(found.best_figures.mean[0] - found.best_figures.spread[0])
+    assert ours >= best - 1e-3 * abs(best)
+    assert (found.figures.margin >= 0.0).all()
+
+
+finite = st.floats(1.0, 100.0)
+
+
+@given(st.lists(st.tuples(finite, finite, st.booleans()), min_size=1, max_size=30))
+def test_front_holds_just_what_nothing_beats(points):
+    mean, spread, feasible = (np.array(column) for column in zip(*points, strict=True))
+    rows = search._front_rows(PlacementFigures(mean, spread, mean, np.where(feasible, 1.0, -1.0)))
+    for i in np.flatnonzero(feasible):
+        beaten = (mean[feasible] >= mean[i]) & (spread[feasible] <= spread[i])
+        beaten &= (mean[feasible] > mean[i]) | (spread[feasible] < spread[i])
+        if i in rows:
+            assert not beaten.any()
+        elif not beaten.any():  # an equal one is on the front
+            assert any(mean[r] == mean[i] and spread[r] == spread[i] for r in rows)
+    assert feasible[rows].all()
+
+
+def test_keep_outs_and_heights_are_kept():
+    path = telling_path(work_path(program_of("case_study"), 5e-3), 60)
+    box = Keepout("vice", (-0.3, -0.3, 0.0), (0.0, 0.3, 2.0))
+    bounds = Bounds(BOUNDS.low, BOUNDS.high, heights=(0.6, 0.8))
+    found = search_placements(MODEL, path, TANGENTIAL, bounds, keepouts=(box,))
+    from toolpath_stiff.placement.batch import placed_path
+
+    for placement in found.front:
+        position = placed_path(path, placement)[0]
+        assert not ((position > box.low) & (position < box.high)).all(axis=1).any()
+        assert placement[2] in (0.6, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "keepouts", "words"),
+    [
+        (Bounds(np.array([2.0, 0, 0.8, 0, 0, 0]), np.array([2.2, 0.1, 0.9, 0, 0, 1.0])), (), "breaks a limit"),
+        (BOUNDS, (Keepout("everything", (-9, -9, -9), (9, 9, 9)),), "keep-out (everything)"),
+    ],
+)
+def test_nothing_feasible_says_why(bounds, keepouts, words):
+    path = telling_path(work_path(program_of("case_study"), 5e-3), 40)
+    with pytest.raises(InputError) as caught:
+        search_placements(MODEL, path, TANGENTIAL, bounds, keepouts=keepouts)
+    assert words in str(caught.value)
+
+
+def test_cutting_to_machine_coordinates_is_refused():
+    with pytest.raises(InputError, match="does not move with the work"):
+        work_path(parse_program("F100\nG1 X5\nG53 G1 Z3\n", "part.nc"), 1e-3)
+
+
+def test_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    program = str(ROOT / "programs" / "case_study.nc")
+    arguments = ["place", program, "--x", "-200:200", "--y", "-200:200", "--z", "400:1250", "--step", "10"]
+    assert main([*arguments, "--out", "one"]) == 0
+    assert "recommended" in capsys.readouterr().out
+    names = {"placements.csv", "placement.json", "front.png", "profiles.png", "map.png", "setup.pdf"}
+    assert {p.name for p in (tmp_path / "one").iterdir()} == names
+    summary = json.loads((tmp_path / "one/placement.json").read_text())
+    best = summary["recommended"]
+    for key in ("x_mm", "y_mm", "z_mm", "rotation_deg", "mean_N_per_mm", "range_N_per_mm", "min_N_per_mm"):
+        assert key in best
+    rows = list(csv.DictReader((tmp_path / "one/placements.csv").open()))
+    assert len(rows) == len(summary["front"]) and "extrapolated_share" in rows[0]
+    # What is recommended is what the analysis finds there.
+    origin = ",".join(str(best[key]) for key in ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "rotation_deg"))
+    assert main(["analyze", program, "--origin", origin, "--step", "10", "--no-plots", "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["mean_N_per_mm"] == pytest.approx(best["mean_N_per_mm"], rel=1e-9)
+    assert main([*arguments, "--out", "two"]) == 0
+    for name in names:
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--x", "300:-300"], "above the upper bound"),
+        (["--x", "nan"], "not a finite number"),
+        (["--keep-out", "vice:1,2,3"], "NAME:X0"),
+        (["--keep-out", "vice:5,0,0,1,1,1"], "is not above"),
+        (["--objective", "best"], "invalid choice"),
+        (["--points", "1"], "2 to 1000"),
+        (["--x", "1900:2000", "--y", "0", "--z", "800"], "no placement is feasible"),
+    ],
+)
+def test_mistakes(tmp_path, monkeypatch, capsys, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    program = str(ROOT / "programs" / "case_study.nc")
+    assert main(["place", program, "--step", "20", *arguments]) == 2
+    assert words in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
