@@ -106,10 +106,23 @@ def _nist() -> str:
     return packaged_machines()["nist"].read_text()
 
 
+def _keys(effect: str) -> list[str]:
+    from toolpath_stiff.stiffness.effects import find_effect
+
+    return [parameter.key for parameter in find_effect(effect).parameters]
+
+
 def test_effects_of_a_machine_file_are_honoured_and_instruments_set_aside(part, capsys):
     (part.parent / "bars.toml").write_text(
         _nist() + '\n[[effect]]\nname = "platform_flexibility"\nbar_stiffness_N_per_m = 3e8\n'
     )
+    (part.parent / "gauge.toml").write_text(
+        _nist()
+        + '\n[[instrument]]\nname = "thermal_drift"\n'
+        + "".join(f"{key} = 1.0\n" for key in _keys("thermal_drift"))
+    )
+    assert main(["analyze", "part.nc", "--machine", "gauge.toml", "--no-plots"]) == 0
+    assert "instruments set aside" in capsys.readouterr().out
     values = []
     for machine in ("nist", "bars.toml"):
         assert main(["analyze", "part.nc", "--machine", machine, "--json", "--no-plots"]) == 0

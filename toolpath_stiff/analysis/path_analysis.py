@@ -158,7 +158,7 @@ def analyse(
         moves=moves,
         samples=samples,
         at=at,
-        warnings=(*program.warnings, *_warnings(samples, at)),
+        warnings=(*program.warnings, *instruments_set_aside(model), *_warnings(samples, at)),
     )
     _check_reach(analysis, partial)
     return analysis
@@ -179,6 +179,12 @@ def _effective_origin(machine: Machine, program: Program, origin: Pose | None) -
             file=program.name,
         )
     return chosen, source
+
+
+def instruments_set_aside(model: StiffnessModel) -> list[str]:
+    """That the machine file's instruments change readings and are left out here; nothing if there are none."""
+    names = ", ".join(active.effect.name for active in model.instruments)
+    return [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
 
 
 def _warnings(samples: Samples, at: PoseStiffness) -> list[str]:
@@ -256,9 +262,6 @@ def assumptions(analysis: Analysis) -> list[str]:
     found.append(f"load {analysis.load}: {RULES[analysis.load.kind]}")
     secant = "; the stiffness is the secant one at this load" if analysis.model.load_dependent else ""
     found.append(f"a force of {analysis.force:g} N for deflections{secant}")
-    if analysis.model.instruments:
-        names = ", ".join(active.effect.name for active in analysis.model.instruments)
-        found.append(f"instruments set aside (they act on readings, not on the machine): {names}")
     law = machine.strut_law
     found.append(
         f"the strut law is extrapolated outside {mm_from_m(min(law.length_1, law.length_2)):.1f} to "

@@ -185,6 +185,8 @@ def map_csv(found: StiffnessMap) -> Iterator[str]:
 
 def _print(summary: dict[str, Any]) -> None:
     print(f"machine {summary['machine']}, load {summary['load']}, {summary['points']} points")
+    if summary["instruments_set_aside"]:
+        print(f"instruments set aside: {', '.join(summary['instruments_set_aside'])}")
     for row in summary["slices"]:
         print(f"z = {row['z_mm']:g} mm: {100 * row['reachable_share']:.0f} % within reach")
         for name in ("softest", "stiffest"):

@@ -221,4 +221,5 @@ def _table(summary: dict[str, Any]) -> str:
     fanuc = (blocks["fanuc"] or blocks["fanuc_reason"]).replace("\n", "\n                ")
     lines.append(f"Fanuc-style     {fanuc}")
     lines.append(f"front           {len(summary['front'])} placements, {summary['pose_evaluations']} poses evaluated")
+    lines += [f"warning         {text}" for text in summary["warnings"]]
     return "\n".join(lines)

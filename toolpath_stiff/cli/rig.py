@@ -64,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
             args.out, args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at
         )
         print(f"{args.out}: {count} measurements, the nominal machine and the sealed truth")
-        print(f"next: tps diagnose {args.out}/measurements.csv --machine {args.out}/machine.toml")
         return 0
     if args.action == "measure":
         count = rig.measure_again(args.folder, args.at, args.out, args.visit)
