@@ -126,8 +126,10 @@ def test_command(tmp_path, monkeypatch, capsys):
     arguments = ["place", program, "--x", "-200:200", "--y", "-200:200", "--z", "400:1250", "--step", "10"]
     assert main([*arguments, "--out", "one"]) == 0
     assert "recommended" in capsys.readouterr().out
-    names = {"placements.csv", "placement.json", "front.png", "profiles.png", "map.png", "setup.pdf"}
+    names = {"placements.csv", "placement.json", "front.png", "profiles.png", "map.png", "setup.pdf", "report.html"}
     assert {p.name for p in (tmp_path / "one").iterdir()} == names
+    page = (tmp_path / "one/report.html").read_text()
+    assert "__DATA__" not in page and "http://www.w3.org/2000/svg" in page and page.count("http") == 1
     summary = json.loads((tmp_path / "one/placement.json").read_text())
     best = summary["recommended"]
     for key in ("x_mm", "y_mm", "z_mm", "rotation_deg", "mean_N_per_mm", "range_N_per_mm", "min_N_per_mm"):

@@ -31,7 +31,8 @@ examples:
   tps place programs/pocket.nc --keep-out vice:100,100,0,300,300,900
 
 A placement is where program zero sits and how the work is turned about it: the numbers of --origin. Files written to
---out: placements.csv (the front), placement.json, front.png, profiles.png, map.png, setup.pdf.
+--out: placements.csv (the front), placement.json, front.png, profiles.png, map.png, setup.pdf,
+report.html (click a placement of the front, see the path there).
 """
 FARTHEST_MM = 1e5
 OBJECTIVES = ("balanced", "mean", "range", "min")
@@ -184,8 +185,10 @@ def _write(args: argparse.Namespace, out: Path, summary: dict[str, Any], best: A
         "placement.json": json.dumps(summary, indent=2) + "\n",
     }
     if not args.no_plots:
+        from toolpath_stiff.report.place_page import place_page
         from toolpath_stiff.report.place_picture import front_picture, profiles_picture, setup_sheet, workspace_picture
 
+        contents["report.html"] = place_page(summary, best)
         contents["front.png"] = front_picture(summary)
         contents["profiles.png"] = profiles_picture(best, before)
         contents["map.png"] = workspace_picture(best, before)

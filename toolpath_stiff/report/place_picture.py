@@ -137,6 +137,9 @@ def setup_sheet(summary: dict[str, Any], best: Analysis) -> bytes:
             ("heights of the cut", f"Z {position[:, 2].min():.3f} to {position[:, 2].max():.3f} mm (machine)"),
             ("LinuxCNC", blocks["linuxcnc"] or blocks["linuxcnc_reason"]),
             ("Fanuc-style", blocks["fanuc"] or blocks["fanuc_reason"]),
+            ("", "G68 follows the program's own G17 and G54, and holds until G69")
+            if "G68" in (blocks["fanuc"] or "")
+            else ("", ""),
             ("mean stiffness", f"{number(row['mean_N_per_mm'])} N/mm"),
             ("range, weakest", f"{number(row['range_N_per_mm'])} N/mm, {number(row['min_N_per_mm'])} N/mm"),
             (
