@@ -23,11 +23,20 @@ class Interpreter(Mover):
 
     def execute(self, block: Block) -> bool:
         """Execute a block; False once the program has ended."""
-        self.block = block
         if not block.words:
+            self.block = block
             return True
+        return self.finish(self.begin(block))
+
+    def begin(self, block: Block) -> Codes:
+        """Take a block's codes and set its modes, not moving yet; to do so twice changes nothing but dwells."""
+        self.block = block
         codes = self._collect(block)
         self._modes(codes)
+        return codes
+
+    def finish(self, codes: Codes) -> bool:
+        """Offsets and moves of the block begun; False once the program has ended."""
         self._once(codes)
         self._move(codes)
         for letter in sorted(self.free):

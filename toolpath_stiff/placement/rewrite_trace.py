@@ -1,0 +1,106 @@
+"""What a block of the program does, and whether the written block does the same at its place. mm, degrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from toolpath_stiff.nc.interpreter import Interpreter
+from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.recorder import Arc, Recorder
+from toolpath_stiff.placement.rewrite_turn import Turn
+
+# In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start; a centre
+# given by I, J, K adds that of its own words, one given by R what `rewrite_blocks.NEAR` allows.
+END_UNITS, CENTER_UNITS = 2.0, 6.0
+
+
+class Segment(NamedTuple):
+    """One move of a block, those of no length too: control coordinates of its end, and its arc."""
+
+    motion: int
+    end: list[float]
+    arc: Arc | None
+
+
+class Tracer(Interpreter):
+    """Executes the untouched program; `segments` are those of the block in hand."""
+
+    segments: list[Segment]
+
+    def _record(self, motion: int, control: list[float], work: set[int], machine: set[int], arc: Arc | None) -> None:
+        super()._record(motion, control, work, machine, arc)
+        self.segments.append(Segment(motion, list(self.frames.position), arc))
+
+
+class Row(NamedTuple):
+    """A recorded cutting move: ends (6), arc."""
+
+    start: list[float]
+    end: list[float]
+    arc: Arc | None
+
+
+def cutting_rows(recorder: Recorder, first: int, shortest: float) -> Iterator[Row]:
+    """Cutting moves recorded from `first` on; straight ones shorter than `shortest` are left out."""
+    for i in range(first, len(recorder.line)):
+        start, end, arc = recorder.start[i], recorder.end[i], recorder.arc[i]
+        if recorder.motion[i] == RAPID:
+            continue
+        if arc is None and max(abs(e - s) for s, e in zip(start, end, strict=True)) < shortest:
+            continue
+        yield Row(start, end, arc)
+
+
+def difference(turn: Turn, wanted: Row, found: Row, unit: float) -> str:
+    """How a written cutting move differs from the placed one beyond the rounding to `unit` mm, or "".
+
+    For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them.
+    """
+    for place, name in ((0, "starts"), (1, "ends")):
+        target, point = turn.point(wanted[place][:3]), found[place][:3]
+        apart = math.dist(target, point)
+        if apart > END_UNITS * unit:
+            return f"{name} {apart:.4g} mm off"
+    for place in (0, 1):
+        if any(wanted[place][3:]) or any(found[place][3:]) or turn.turns:
+            goal = turn.rotations(np.array([wanted[place][3:]]))[0]
+            angle = angle_between(goal, rotation_of(found[place][3:]))
+            if angle > END_UNITS * max(unit, 1e-9):
+                return f"leans {angle:.4g} degrees otherwise"
+    if wanted.arc is None or found.arc is None:
+        return "" if wanted.arc is found.arc else "is another kind of move"
+    return _arc_difference(turn, wanted.arc, found, unit)
+
+
+def _arc_difference(turn: Turn, arc: Arc, found: Row, unit: float) -> str:
+    assert found.arc is not None
+    normal = turn.turn @ np.array(arc.normal)
+    sense = float(normal @ np.array(found.arc.normal))
+    if abs(abs(sense) - 1.0) > 1e-9:
+        return "lies in another plane"
+    apart = np.array(turn.point(arc.center)) - np.array(found.arc.center)
+    off = float(np.linalg.norm(apart - (apart @ normal) * normal))
+    if off > CENTER_UNITS * unit:
+        return f"has its centre {off:.4g} mm off"
+    radius = math.dist(found.start[:3], found.arc.center)
+    swept = abs(arc.sweep - math.copysign(1.0, sense) * found.arc.sweep)
+    if swept * radius > 4.0 * CENTER_UNITS * unit:
+        return f"turns {math.degrees(swept):.4g} degrees otherwise"
+    return ""
+
+
+def rotation_of(abc: list[float]) -> np.ndarray:
+    """(3, 3) rotation of rotary words in degrees."""
+    from toolpath_stiff.path.rotations import rotation_matrices
+
+    return rotation_matrices(np.radians(abc))
+
+
+def angle_between(first: np.ndarray, second: np.ndarray) -> float:
+    """Angle in degrees between two rotations; exact for small ones, where the cosine has no digits left."""
+    chord = float(np.linalg.norm(first - second)) / (2.0 * math.sqrt(2.0))
+    return 2.0 * math.degrees(math.asin(min(chord, 1.0)))
