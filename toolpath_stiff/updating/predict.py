@@ -115,6 +115,14 @@ class Predictor:
             temperature=None if "temperature_C" in missing else self.data.temperature,
         )
 
+    def strut_lengths(self) -> FloatArray:
+        """(n, 6) m."""
+        return np.asarray(self._timeless.path.struts.lengths[self._timeless.which])
+
+    def strut_forces(self) -> FloatArray:
+        """(n, 6) force in each strut per unit load, tension positive."""
+        return np.asarray(self._timeless.forces[self._timeless.which])
+
     def strut_columns(self) -> FloatArray:
         """(n, 6) d ln k / d ln(stiffness of strut i) at the machine file's strut law: its share of the compliance."""
         prepared = self._timeless
@@ -139,6 +147,30 @@ class Predictor:
             (energy * rule.stiffness_2 * second).sum(axis=1),
         ]
         return np.asarray(np.stack(columns, axis=1)[prepared.which] * np.exp(log_stiffness)[:, None])
+
+    def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
+        """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
+        prepared = self._timeless
+        logs = np.asarray(law, dtype=float)
+        rule = self.machine.strut_law
+        second = (prepared.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        first_term = rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * (1.0 - second)
+        stiffness = first_term + rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second
+        return np.asarray((prepared.forces**2 / stiffness).sum(axis=-1)[..., prepared.which])
+
+    def strut_slopes(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
+        """(..., n, 2) derivatives of `strut_part` to the law's logarithms."""
+        prepared = self._timeless
+        logs = np.asarray(law, dtype=float)
+        rule = self.machine.strut_law
+        second = (prepared.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        terms = [
+            rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * (1.0 - second),
+            rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second,
+        ]
+        energy = prepared.forces**2 / (terms[0] + terms[1]) ** 2
+        slopes = [-(energy * term).sum(axis=-1)[..., prepared.which] for term in terms]
+        return np.stack(slopes, axis=-1)
 
     def joint_columns(self) -> FloatArray:
         """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.

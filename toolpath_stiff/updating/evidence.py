@@ -1,0 +1,334 @@
+"""How well candidates explain the data: bounded fits under the noise model, and their marginal likelihoods.
+
+Residuals of ln k are multivariate normal with the covariance of `noise`; a wild reading has its own scatter widened, at
+the price of its rarity. The strut law's two logarithms are refitted along with every candidate (prior sd
+`LAW_PRIOR`), so that they can neither hide nor fake an effect. Sizes carry a prior that is flat in the logarithm of
+the change that they make to the stiffness; the marginal likelihood follows by quadrature over the size of an effect of
+one parameter, by Laplace's approximation otherwise (MacKay, Information Theory, Inference and Learning Algorithms,
+chapters 27 and 28). An effect of several parameters is tried with each subset of them: one component at zero is normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.updating.candidates import Candidate, Table
+from toolpath_stiff.updating.predict import Predictor
+from toolpath_stiff.updating.scatter import Scatter
+from toolpath_stiff.updating.size_prior import SizePrior, log_mean_likelihood, log_prior_of_component
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
+GRID = 24  # sizes a sign
+ZOOMS = 3
+MOST_ROUNDS = 3  # searches for wild readings
+
+
+@dataclass(frozen=True)
+class Score:
+    """One fit: a set of candidates with their sizes, and how likely it makes the data.
+
+    Attributes
+    ----------
+    tables
+        The candidates' tables; none for the base model.
+    sizes
+        One array (p,) a candidate.
+    law
+        (2,) logarithms of the factors on the strut law.
+    residual
+        (n,) ln measured - ln modelled.
+    scatter
+        With the wild readings of this fit.
+    log_likelihood, log_evidence
+        At the fit; integrated over sizes and law under their priors.
+    jacobian
+        (n, 2 + p) derivatives of the modelled ln k to law and to the free sizes.
+    covariance
+        (2 + p, 2 + p) of law and free sizes.
+    free
+        Indices of the free sizes, counted over all candidates.
+    interval
+        (2,) 95 % interval of the size of a single parameter from its profile; None otherwise.
+    possible
+        Whether the sizes lie within their bounds; if not, only `log_evidence` means anything.
+    """
+
+    tables: tuple[Table, ...]
+    sizes: tuple[FloatArray, ...]
+    law: FloatArray
+    residual: FloatArray
+    scatter: Scatter
+    log_likelihood: float
+    log_evidence: float
+    jacobian: FloatArray
+    covariance: FloatArray
+    free: tuple[int, ...] = ()
+    interval: FloatArray | None = None
+    possible: bool = True
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The candidates."""
+        return tuple(table.candidate for table in self.tables)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(table.candidate.name for table in self.tables)
+
+
+@dataclass
+class Problem:
+    """The data, the model as a function of strut law and added compliance, and the scatter.
+
+    Attributes
+    ----------
+    predictor
+        The model's answers.
+    scatter, covariance
+        Without wild readings; (n, n) of ln readings.
+    observed
+        (n,) ln k as measured.
+    """
+
+    predictor: Predictor
+    scatter: Scatter
+    covariance: FloatArray
+    observed: FloatArray = field(init=False)
+    rest: FloatArray = field(init=False)  # (n,) m/N of the machine file's own effects
+    base_compliance: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.observed = np.log(self.predictor.data.stiffness)
+        self.base_compliance = np.exp(-self.predictor.log_stiffness())
+        self.rest = self.base_compliance - self.predictor.strut_part()
+
+    def compliance(self, law: FloatArray, delta: FloatArray) -> FloatArray:
+        """(..., n) for laws (..., 2) and added compliances (..., n); held above a tenth of the base model's."""
+        return np.maximum(self.predictor.strut_part(law) + self.rest + delta, 0.1 * self.base_compliance)
+
+    def law_jacobian(self, law: FloatArray, compliance: FloatArray) -> FloatArray:
+        """(..., n, 2) of ln k."""
+        return np.asarray(-self.predictor.strut_slopes(law) / compliance[..., None])
+
+    def fit_law(
+        self, delta: FloatArray, inverse: FloatArray, start: FloatArray, steps: int = 3
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Laws (g, 2), residuals (g, n), information matrices (g, 2, 2) for added compliances (g, n)."""
+        count, n = delta.shape
+        law = np.broadcast_to(start, (count, 2)).copy()
+        compliance = self.compliance(law, delta)
+        residual = self.observed + np.log(compliance)
+        for _ in range(steps):
+            jacobian = self.law_jacobian(law, compliance)
+            weighted = (np.swapaxes(jacobian, 1, 2).reshape(2 * count, n) @ inverse).reshape(count, 2, n)
+            information = weighted @ jacobian + np.eye(2) / LAW_PRIOR**2
+            gradient = (weighted @ residual[..., None])[..., 0] - law / LAW_PRIOR**2
+            law = law + np.clip(np.linalg.solve(information, gradient[..., None])[..., 0], -0.5, 0.5)
+            compliance = self.compliance(law, delta)
+            residual = self.observed + np.log(compliance)
+        return law, residual, information
+
+    # -- scores ----------------------------------------------------------------------------------------------------
+
+    def score_base(self) -> Score:
+        """The model without any further effect."""
+        scatter, law = self.scatter, np.zeros(2)
+        none = np.zeros((1, len(self.observed)))
+        for _ in range(3):
+            laws, residuals, information = self.fit_law(none, scatter.inverse, law)
+            law, residual = laws[0], residuals[0]
+            scatter, wild = self.scatter.with_wild(residual), scatter.wild
+            if scatter.wild == wild:
+                break
+        likelihood = float(scatter.log_likelihood(residual))
+        return Score(
+            (), (), law, residual, scatter, likelihood,
+            likelihood + float(_law_terms(law[None], information)[0]),
+            self.law_jacobian(law, self.compliance(law, none[0])),
+            np.linalg.inv(information[0]),
+        )  # fmt: skip
+
+    def score_single(self, table: Table, start: Score) -> Score:
+        """A candidate of one parameter: quadrature over its size."""
+        sizes = np.sort(
+            np.concatenate([s * np.geomspace(np.exp(k[0][0]), table.reach(s), GRID) for s, k in table.knots.items()])
+        )
+        prior = SizePrior.of(table, sizes, self.base_compliance)
+        scatter, law = self.scatter, start.law
+        for last in range(MOST_ROUNDS, -1, -1):
+            scan = self._refined(table, self._scan(table, sizes, scatter.inverse, law), scatter.inverse)
+            peak = int(np.argmax(scan.profile))
+            residual, law = scan.residuals[peak], scan.laws[peak]
+            again = self.scatter.with_wild(residual)
+            if not last or set(again.wild) == set(scatter.wild):
+                break
+            scatter = again
+        log_integral, interval = prior.integrate(scan.sizes, scan.profile)
+        best = (np.array([scan.sizes[peak]]),)
+        jacobian = self._jacobian((table,), best, law)
+        information = jacobian.T @ scatter.inverse @ jacobian
+        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
+        constant = -0.5 * scatter.log_determinant - len(scatter.wild) * scatter.price
+        return Score(
+            (table,), best, law, residual, scatter, float(scatter.log_likelihood(residual)), log_integral + constant,
+            jacobian, np.linalg.pinv(information), (0,), interval,
+        )  # fmt: skip
+
+    def _scan(
+        self, table: Table, sizes: FloatArray, inverse: FloatArray, law: FloatArray, steps: int = 3
+    ) -> _Scan:
+        laws, residuals, information = self.fit_law(table.delta(sizes[:, None]), inverse, law, steps)
+        squared = np.einsum("gi,gi->g", residuals @ inverse, residuals)
+        return _Scan(sizes, -0.5 * squared + _law_terms(laws, information), laws, residuals)
+
+    def _refined(self, table: Table, scan: _Scan, inverse: FloatArray) -> _Scan:
+        """With more sizes about the peak: zooms, then five standard deviations to each side."""
+        for _ in range(ZOOMS):
+            peak = int(np.argmax(scan.profile))
+            low, high = scan.sizes[max(peak - 1, 0)], scan.sizes[min(peak + 1, len(scan.sizes) - 1)]
+            low, high = (max(low, 0.0), high) if scan.sizes[peak] > 0.0 else (low, min(high, 0.0))
+            more = np.linspace(low, high, 8)[1:-1]
+            more = more[(more != 0.0) & (more != scan.sizes[peak])]
+            scan = scan.merged(self._scan(table, more, inverse, scan.laws[peak], steps=2))
+        peak = int(np.argmax(scan.profile))
+        size, sd = float(scan.sizes[peak]), scan.width()
+        more = size + sd * np.linspace(-4.5, 4.5, 14)
+        inside = (more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))
+        return scan.merged(self._scan(table, more[inside], inverse, scan.laws[peak], steps=2)) if inside.any() else scan
+
+    def _jacobian(self, tables: Sequence[Table], sizes: Sequence[FloatArray], law: FloatArray) -> FloatArray:
+        """(n, 2 + p) of the modelled ln k to law and all sizes."""
+        delta = sum((t.delta(s) for t, s in zip(tables, sizes, strict=True)), np.zeros(len(self.observed)))
+        compliance = self.compliance(law, delta)
+        slopes = [-t.slope(s) / compliance[:, None] for t, s in zip(tables, sizes, strict=True)]
+        return np.concatenate([self.law_jacobian(law, compliance), *slopes], axis=1)
+
+    def score_subset(self, tables: Sequence[Table], free: tuple[int, ...], start: Score) -> Score | None:
+        """Candidates with these components free (counted over all of them); None if one ends at zero or at its bound.
+
+        Gauss-Newton, then Laplace's approximation.
+        """
+        owners = [(t, j) for t in tables for j in range(len(t.candidate.components))]
+        chosen = [owners[i] for i in free]
+        sizes = {id(t): np.zeros(len(t.candidate.components)) for t in tables}
+        if len(start.free) > 0:
+            for table, old in zip(start.tables, start.sizes, strict=True):
+                if id(table) in sizes:
+                    sizes[id(table)] = old.copy()
+        law, scatter = start.law.copy(), self.scatter
+        for last in range(MOST_ROUNDS, -1, -1):
+            converged = self._gauss_newton(tables, chosen, sizes, law, scatter.inverse)
+            if converged is None:
+                return None
+            law, residual, information, jacobian = converged
+            again = self.scatter.with_wild(residual)
+            if not last or set(again.wild) == set(scatter.wild):
+                break
+            scatter = again
+        covariance = np.linalg.inv(information)
+        deviations = np.sqrt(np.diag(covariance)[2:])
+        own = [float(sizes[id(table)][j]) for table, j in chosen]
+        possible = all(_possible(table, j, size) for (table, j), size in zip(chosen, own, strict=True))
+        if not possible and len(free) > 1:
+            return None
+        likelihood = float(scatter.log_likelihood(residual))
+        evidence = likelihood - 0.5 * float(law @ law) / LAW_PRIOR**2 - 2.0 * np.log(LAW_PRIOR)
+        if len(free) == 1:
+            evidence -= 0.5 * np.linalg.slogdet(information[:2, :2])[1]
+            # By quadrature, which holds for sizes next to nothing as well, with the profile as a parabola.
+            table, j = chosen[0]
+            evidence += log_mean_likelihood(table, j, own[0], float(deviations[0]), self.base_compliance)
+        else:
+            evidence -= 0.5 * np.linalg.slogdet(information)[1]
+            for (table, j), size, sd in zip(chosen, own, deviations, strict=True):
+                evidence += log_prior_of_component(table, j, size, float(sd), self.base_compliance)
+                evidence += 0.5 * np.log(2.0 * np.pi)
+        return Score(
+            tuple(tables), tuple(sizes[id(t)] for t in tables), law, residual, scatter, likelihood, float(evidence),
+            jacobian, covariance, free, possible=possible,
+        )  # fmt: skip
+
+    def _gauss_newton(
+        self,
+        tables: Sequence[Table],
+        chosen: Sequence[tuple[Table, int]],
+        sizes: dict[int, FloatArray],
+        law: FloatArray,
+        inverse: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+        prior = np.zeros((2 + len(chosen), 2 + len(chosen)))
+        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        for _ in range(12):
+            delta = sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
+            compliance = self.compliance(law, delta)
+            residual = self.observed + np.log(compliance)
+            jacobian = np.empty((len(residual), 2 + len(chosen)))
+            jacobian[:, :2] = self.law_jacobian(law, compliance)
+            slopes = {id(t): t.slope(sizes[id(t)]) for t in tables}
+            for i, (table, j) in enumerate(chosen):
+                jacobian[:, 2 + i] = -slopes[id(table)][:, j] / compliance
+            information = jacobian.T @ inverse @ jacobian + prior
+            gradient = jacobian.T @ (inverse @ residual)
+            gradient[:2] -= law / LAW_PRIOR**2
+            scale = np.sqrt(np.diag(information))
+            try:
+                step = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(step).all():
+                return None
+            # A step may change no reading by more than half: beyond that the linearisation means nothing.
+            worst = float(np.abs(jacobian @ step).max())
+            step *= min(1.0, 0.5 / max(worst, 1e-12))
+            law = law + step[:2]
+            for i, (table, j) in enumerate(chosen):
+                sizes[id(table)][j] += step[2 + i]
+            if np.abs(step * scale).max() < 1e-4:
+                break
+        delta = sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
+        residual = self.observed + np.log(self.compliance(law, delta))
+        return law, residual, information, jacobian
+
+
+@dataclass(frozen=True)
+class _Scan:
+    """Sizes (g,) in rising order, their log posterior with the law integrated out, laws (g, 2), residuals (g, n)."""
+
+    sizes: FloatArray
+    profile: FloatArray
+    laws: FloatArray
+    residuals: FloatArray
+
+    def merged(self, other: _Scan) -> _Scan:
+        """Both, in order, each size once."""
+        sizes, first = np.unique(np.concatenate([self.sizes, other.sizes]), return_index=True)
+        parts = ((getattr(self, name), getattr(other, name)) for name in ("profile", "laws", "residuals"))
+        return _Scan(sizes, *(np.concatenate(pair)[first] for pair in parts))
+
+    def width(self) -> float:
+        """Standard deviation of the size from the curvature at the peak."""
+        peak = int(np.argmax(self.profile))
+        if not 0 < peak < len(self.sizes) - 1:
+            return 0.1 * abs(float(self.sizes[peak]))
+        x, y = self.sizes[peak - 1 : peak + 2], self.profile[peak - 1 : peak + 2]
+        curvature = 2.0 * ((y[2] - y[1]) / (x[2] - x[1]) - (y[1] - y[0]) / (x[1] - x[0])) / (x[2] - x[0])
+        return float(1.0 / np.sqrt(max(-curvature, 1e-2 / x[1] ** 2)))
+
+
+def _possible(table: Table, j: int, size: float) -> bool:
+    component, sign = table.candidate.components[j], float(np.sign(size))
+    return sign in component.signs and abs(size) <= component.reach(sign)
+
+
+def _law_terms(laws: FloatArray, information: FloatArray) -> FloatArray:
+    """(g,) log prior of the laws and Laplace's term for integrating them out."""
+    penalty = -0.5 * (laws**2).sum(axis=-1) / LAW_PRIOR**2
+    return np.asarray(penalty - 0.5 * np.linalg.slogdet(information)[1] - 2.0 * np.log(LAW_PRIOR))
