@@ -11,6 +11,8 @@ import numpy as np
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.recorder import Arc, Recorder
+from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.placement.rewrite_pieces import angle_between
 from toolpath_stiff.placement.rewrite_turn import Turn
 
 # In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start; a centre
@@ -19,9 +21,10 @@ END_UNITS, CENTER_UNITS = 2.0, 6.0
 
 
 class Segment(NamedTuple):
-    """One move of a block, those of no length too: control coordinates of its end, and its arc."""
+    """One move of a block, those of no length too: control coordinates of its ends, and its arc."""
 
     motion: int
+    start: list[float]
     end: list[float]
     arc: Arc | None
 
@@ -32,8 +35,9 @@ class Tracer(Interpreter):
     segments: list[Segment]
 
     def _record(self, motion: int, control: list[float], work: set[int], machine: set[int], arc: Arc | None) -> None:
+        start = list(self.frames.position)
         super()._record(motion, control, work, machine, arc)
-        self.segments.append(Segment(motion, list(self.frames.position), arc))
+        self.segments.append(Segment(motion, start, list(control), arc))
 
 
 class Row(NamedTuple):
@@ -68,7 +72,7 @@ def difference(turn: Turn, wanted: Row, found: Row, unit: float) -> str:
     for place in (0, 1):
         if any(wanted[place][3:]) or any(found[place][3:]) or turn.turns:
             goal = turn.rotations(np.array([wanted[place][3:]]))[0]
-            angle = angle_between(goal, rotation_of(found[place][3:]))
+            angle = angle_between(goal, rotation_matrices(np.radians(found[place][3:])))
             if angle > END_UNITS * max(unit, 1e-9):
                 return f"leans {angle:.4g} degrees otherwise"
     if wanted.arc is None or found.arc is None:
@@ -91,16 +95,3 @@ def _arc_difference(turn: Turn, arc: Arc, found: Row, unit: float) -> str:
     if swept * radius > 4.0 * CENTER_UNITS * unit:
         return f"turns {math.degrees(swept):.4g} degrees otherwise"
     return ""
-
-
-def rotation_of(abc: list[float]) -> np.ndarray:
-    """(3, 3) rotation of rotary words in degrees."""
-    from toolpath_stiff.path.rotations import rotation_matrices
-
-    return rotation_matrices(np.radians(abc))
-
-
-def angle_between(first: np.ndarray, second: np.ndarray) -> float:
-    """Angle in degrees between two rotations; exact for small ones, where the cosine has no digits left."""
-    chord = float(np.linalg.norm(first - second)) / (2.0 * math.sqrt(2.0))
-    return 2.0 * math.degrees(math.asin(min(chord, 1.0)))

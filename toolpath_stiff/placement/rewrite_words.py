@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from toolpath_stiff.nc.blocks import AXES
 from toolpath_stiff.nc.words import Block, Word
 
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
@@ -80,15 +81,34 @@ class LineEdit:
         """The line as edited."""
         return "".join(gap + text for gap, text in zip(self._gaps, [*self._texts, ""], strict=True))
 
+    def next_line(self, lead: str) -> LineEdit:
+        """A further line in this one's style, with no words yet; `lead` stands before them."""
+        line = LineEdit(lead, Block(self.block.line, ()), self.decimals)
+        line._between, line._points, line._lower = self._between, self._points, self._lower
+        return line
+
+    @property
+    def moves(self) -> bool:
+        """Whether the line holds an axis word."""
+        return any(word.letter in AXES for word in self._words)
+
     def _add(self, letter: str, text: str) -> None:
         rank = ORDER.index(letter)
         added = Word(letter, 0.0, 0, text)
-        earlier = [i for i, w in enumerate(self._words) if w.letter in ORDER and ORDER.index(w.letter) < rank]
-        axes = [i for i in earlier if self._words[i].letter != "G"]
-        at = 0 if letter == "G" else (axes or earlier or [len(self._words) - 1])[-1] + 1
+        ranked = [(ORDER.index(w.letter), i) for i, w in enumerate(self._words) if w.letter in NUMBERS]
+        before, after = [i for r, i in ranked if r < rank], [i for r, i in ranked if r > rank]
+        codes = [i for i, w in enumerate(self._words) if w.letter == "G"]
+        if letter == "G":
+            at = 0
+        elif before:
+            at = before[-1] + 1
+        elif after:
+            at = after[0]
+        else:
+            at = codes[-1] + 1 if codes else len(self._words)
         self._words.insert(at, added)
         self._texts.insert(at, text)
-        if at == 0:
+        if at == 0:  # what stands before the first word stays there
             self._gaps.insert(1, self._between if len(self._words) > 1 else "")
         else:
             self._gaps.insert(at, self._between)
