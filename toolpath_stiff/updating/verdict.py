@@ -1,0 +1,205 @@
+"""From fits, probabilities and gates to a verdict.
+
+Two gates. Absolute: a hypothesis must leave residuals that its own noise explains. Relative: among those that do, the
+posterior probabilities decide; only a single name that holds 95 % is given as the answer.
+
+adequate      nothing is missing that these data could show
+identified    one effect (or one pair) explains the data, and no other does
+ambiguous     several explain them equally well
+unexplained   something is missing, and nothing in the catalogue accounts for it
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect
+from toolpath_stiff.updating.discrepancy import discrepancy_forms
+from toolpath_stiff.updating.evidence import Problem, Score
+from toolpath_stiff.updating.gates import Gate, Simulator, absolute_gate
+from toolpath_stiff.updating.noise import Noise
+from toolpath_stiff.updating.pairs import Pair, discrepancy_evidence, score_pairs
+from toolpath_stiff.updating.ranking import Family, probabilities, score_families, signatures
+
+FloatArray = NDArray[np.float64]
+
+NONE = "none"
+OUTSIDE = "outside the catalogue"
+# What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
+PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.10
+FALSE_ALARM = 0.05  # of the base model's gate
+ADEQUATE = 0.02  # below this probability an explanation does not explain the data
+HELD = 0.95  # probability that the plausible set holds
+TESTED = 4  # candidates, besides all those that matter, that go through the absolute gate
+SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alone
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the data say under one noise model.
+
+    Attributes
+    ----------
+    verdict, plausible
+        See above; names that hold the truth with 95 % probability.
+    problem, noise
+        Data and scatter.
+    base, base_gate
+        The model with its strut law refitted, and its absolute test.
+    families
+        All effects, most likely first.
+    gates
+        Effect (or "a + b") -> its absolute test, where it was made.
+    pairs
+        Pairs tried, most likely first.
+    probability
+        Hypothesis -> posterior probability: effects, `none`, "a + b", `OUTSIDE`. Hypotheses that fail the absolute gate
+        have none unless nothing passes.
+    form
+        The form of discrepancy that stands out, in words; "" if none was looked for.
+    """
+
+    verdict: str
+    plausible: tuple[str, ...]
+    problem: Problem
+    noise: Noise
+    base: Score
+    base_gate: Gate
+    families: tuple[Family, ...]
+    gates: dict[str, Gate]
+    pairs: tuple[Pair, ...]
+    probability: dict[str, float]
+    form: str
+
+    def family(self, name: str) -> Family:
+        """The family of an effect."""
+        return next(family for family in self.families if family.name == name)
+
+
+def judge(
+    problem: Problem, noise: Noise, covariance: FloatArray, effects: Sequence[Effect], seed: int
+) -> Judgement:
+    """Search all candidates, test them, and come to a verdict under one noise model."""
+    base = problem.score_base()
+    families = score_families(problem, effects, base)
+    forms = discrepancy_forms(problem.predictor)
+    simulator = Simulator.of(noise, covariance, seed)
+    gain = max((2.0 * (f.best.log_likelihood - base.log_likelihood) for f in families if f.best), default=0.0)
+    base_gate = absolute_gate(problem, base, simulator, forms, signatures(problem, families), gain)
+    work = _Work(problem, base, families, forms, simulator)
+    if base_gate.probability > FALSE_ALARM:
+        posterior = work.posterior(none=True, names=[f.name for f in families])
+        return work.judgement("adequate", _smallest_set(posterior), noise, base_gate, posterior, "")
+    # The base model stays in the running if only the gain of the best candidate, not its own residuals, spoke against.
+    none_stands = min(base_gate.squares_probability, base_gate.structure_probability) > ADEQUATE
+    names = work.adequate_singles(none_stands)
+    if names:
+        posterior = work.posterior(none=none_stands, names=names)
+        plausible = _smallest_set(posterior)
+        verdict = "identified" if len(plausible) == 1 else "ambiguous"
+        if plausible == (NONE,):
+            verdict = "adequate"
+        return work.judgement(verdict, plausible, noise, base_gate, posterior, "")
+    return work.beyond_singles(noise, base_gate)
+
+
+def _smallest_set(posterior: dict[str, float]) -> tuple[str, ...]:
+    """The fewest hypotheses that hold `HELD`, pairs as their members."""
+    found: list[str] = []
+    held = 0.0
+    for name, weight in sorted(posterior.items(), key=lambda item: (-item[1], item[0])):
+        if held >= HELD or weight <= 0.0:
+            break
+        found += [part for part in name.split(" + ") if part not in found]
+        held += weight
+    return tuple(found)
+
+
+class _Work:
+    """What one judgement passes from step to step."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        base: Score,
+        families: list[Family],
+        forms: dict[str, FloatArray],
+        simulator: Simulator,
+    ) -> None:
+        self.problem, self.base, self.families = problem, base, families
+        self.forms, self.simulator = forms, simulator
+        self.gates: dict[str, Gate] = {}
+        self.pairs: list[Pair] = []
+
+    def gate(self, name: str, score: Score) -> Gate:
+        """The absolute test of a fit, made once."""
+        if name not in self.gates:
+            self.gates[name] = absolute_gate(self.problem, score, self.simulator, self.forms)
+        return self.gates[name]
+
+    def posterior(self, none: bool, names: Sequence[str]) -> dict[str, float]:
+        """Probabilities of the base model (if it stands) and of single effects; 0 for all others."""
+        evidence = {f.name: f.log_evidence for f in self.families}
+        prior = {name: PRIOR_SINGLES / max(len(self.families), 1) for name in names}
+        return probabilities({NONE: self.base.log_evidence} | evidence, prior | ({NONE: PRIOR_NONE} if none else {}))
+
+    def adequate_singles(self, none_stands: bool) -> list[str]:
+        """Effects that pass the absolute gate, among all that could matter."""
+        offered = [f for f in self.families if f.best is not None]
+        if not offered:
+            return []
+        top = max(offered[0].log_evidence, self.base.log_evidence if none_stands else -np.inf)
+        # A family a hundred million times less likely than the best cannot matter unless the best fail.
+        passed: list[str] = []
+        for count, family in enumerate(offered):
+            assert family.best is not None
+            if count >= TESTED and (passed or family.log_evidence < top - 40.0):
+                if family.log_evidence < top - 12.0:
+                    break
+            if self.gate(family.name, family.best).probability > ADEQUATE:
+                passed.append(family.name)
+                top = max(family.log_evidence, -np.inf) if len(passed) == 1 else top
+        return passed
+
+    def beyond_singles(self, noise: Noise, base_gate: Gate) -> Judgement:
+        """No single effect will do: two, or something else."""
+        offered = [f for f in self.families if f.best is not None]
+        self.pairs = score_pairs(self.problem, self.families)
+        outside, form = -np.inf, ""
+        for score in (self.base, *(f.best for f in offered[:2] if f.best is not None)):
+            evidence, words = discrepancy_evidence(self.problem, score, self.forms)
+            if evidence > outside:
+                outside, form = evidence, words
+        singles = {f.name: f.log_evidence for f in self.families}
+        evidences, prior = {OUTSIDE: outside}, {OUTSIDE: PRIOR_OUTSIDE}
+        number = max(len(self.families) * (len(self.families) - 1) // 2, 1)
+        for pair in self.pairs[:TESTED]:
+            name = " + ".join(pair.names)
+            alone = max(singles[member] for member in pair.names)
+            if self.gate(name, pair.score).probability > ADEQUATE and pair.log_evidence > alone + SURVIVES:
+                evidences[name], prior[name] = pair.log_evidence, PRIOR_PAIRS / number
+        posterior = probabilities(evidences, prior)
+        if posterior[OUTSIDE] >= 1.0 - HELD or len(posterior) == 1:
+            return self.judgement("unexplained", (), noise, base_gate, posterior, form)
+        posterior.pop(OUTSIDE)
+        likely = [name for name, weight in posterior.items() if weight > 1.0 - HELD]
+        verdict = "identified" if len(likely) == 1 else "ambiguous"
+        return self.judgement(verdict, _smallest_set(posterior), noise, base_gate, posterior, form)
+
+    def judgement(
+        self,
+        verdict: str,
+        plausible: tuple[str, ...],
+        noise: Noise,
+        base_gate: Gate,
+        posterior: dict[str, float],
+        form: str,
+    ) -> Judgement:
+        return Judgement(
+            verdict, plausible, self.problem, noise, self.base, base_gate, tuple(self.families), self.gates,
+            tuple(self.pairs), posterior, form,
+        )  # fmt: skip
