@@ -70,9 +70,7 @@ def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
     return scaled
 
 
-def _by_column(
-    column: FloatArray, words: str, same_direction: FloatArray, near: FloatArray
-) -> dict[str, FloatArray]:
+def _by_column(column: FloatArray, words: str, same_direction: FloatArray, near: FloatArray) -> dict[str, FloatArray]:
     if not np.isfinite(column).all() or np.ptp(column) == 0.0:
         return {}
     centred = _centred(column[:, None] / float(np.ptp(column)))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.updating.candidates import Candidate, Table
 from toolpath_stiff.updating.predict import Predictor
 from toolpath_stiff.updating.scatter import Scatter
-from toolpath_stiff.updating.size_prior import SizePrior, log_mean_likelihood, log_prior_of_component
+from toolpath_stiff.updating.size_prior import Sight, SizePrior
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -102,6 +102,7 @@ class Problem:
     scatter: Scatter
     covariance: FloatArray
     observed: FloatArray = field(init=False)
+    sight: Sight = field(init=False)
     rest: FloatArray = field(init=False)  # (n,) m/N of the machine file's own effects
     base_compliance: FloatArray = field(init=False)
 
@@ -109,6 +110,28 @@ class Problem:
         self.observed = np.log(self.predictor.data.stiffness)
         self.base_compliance = np.exp(-self.predictor.log_stiffness())
         self.rest = self.base_compliance - self.predictor.strut_part()
+        self._priors: dict[tuple[int, int], tuple[Table, SizePrior]] = {}
+        jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
+        self.sight = Sight(self.base_compliance, self.projected(jacobian))
+
+    def projected(self, jacobian: FloatArray) -> FloatArray:
+        """(n, n) P = A - A J (J^T A J + prior)^-1 J^T A: the inverse covariance of what a refit leaves.
+
+        `jacobian` (n, 2 + p) of ln k to the strut law and p sizes.
+        """
+        weighted = self.scatter.inverse @ jacobian
+        information = jacobian.T @ weighted
+        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        inner = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+        return np.asarray(self.scatter.inverse - weighted @ inner @ weighted.T)
+
+    def prior(self, table: Table, j: int) -> SizePrior:
+        """Prior of a component's size, worked out once."""
+        key = (id(table), j)
+        if key not in self._priors:
+            self._priors[key] = (table, SizePrior.of(table, j, self.sight))
+        return self._priors[key][1]
 
     def compliance(self, law: FloatArray, delta: FloatArray) -> FloatArray:
         """(..., n) for laws (..., 2) and added compliances (..., n); held above a tenth of the base model's."""
@@ -161,7 +184,7 @@ class Problem:
         sizes = np.sort(
             np.concatenate([s * np.geomspace(np.exp(k[0][0]), table.reach(s), GRID) for s, k in table.knots.items()])
         )
-        prior = SizePrior.of(table, sizes, self.base_compliance)
+        prior = self.prior(table, 0)
         scatter, law = self.scatter, start.law
         for last in range(MOST_ROUNDS, -1, -1):
             scan = self._refined(table, self._scan(table, sizes, scatter.inverse, law), scatter.inverse)
@@ -182,9 +205,7 @@ class Problem:
             jacobian, np.linalg.pinv(information), (0,), interval,
         )  # fmt: skip
 
-    def _scan(
-        self, table: Table, sizes: FloatArray, inverse: FloatArray, law: FloatArray, steps: int = 3
-    ) -> _Scan:
+    def _scan(self, table: Table, sizes: FloatArray, inverse: FloatArray, law: FloatArray, steps: int = 3) -> _Scan:
         laws, residuals, information = self.fit_law(table.delta(sizes[:, None]), inverse, law, steps)
         squared = np.einsum("gi,gi->g", residuals @ inverse, residuals)
         return _Scan(sizes, -0.5 * squared + _law_terms(laws, information), laws, residuals)
@@ -245,11 +266,11 @@ class Problem:
             evidence -= 0.5 * np.linalg.slogdet(information[:2, :2])[1]
             # By quadrature, which holds for sizes next to nothing as well, with the profile as a parabola.
             table, j = chosen[0]
-            evidence += log_mean_likelihood(table, j, own[0], float(deviations[0]), self.base_compliance)
+            evidence += self.prior(table, j).log_mean_likelihood(own[0], float(deviations[0]))
         else:
             evidence -= 0.5 * np.linalg.slogdet(information)[1]
             for (table, j), size, sd in zip(chosen, own, deviations, strict=True):
-                evidence += log_prior_of_component(table, j, size, float(sd), self.base_compliance)
+                evidence += self.prior(table, j).log_density_around(size, float(sd))
                 evidence += 0.5 * np.log(2.0 * np.pi)
         return Score(
             tuple(tables), tuple(sizes[id(t)] for t in tables), law, residual, scatter, likelihood, float(evidence),

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.updating.evidence import LAW_PRIOR, Problem, Score
+from toolpath_stiff.updating.evidence import Problem
 from toolpath_stiff.updating.noise import Noise
 
 FloatArray = NDArray[np.float64]
@@ -82,15 +82,6 @@ class Simulator:
         return cls(scatter)
 
 
-def projection(problem: Problem, jacobian: FloatArray) -> FloatArray:
-    """(n, n) P = A - A J (J^T A J + prior)^-1 J^T A: the inverse covariance of what a refit leaves."""
-    inverse = problem.scatter.inverse
-    weighted = inverse @ jacobian
-    information = jacobian.T @ weighted
-    information[:2, :2] += np.eye(2) / LAW_PRIOR**2
-    return np.asarray(inverse - weighted @ np.linalg.pinv(information, hermitian=True) @ weighted.T)
-
-
 def set_wild_aside(pulls: FloatArray, projected: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Pulls P r (s, n) as if the wild readings were not there, and the number of these (s,)."""
     diagonal = np.maximum(np.diag(projected), 1e-12)
@@ -136,20 +127,21 @@ class Structure:
 
 def absolute_gate(
     problem: Problem,
-    score: Score,
+    residual: FloatArray,
+    jacobian: FloatArray,
     simulator: Simulator,
     forms: dict[str, FloatArray],
     signatures: Sequence[Sequence[FloatArray]] = (),
     gain: float = 0.0,
 ) -> Gate:
-    """Test a fit against its own noise.
+    """Test a fit, its residual (n,) and jacobian (n, 2 + p), against its own noise.
 
     `signatures`: for the base model, one-sided signatures (n, p) of the candidates, to judge `gain`, the largest
     twice-log-likelihood gain of any of them.
     """
-    projected = projection(problem, score.jacobian)
+    projected = problem.projected(jacobian)
     # What the linearised refit leaves of the data is their residual; the law's prior pulls as in the simulation.
-    observed, wild = set_wild_aside((score.residual @ projected)[None], projected)
+    observed, wild = set_wild_aside((residual @ projected)[None], projected)
     pulls, count = set_wild_aside(simulator.draws @ projected, projected)
     squares = _quadratic(problem, pulls) + WILD_SQUARED * count
     observed_squares = float((_quadratic(problem, observed) + WILD_SQUARED * wild)[0])
@@ -187,9 +179,7 @@ def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(count, 0.5) / len(ordered))
 
 
-def largest_gain(
-    pulls: FloatArray, projected: FloatArray, signatures: Sequence[Sequence[FloatArray]]
-) -> FloatArray:
+def largest_gain(pulls: FloatArray, projected: FloatArray, signatures: Sequence[Sequence[FloatArray]]) -> FloatArray:
     """(s,) largest likelihood-ratio gain over candidates; each a list of matrices (n, p) with sizes >= 0."""
     best = np.zeros(len(pulls))
     for subsets in signatures:

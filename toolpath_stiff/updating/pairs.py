@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.updating.candidates import Table
 from toolpath_stiff.updating.evidence import Problem, Score
-from toolpath_stiff.updating.gates import Structure, projection, set_wild_aside
+from toolpath_stiff.updating.gates import Structure, set_wild_aside
 from toolpath_stiff.updating.ranking import Family
 
 FloatArray = NDArray[np.float64]
@@ -41,7 +41,7 @@ def score_pairs(problem: Problem, families: Sequence[Family]) -> list[Pair]:
     tables = [(family.name, table) for family in families for table in family.tables]
     for first in [family for family in families if family.best is not None][:STARTS]:
         assert first.best is not None
-        projected = projection(problem, first.best.jacobian)
+        projected = problem.projected(first.best.jacobian)
         pulls, _ = set_wild_aside((first.best.residual @ projected)[None], projected)
         partners = [(name, table) for name, table in tables if name != first.name]
         gains = [_gain(table, pulls[0], projected, problem) for _, table in partners]
@@ -101,7 +101,7 @@ def discrepancy_evidence(problem: Problem, score: Score, forms: Mapping[str, Flo
 
     averaged over amplitudes and forms.
     """
-    projected = projection(problem, score.jacobian)
+    projected = problem.projected(score.jacobian)
     pulls, _ = set_wild_aside((score.residual @ projected)[None], projected)
     surprises = Structure(dict(forms), projected).surprises(pulls)[0]
     gains, names = [], list(forms)

@@ -2,6 +2,9 @@
 
 Flat in the logarithm of the change that the effect makes to the stiffness: the same for every effect, so that none is
 preferred for the unit of its parameter. A size far from what is usual for the effect counts less. Bounds alone exclude.
+An effect too small for these data to show is not a hypothesis of its own: "nothing is missing" means nothing that these
+data could show. Its prior therefore starts where its signature, beside the strut law, rises above the noise; an effect
+that no size makes visible keeps its whole prior.
 """
 
 from __future__ import annotations
@@ -22,6 +25,34 @@ TAIL = 1.0  # sd of ln size beyond them
 USUAL = np.log(10.0)  # distance in ln size from the typical range at which the prior has halved
 
 
+VISIBLE = 3.0  # whitened length of a signature from which on it can be seen
+FADES = 0.7  # sd by which visibility fades below
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What these data can see: the base model's compliance (n,) and projected inverse covariance (n, n)."""
+
+    compliance: FloatArray
+    projected: FloatArray
+
+    def change(self, delta: FloatArray) -> FloatArray:
+        """(..., n) change of ln compliance by added compliances (..., n)."""
+        return np.asarray(np.log1p(np.maximum(delta / self.compliance, -0.9)))
+
+    def length(self, change: FloatArray) -> FloatArray:
+        """(...,) whitened length of changes (..., n) beside the strut law."""
+        squared = np.einsum("...i,...i->...", change @ self.projected, change)
+        return np.sqrt(np.maximum(squared, 0.0))
+
+
+def _log_visible(lengths: FloatArray) -> FloatArray:
+    """Log weight of sizes whose signatures have these lengths; all alike if none is visible."""
+    if lengths.max() < VISIBLE:
+        return np.zeros(len(lengths))
+    return np.asarray(-0.5 * (np.maximum(VISIBLE - lengths, 0.0) / FADES) ** 2)
+
+
 def _log_expected(rms: FloatArray) -> FloatArray:
     """Log prior density of ln rms change, not normalised: flat between `EXPECTED`, normal tails."""
     logs = np.log(np.maximum(rms, 1e-9))
@@ -40,83 +71,94 @@ def _log_usual(sizes: FloatArray, typical: tuple[float, float]) -> FloatArray:
     return np.asarray(-np.log1p((beyond / USUAL) ** 2))
 
 
-NORMALISER = np.log(EXPECTED[1] / EXPECTED[0]) + np.sqrt(2.0 * np.pi) * TAIL  # of `_log_expected`
-
-
-def log_prior_of_component(table: Table, j: int, size: float, sd: float, compliance: FloatArray) -> float:
-    """Log prior density at a size (of one sign); averaged over the posterior's width where that is wide."""
-    component = table.candidate.components[j]
-    around = max(size, sd)
-    unit = np.zeros(len(table.candidate.components))
-    unit[j] = around * component.signs[0] if size > 0 and len(component.signs) == 1 else around
-    rms = float(np.sqrt(np.mean(np.log1p(np.maximum(table.delta(unit) / compliance, -0.9)) ** 2)))
-    logs = _log_expected(np.array([rms])) + _log_usual(np.array([around]), component.typical())
-    return float(logs[0] - np.log(NORMALISER) - np.log(around) - np.log(len(component.signs)))
-
-
 @dataclass(frozen=True)
 class SizePrior:
-    """Prior of one size, tabulated; beyond the table it is 0."""
+    """Prior of one component's size, tabulated over the sizes that its table covers; beyond them it is 0.
 
-    sizes: FloatArray
-    log_density: FloatArray  # of the size itself, normalised
+    Attributes
+    ----------
+    log_sizes, log_density
+        Sign -> (g,) logarithms of sizes, and of the density over the logarithm of the size, normalised over all signs.
+    """
+
+    log_sizes: dict[float, FloatArray]
+    log_density: dict[float, FloatArray]
 
     @classmethod
-    def of(cls, table: Table, sizes: FloatArray, compliance: FloatArray) -> SizePrior:
-        change = np.log1p(np.maximum(table.delta(sizes[:, None]) / compliance, -0.999))
-        rms = np.sqrt(np.mean(change**2, axis=1))
-        component = table.candidate.components[0]
-        logs = _log_expected(rms) + _log_usual(sizes, component.typical()) - np.log(np.abs(sizes))
-        mass = sum(_trapezoid(sizes[side], logs[side]) for side in (sizes < 0.0, sizes > 0.0) if side.any())
-        return cls(sizes, logs - np.log(mass))
+    def of(cls, table: Table, j: int, sight: Sight) -> SizePrior:
+        """Of component `j` of a table."""
+        component = table.candidate.components[j]
+        logs, density, lengths = {}, {}, {}
+        for sign in component.signs:
+            if table.knots and sign not in table.knots:
+                continue
+            logs[sign] = np.log(_sizes(table, j, sign, sight))
+            sizes = np.zeros((len(logs[sign]), len(table.candidate.components)))
+            sizes[:, j] = sign * np.exp(logs[sign])
+            change = sight.change(table.delta(sizes))
+            rms = np.sqrt(np.mean(change**2, axis=1))
+            lengths[sign] = sight.length(change)
+            density[sign] = _log_expected(rms) + _log_usual(sizes[:, j], component.typical())
+        visible = _log_visible(np.concatenate(list(lengths.values())))
+        for sign, part in zip(
+            lengths, np.split(visible, np.cumsum([len(x) for x in lengths.values()])[:-1]), strict=True
+        ):
+            density[sign] = density[sign] + part
+        mass = sum(_trapezoid(logs[sign], density[sign]) for sign in logs)
+        return cls(logs, {sign: density[sign] - np.log(max(mass, 1e-300)) for sign in logs})
+
+    def log_at(self, sizes: FloatArray) -> FloatArray:
+        """(g,) log density of the size itself."""
+        out = np.full(len(sizes), -1e9)
+        for sign, logs in self.log_sizes.items():
+            where = sizes * sign > 0.0
+            at = np.log(np.abs(sizes[where]))
+            out[where] = np.interp(at, logs, self.log_density[sign], left=-1e9, right=-1e9) - at
+        return out
 
     def integrate(self, sizes: FloatArray, log_likelihood: FloatArray) -> tuple[float, FloatArray]:
-        """Log of the integral over sizes (g,) of both signs, and the 95 % interval of the size."""
-        density = np.empty(len(sizes))
-        for side in (sizes < 0.0, sizes > 0.0):
-            if side.any():
-                own = (self.sizes < 0.0) if sizes[side][0] < 0.0 else (self.sizes > 0.0)
-                # Interpolated in the logarithm of the size, where it is smooth.
-                order = np.argsort(np.log(np.abs(self.sizes[own])))
-                density[side] = np.interp(
-                    np.log(np.abs(sizes[side])),
-                    np.log(np.abs(self.sizes[own]))[order],
-                    (self.log_density[own] + np.log(np.abs(self.sizes[own])))[order],
-                ) - np.log(np.abs(sizes[side]))
-        logs = log_likelihood + density
+        """Log of the integral over rising sizes (g,) of both signs, and the 95 % interval of the size."""
+        logs = log_likelihood + self.log_at(sizes)
         top = float(logs.max())
         weights = np.exp(logs - top)
         pieces = 0.5 * (weights[1:] + weights[:-1]) * np.diff(sizes)
         pieces[(sizes[1:] > 0.0) & (sizes[:-1] < 0.0)] = 0.0
         total = max(float(pieces.sum()), 1e-300)
         cumulative = np.concatenate([[0.0], np.cumsum(pieces)]) / total
-        interval = np.interp([0.025, 0.975], cumulative, sizes)
-        return top + float(np.log(total)), interval
+        return top + float(np.log(total)), np.interp([0.025, 0.975], cumulative, sizes)
+
+    def log_mean_likelihood(self, peak: float, sd: float) -> float:
+        """Ln of the prior mean of exp(-(size - peak)^2 / (2 sd^2)), which is 1 at its peak, wherever that lies."""
+        total = 0.0
+        for sign, logs in self.log_sizes.items():
+            fine = sign * (peak + sd * np.linspace(-6.0, 6.0, 241))
+            inside = (fine > np.exp(logs[0])) & (fine < np.exp(logs[-1]))
+            at = np.unique(np.concatenate([logs, np.log(fine[inside])]))
+            likelihood = np.exp(-0.5 * ((sign * np.exp(at) - peak) / sd) ** 2)
+            values = np.exp(np.interp(at, logs, self.log_density[sign])) * likelihood
+            total += float((0.5 * (values[1:] + values[:-1]) * np.diff(at)).sum())
+        return float(np.log(max(total, 1e-300)))
+
+    def log_density_around(self, size: float, sd: float) -> float:
+        """Log density at a size; where the posterior is wide, at its width."""
+        around = np.sign(size) * max(abs(size), sd)
+        return float(max(self.log_at(np.array([around]))[0], -60.0))
+
+
+def _sizes(table: Table, j: int, sign: float, sight: Sight) -> FloatArray:
+    """Sizes of one sign to tabulate the prior at."""
+    if table.knots:
+        logs = table.knots[sign][0]
+        return np.exp(np.linspace(logs[0], logs[-1], 96))
+    unit = np.zeros(len(table.candidate.components))
+    unit[j] = sign
+    # Linear in its components: the rms change of a unit tells which sizes make a few per cent.
+    scale = float(np.sqrt(np.mean((table.delta(unit) / sight.compliance) ** 2)))
+    largest = min(20.0 * EXPECTED[1] / max(scale, 1e-300), table.candidate.components[j].reach(sign))
+    smallest = min(0.05 * EXPECTED[0] / max(scale, 1e-300), 0.1 * largest)
+    return np.geomspace(smallest, largest, 160)
 
 
 def _trapezoid(x: FloatArray, logs: FloatArray) -> float:
     weights = np.exp(logs)
     return float((0.5 * (weights[1:] + weights[:-1]) * np.abs(np.diff(x))).sum())
-
-
-def log_mean_likelihood(table: Table, j: int, peak: float, sd: float, compliance: FloatArray) -> float:
-    """ln of the prior mean of exp(-(size - peak)^2 / (2 sd^2)), which is 1 at its peak, wherever that lies."""
-    component = table.candidate.components[j]
-    unit = np.zeros(len(table.candidate.components))
-    unit[j] = 1.0
-    # The effect is linear in its components: ln size and ln rms change differ by a constant, for changes of a few %.
-    scale = float(np.sqrt(np.mean((table.delta(unit) / compliance) ** 2)))
-    logs = np.linspace(np.log(EXPECTED[0] * 0.05), np.log(EXPECTED[1] * 20.0), 1200)
-    sizes = np.exp(logs) / scale
-    fine = peak + sd * np.linspace(-6.0, 6.0, 240)
-    fine = fine[(fine > sizes[0]) & (fine < sizes[-1])]
-    sizes = np.unique(np.concatenate([sizes, fine]))
-    prior = _log_expected(sizes * scale) + _log_usual(sizes, component.typical())
-    weight = np.exp(prior) / NORMALISER / len(component.signs)
-    total = 0.0
-    for sign in component.signs:
-        inside = sizes <= component.reach(sign)
-        likelihood = np.exp(-0.5 * ((sign * sizes - peak) / sd) ** 2)
-        values = (weight * likelihood)[inside]
-        total += float((0.5 * (values[1:] + values[:-1]) * np.diff(np.log(sizes[inside]))).sum())
-    return float(np.log(max(total, 1e-300)))

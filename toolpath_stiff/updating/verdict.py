@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.discrepancy import discrepancy_forms
 from toolpath_stiff.updating.evidence import Problem, Score
+from toolpath_stiff.updating.fit import Fit, refine
 from toolpath_stiff.updating.gates import Gate, Simulator, absolute_gate
 from toolpath_stiff.updating.noise import Noise
 from toolpath_stiff.updating.pairs import Pair, discrepancy_evidence, score_pairs
@@ -52,8 +53,8 @@ class Judgement:
         The model with its strut law refitted, and its absolute test.
     families
         All effects, most likely first.
-    gates
-        Effect (or "a + b") -> its absolute test, where it was made.
+    gates, fits
+        Effect (or "a + b") -> its absolute test and final fit, where they were made.
     pairs
         Pairs tried, most likely first.
     probability
@@ -71,6 +72,7 @@ class Judgement:
     base_gate: Gate
     families: tuple[Family, ...]
     gates: dict[str, Gate]
+    fits: dict[str, Fit]
     pairs: tuple[Pair, ...]
     probability: dict[str, float]
     form: str
@@ -80,16 +82,16 @@ class Judgement:
         return next(family for family in self.families if family.name == name)
 
 
-def judge(
-    problem: Problem, noise: Noise, covariance: FloatArray, effects: Sequence[Effect], seed: int
-) -> Judgement:
+def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Sequence[Effect], seed: int) -> Judgement:
     """Search all candidates, test them, and come to a verdict under one noise model."""
     base = problem.score_base()
     families = score_families(problem, effects, base)
     forms = discrepancy_forms(problem.predictor)
     simulator = Simulator.of(noise, covariance, seed)
     gain = max((2.0 * (f.best.log_likelihood - base.log_likelihood) for f in families if f.best), default=0.0)
-    base_gate = absolute_gate(problem, base, simulator, forms, signatures(problem, families), gain)
+    base_gate = absolute_gate(
+        problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain
+    )
     work = _Work(problem, base, families, forms, simulator)
     if base_gate.probability > FALSE_ALARM:
         posterior = work.posterior(none=True, names=[f.name for f in families])
@@ -133,12 +135,14 @@ class _Work:
         self.problem, self.base, self.families = problem, base, families
         self.forms, self.simulator = forms, simulator
         self.gates: dict[str, Gate] = {}
+        self.fits: dict[str, Fit] = {}
         self.pairs: list[Pair] = []
 
     def gate(self, name: str, score: Score) -> Gate:
-        """The absolute test of a fit, made once."""
+        """The absolute test of a fit, made once, with the model itself."""
         if name not in self.gates:
-            self.gates[name] = absolute_gate(self.problem, score, self.simulator, self.forms)
+            fit = self.fits[name] = refine(self.problem, score)
+            self.gates[name] = absolute_gate(self.problem, fit.residual, fit.jacobian, self.simulator, self.forms)
         return self.gates[name]
 
     def posterior(self, none: bool, names: Sequence[str]) -> dict[str, float]:
@@ -201,5 +205,5 @@ class _Work:
     ) -> Judgement:
         return Judgement(
             verdict, plausible, self.problem, noise, self.base, base_gate, tuple(self.families), self.gates,
-            tuple(self.pairs), posterior, form,
+            self.fits, tuple(self.pairs), posterior, form,
         )  # fmt: skip
