@@ -1,0 +1,21 @@
+from __future__ import annotations
+
+import io
+import json
+
+import pytest
+from matplotlib.image import imread
+
+from tests.report import diagnose_documents as documents
+from toolpath_stiff.report.diagnose_pictures import confounding_png, detectable_png, ladder_png
+
+PICTURES = (ladder_png, confounding_png, detectable_png)
+
+
+@pytest.mark.parametrize("draw", PICTURES)
+@pytest.mark.parametrize("name", documents.ALL)
+def test_every_verdict_is_drawn_with_the_same_bytes_again(name, draw):
+    document = json.loads(json.dumps(documents.ALL[name]()))
+    first = draw(document)
+    assert imread(io.BytesIO(first), format="png").shape[1] >= 700
+    assert draw(document) == first

@@ -1,0 +1,339 @@
+"""Pictures of a diagnosis: the candidate ladder, what cannot be told apart, what could hide, is the fit good enough.
+
+Each takes the content of `diagnose.json` and copes with entries that are absent or None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolpath_stiff.report.diagnose_words import (
+    NONE,
+    entries,
+    figure_of,
+    is_offered,
+    is_plausible,
+    name_text,
+    noise_floor_percent,
+    parameter_texts,
+    percent,
+    probability_text,
+    significant,
+)
+from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.wording import plain, shortened
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BLUE, PALE_BLUE, GREY, GREEN = "#2457a6", "#e3edfa", "#9aa5b1", "#2f855a"
+ROW = 0.47  # inch a candidate
+MOST_PAIRS = 5  # of the ladder; all are in diagnose.json
+BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and arrows stand for more
+
+
+def ladder_png(document: Mapping[str, Any]) -> bytes:
+    """PNG: every explanation with its error at left-out points and its probability, best first."""
+    rows = ladder_rows(document)
+    height = 1.75 + ROW * len(rows)
+    with house_style():
+        figure = new_figure(14.0, height)
+        _title(figure, "Which effect explains the data, and how surely?", _ladder_note(document))
+        bottom, top = 0.62 / height, 1.0 - 1.1 / height
+        shade = figure.add_axes((0.01, bottom, 0.985, top - bottom))
+        labels = figure.add_axes((0.02, bottom, 0.34, top - bottom))
+        errors = figure.add_axes((0.35, bottom, 0.31, top - bottom))
+        chances = figure.add_axes((0.69, bottom, 0.13, top - bottom))
+        words = figure.add_axes((0.82, bottom, 0.175, top - bottom))
+        for axes in (shade, labels, words):
+            axes.set_axis_off()
+            axes.set_xlim(0.0, 1.0)
+        for axes in (shade, labels, errors, chances, words):
+            axes.set_ylim(len(rows) - 0.5, -0.5)
+        for axes in (errors, chances):
+            axes.patch.set_visible(False)
+            axes.set_yticks([])
+            axes.grid(visible=False, axis="y")
+            axes.spines[["top", "right", "left"]].set_visible(False)
+        _ladder_labels(labels, rows, document)
+        _ladder_errors(errors, rows, document)
+        _ladder_chances(chances, rows)
+        _ladder_words(words, rows)
+        for y, row in enumerate(rows):
+            if _marked(row, document):
+                shade.axhspan(y - 0.5, y + 0.5, color=PALE_BLUE, lw=0)
+        return png_bytes(figure)
+
+
+def ladder_rows(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The base model, then pairs and effects as the document orders them."""
+    base = {**(document.get("baseline") or {}), "effect": NONE}
+    return [base, *entries(document, "pairs")[:MOST_PAIRS], *entries(document, "candidates")]
+
+
+def _marked(row: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
+    return is_plausible(row, document)
+
+
+def _ladder_note(document: Mapping[str, Any]) -> str:
+    plausible = entries(document, "plausible")
+    shown = f"shaded: holds the truth with 95 % probability ({len(plausible)})" if plausible else "nothing is plausible"
+    return (
+        f"verdict: {plain(str(document.get('verdict', '-')))}   ·   {shown}   ·   bar at a dot: standard error "
+        "of its fall from the base model   ·   grey: not offered"
+    )
+
+
+def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
+    for y, row in enumerate(rows):
+        if row.get("effect") == NONE:
+            name, small = "model without a further effect", "strut law refitted"
+        else:
+            name = name_text(row)
+            small = ", ".join(parameter_texts(row, intervals=False)) or plain(str(row.get("title") or ""))
+        colour = INK if is_offered(row) else GREY
+        weight = "bold" if _marked(row, document) else "normal"
+        axes.text(0.0, y - 0.16, shortened(name, 58), va="center", color=colour, weight=weight)
+        axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=MUTED if is_offered(row) else GREY, size=8)
+
+
+def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
+    base = figure_of(rows[0], "held_out_error_percent")
+    held = [figure_of(row, "held_out_error_percent") for row in rows]
+    inside = [figure_of(row, "mean_abs_error_percent") for row in rows]
+    known = [value for value in (*held, *inside) if value is not None]
+    end = 1.08 * max(known, default=1.0)
+    if base is not None:
+        end = min(end, BEYOND * base)
+    floor = noise_floor_percent(document)
+    end = max(end, 1.3 * floor if floor is not None else 0.0, 1e-6)
+    axes.set_xlim(0.0, end)
+    for value, text, style in ((floor, "noise floor", ":"), (base, "base model", "--")):
+        if value is not None:
+            axes.axvline(value, color=SECOND_ORANGE if style == ":" else INK, lw=1.3, ls=style, zorder=1)
+            axes.annotate(
+                f"{text} {percent(value)}", (value, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
+                textcoords="offset points", ha="center", size=8.5, color=SECOND_ORANGE if style == ":" else INK,
+            )  # fmt: skip
+    for y, row in enumerate(rows):
+        colour = _row_colour(row, document)
+        within, outside = inside[y], held[y]
+        if within is not None and within <= end:
+            axes.plot(within, y, "|", color=colour, ms=11, mew=1.6, zorder=3)
+        if outside is None:
+            continue
+        if outside > end:
+            axes.annotate(
+                f"{percent(outside)} \N{RIGHTWARDS ARROW}", (end, y), ha="right", va="center", size=9, color=colour
+            )
+            continue
+        axes.plot(outside, y, "o", color=colour, mfc=colour if is_offered(row) else "white", ms=8, zorder=4)
+        if (error := standard_error(base, outside, figure_of(row, "held_out_gain_in_se"))) is not None:
+            axes.plot([max(outside - error, 0.0), outside + error], [y, y], color=colour, lw=2.0, zorder=3)
+    axes.set_xlabel("mean |model - measured| / measured, %: dot at points left out, tick in sample", size=9)
+
+
+def standard_error(base: float | None, outside: float | None, gain_in_se: float | None) -> float | None:
+    """Standard error of the fall of the held-out error, from the fall in standard errors; None where unknown."""
+    if base is None or outside is None or not gain_in_se or base == outside:
+        return None
+    return abs((base - outside) / gain_in_se)
+
+
+def _row_colour(row: Mapping[str, Any], document: Mapping[str, Any]) -> str:
+    if not is_offered(row):
+        return GREY
+    if _marked(row, document):
+        return BLUE
+    return INK if row.get("effect") == NONE else "#52606d"
+
+
+def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
+    axes.set_xlim(0.0, 1.0)
+    for y, row in enumerate(rows):
+        value = figure_of(row, "probability")
+        axes.barh(y, value or 0.0, height=0.5, color=BLUE if is_offered(row) else GREY, zorder=2)
+        inside = (value or 0.0) > 0.6
+        axes.text(
+            (value or 0.0) + (-0.03 if inside else 0.03), y, probability_text(value), va="center",
+            ha="right" if inside else "left", size=9, color="white" if inside else INK, zorder=3,
+        )  # fmt: skip
+    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
+    axes.set_xlabel("probability", size=9)
+
+
+def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
+    import textwrap
+
+    for y, row in enumerate(rows):
+        text = str(row.get("words") or "") if is_offered(row) else str(row.get("remark") or "not offered")
+        if is_offered(row) and row.get("adequate") is False:
+            text = f"{text}; leaves structure" if text else "leaves structure"
+        lines = textwrap.wrap(plain(text), 34, max_lines=2, placeholder=" ...")
+        axes.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if is_offered(row) else MUTED)
+
+
+def confounding_png(document: Mapping[str, Any]) -> bytes:
+    """PNG: how alike the effects' signatures are on this design; effects that cannot be told apart stand in boxes."""
+    given = document.get("confounding") or {}
+    names, matrix, sets = confounding_in_order(given)
+    size = 0.42 * max(len(names), 3)
+    with house_style():
+        width, height = max(size + 3.6, 7.0), size + 2.9
+        figure = new_figure(width, height)
+        _title(
+            figure, "What can these data not tell apart?", "1: the same after refitting the strut law; boxed: one set"
+        )
+        axes = figure.add_axes((2.3 / width, 0.3 / height, size / width, size / height))
+        if not names:
+            _nothing(axes, "nothing to compare")
+            return png_bytes(figure)
+        axes.imshow(matrix, cmap="Blues", vmin=0.0, vmax=1.25, aspect="equal")
+        axes.set_xticks(range(len(names)), names, rotation=50, ha="left", rotation_mode="anchor", color=INK, size=9)
+        axes.xaxis.tick_top()
+        axes.set_yticks(range(len(names)), names, color=INK, size=9)
+        axes.tick_params(length=0)
+        axes.grid(visible=False)
+        axes.spines[:].set_visible(False)
+        for i, j in np.ndindex(matrix.shape):
+            value = matrix[i, j]
+            if i != j and np.isfinite(value) and value > 0.5:
+                axes.text(
+                    j, i, f"{value:.2f}".replace("0.", ".", 1), ha="center", va="center", size=8,
+                    color="white" if value > 0.85 else INK,
+                )  # fmt: skip
+        for start, count in sets:
+            axes.add_patch(_box(start - 0.5, count))
+        return png_bytes(figure)
+
+
+def _box(corner: float, count: int) -> Any:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle(
+        (corner, corner), count, count, fill=False, edgecolor=SECOND_ORANGE, lw=2.6, zorder=5, clip_on=False
+    )
+
+
+def confounding_in_order(
+    given: Mapping[str, Any],
+) -> tuple[list[str], np.ndarray[Any, np.dtype[np.float64]], list[tuple[int, int]]]:
+    """Names and matrix with the sets beside each other, the largest first, and (first place, size) of each set.
+
+    Within a set and after the sets, each effect follows the one that it is most like. An effect in several sets stands
+    with the first.
+    """
+    names = [plain(str(name)) for name in given.get("effects") or []]
+    matrix = np.array(given.get("matrix") or np.zeros((0, 0)), dtype=float)
+    if matrix.shape != (len(names), len(names)):
+        names = []
+        matrix = np.zeros((0, 0))
+    order: list[int] = []
+    boxes = []
+    for members in sorted(given.get("sets") or [], key=len, reverse=True):
+        places = [names.index(str(m)) for m in members if str(m) in names]
+        places = [place for place in places if place not in order]
+        if len(places) > 1:
+            boxes.append((len(order), len(places)))
+            order += _chain(places, matrix)
+    order += _chain([place for place in range(len(names)) if place not in order], matrix)
+    return [names[place] for place in order], matrix[np.ix_(order, order)], boxes
+
+
+def _chain(places: list[int], matrix: np.ndarray[Any, np.dtype[np.float64]]) -> list[int]:
+    """Each next to the one most like it, from the pair that is most alike."""
+    left = list(places)
+    if len(left) < 3:
+        return left
+    alike = np.nan_to_num(matrix)
+    inside = alike[np.ix_(left, left)] - np.eye(len(left)) * 2.0
+    chain = [left.pop(int(np.argmax(inside.max(axis=1))))]
+    while left:
+        chain.append(left.pop(int(np.argmax([alike[chain[-1], place] for place in left]))))
+    return chain
+
+
+def detectable_png(document: Mapping[str, Any]) -> bytes:
+    """PNG: the smallest size of each effect that these data would show, as the change of stiffness that it makes."""
+    given = [entry for entry in entries(document, "detectable") if isinstance(entry, Mapping)]
+    seen = sorted(
+        (e for e in given if e.get("detectable") is not False and figure_of(e, "rms_percent") is not None),
+        key=lambda e: figure_of(e, "rms_percent") or 0.0,
+    )
+    never = [e for e in given if e not in seen]
+    rows = [*seen, *never]
+    height = 1.7 + 0.32 * max(len(rows), 3)
+    with house_style():
+        figure = new_figure(11.0, height)
+        _title(
+            figure,
+            "What could be there unseen?",
+            "smallest size seen with 80 % power at 5 % family-wise, and the change it makes; less stays unseen",
+        )
+        axes = figure.add_axes((0.33, 0.58 / height, 0.62, 1.0 - 1.55 / height))
+        if not rows:
+            _nothing(axes, "not computed")
+            return png_bytes(figure)
+        reach = max((figure_of(e, "rms_percent") or 0.0 for e in seen), default=1.0)
+        axes.set_xlim(0.0, 1.32 * reach)
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        for y, entry in enumerate(rows):
+            size = f"{significant(figure_of(entry, 'size'))} {plain(str(entry.get('unit') or ''))}".rstrip()
+            if entry in seen:
+                value = figure_of(entry, "rms_percent") or 0.0
+                axes.barh(y, value, height=0.6, color=BLUE, zorder=2)
+                axes.text(value + 0.012 * reach, y, size, va="center", size=9.5)
+            else:
+                text = "not seen at any size that can be"
+                if figure_of(entry, "size") is not None:
+                    text += f", up to {size}"
+                axes.text(0.012 * reach, y, text, va="center", size=9.5, color="#a3333d")
+        axes.set_yticks(range(len(rows)), [shortened(_detectable_name(e), 42) for e in rows], color=INK)
+        axes.tick_params(axis="y", length=0)
+        axes.grid(visible=False, axis="y")
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.set_xlabel("change of stiffness that this size makes, rms over the readings, %")
+        return png_bytes(figure)
+
+
+def _detectable_name(entry: Mapping[str, Any]) -> str:
+    parameter = str(entry.get("parameter") or "").replace("_", " ")
+    return plain(f"{name_text(entry)}: {parameter}" if parameter else name_text(entry))
+
+
+def envelope_png(document: Mapping[str, Any]) -> bytes | None:
+    """PNG: the weighted sum of squares of base and best explanation among simulated ones; None without `gates`."""
+    gates = [gate for gate in entries(document, "gates") if isinstance(gate, Mapping) and gate.get("simulated")][:2]
+    if not gates:
+        return None
+    with house_style():
+        figure = new_figure(11.0, 4.0)
+        _title(figure, "Is it good enough?", "weighted sum of squares: simulated if the model were right, and observed")
+        for place, gate in enumerate(gates):
+            axes = figure.add_axes((0.07 + 0.47 * place, 0.16, 0.42, 0.56))
+            simulated = np.asarray(gate["simulated"], dtype=float)
+            axes.hist(simulated, bins=30, color="#b8c9e4", zorder=2)
+            observed = figure_of(gate, "squares")
+            if observed is not None:
+                axes.axvline(observed, color=SECOND_ORANGE, lw=2.2, zorder=3)
+            chance = probability_text(figure_of(gate, "probability"))
+            axes.set_title(f"{plain(str(gate.get('model') or '-'))}: probability {chance}", size=10)
+            axes.set_yticks([])
+            axes.spines[["top", "right", "left"]].set_visible(False)
+            axes.set_xlabel("weighted sum of squares (orange: observed)")
+        return png_bytes(figure)
+
+
+def _title(figure: Figure, text: str, note: str) -> None:
+    width, height = figure.get_size_inches()
+    figure.text(0.25 / width, 1.0 - 0.4 / height, text, fontsize=14, weight="bold")
+    figure.text(0.25 / width, 1.0 - 0.68 / height, note, fontsize=9.5, color=MUTED)
+
+
+def _nothing(axes: Axes, text: str) -> None:
+    axes.set_axis_off()
+    axes.text(0.0, 1.0, text, transform=axes.transAxes, va="top", color=MUTED, size=11)

@@ -1,0 +1,153 @@
+"""The words and figures of a diagnosis, the same on the terminal, in the pictures and on the page.
+
+Everything here takes entries of `diagnose.json`; whatever is absent or None is shown as "-" or left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from toolpath_stiff.report.wording import plain
+
+# Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
+MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
+NONE = "none"
+
+HEADLINES = {
+    "adequate": "Nothing is missing that these data could show",
+    "identified": "One explanation fits the data, and no other does",
+    "ambiguous": "Several explanations fit the data equally well",
+    "unexplained": "Something is missing, and nothing in the catalogue accounts for it",
+}
+
+
+def figure_of(entry: Mapping[str, Any] | None, name: str) -> float | None:
+    """A finite number of an entry, or None."""
+    value = (entry or {}).get(name)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(value)
+
+
+def entries(document: Mapping[str, Any], name: str) -> list[Any]:
+    """A list of the document, empty where it is absent."""
+    found = document.get(name)
+    return list(found) if isinstance(found, list | tuple) else []
+
+
+def significant(value: float | None, digits: int = 3) -> str:
+    """Three significant digits, in thousands as usual, with an exponent where there would be rows of zeros."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if -4 < size < 5:
+        return f"{value:.{max(digits - 1 - size, 0)}f}"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def percent(value: float | None, digits: int = 1) -> str:
+    """A figure that is in per cent already."""
+    return "-" if value is None else f"{value:.{digits}f} %"
+
+
+def probability_text(value: float | None) -> str:
+    """A probability from 0 to 1 as per cent; what rounds to 0 or 100 without being it says so."""
+    if value is None:
+        return "-"
+    if 0.0 < value < 0.005:
+        return "< 0.5 %"
+    if 0.995 < value < 1.0:
+        return "> 99.5 %"
+    return f"{100.0 * value:.0f} %"
+
+
+def effect_names(entry: Mapping[str, Any]) -> list[str]:
+    """Effects of a candidate (`effect`) or a pair (`effects`)."""
+    several = entry.get("effects")
+    names = several if isinstance(several, list | tuple) else [entry.get("effect", "?")]
+    return [plain(str(name)) for name in names]
+
+
+def name_text(entry: Mapping[str, Any]) -> str:
+    """Name with what it acts on: "weak_strut (strut 3)"; a pair as "a + b"."""
+    chosen: Mapping[str, Any] = entry.get("choice") or {}
+    parts = []
+    for name in effect_names(entry):
+        inner = chosen.get(name)
+        own = inner if isinstance(inner, Mapping) else chosen
+        acts_on = [f"{key} {value}" for key, value in own.items() if _says_something(value)]
+        parts.append(plain(f"{name} ({', '.join(acts_on)})") if acts_on else name)
+    return " + ".join(parts)
+
+
+def _says_something(value: object) -> bool:
+    return value not in ("", 0, None) and not isinstance(value, Mapping)
+
+
+def parameter_texts(entry: Mapping[str, Any], intervals: bool = True) -> list[str]:
+    """Each fitted size in words: "radial 5.12 nm/N (4.40 to 5.90)"; those of a pair one effect after the other."""
+    parameters = entry.get("parameters") or {}
+    texts = []
+    for key, value in parameters.items():
+        if isinstance(value, Mapping) and "value" not in value:  # a pair: effect -> its parameters
+            texts += parameter_texts({"parameters": value}, intervals)
+        elif isinstance(value, Mapping):
+            texts.append(_parameter_text(str(key), value, intervals))
+    return texts
+
+
+def _parameter_text(key: str, value: Mapping[str, Any], intervals: bool) -> str:
+    unit = str(value.get("unit") or "")
+    name = parameter_name(key, unit)
+    size = value.get("value")
+    # JSON holds no infinity; a stiffness without end is null there.
+    text = f"{name} {significant(size) if isinstance(size, int | float) else '-'} {unit}".rstrip()
+    interval = value.get("interval")
+    if intervals and isinstance(interval, list | tuple) and len(interval) == 2:
+        low, high = (significant(end) if isinstance(end, int | float) else "no limit" for end in interval)
+        text += f" ({low} to {high})"
+    return plain(text)
+
+
+def parameter_name(key: str, unit: str) -> str:
+    """The name in a machine file's key, `bar_stiffness_N_per_m`, without the unit and its underscores."""
+    tail = unit.replace("/", "_per_").replace(" ", "_").replace("%", "percent")
+    return (key.removesuffix(f"_{tail}") if tail else key).replace("_", " ")
+
+
+def is_offered(entry: Mapping[str, Any]) -> bool:
+    """False only where the diagnosis says so."""
+    return entry.get("offered") is not False
+
+
+def is_plausible(entry: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
+    """Whether all its effects are in the plausible set; a pair needs some probability of its own besides."""
+    plausible = entries(document, "plausible")
+    names = effect_names(entry)
+    if not plausible or not all(name in plausible for name in names):
+        return False
+    return len(names) == 1 or (figure_of(entry, "probability") or 0.0) > 0.0
+
+
+def best_explanation(document: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The pair or the candidate that the data favour, if one is offered."""
+    found = [e for e in (*entries(document, "pairs"), *entries(document, "candidates")) if is_offered(e)]
+    return max(found, key=lambda e: figure_of(e, "probability") or 0.0, default=None)
+
+
+def noise_floor_percent(document: Mapping[str, Any]) -> float | None:
+    """Mean absolute error that scatter alone would leave."""
+    noise = figure_of(document.get("baseline"), "noise_percent")
+    return None if noise is None else MEAN_OVER_SD * noise
+
+
+def plausible_text(names: Sequence[str]) -> str:
+    """The plausible set in words."""
+    if not names:
+        return "no effect of the catalogue"
+    return ", ".join("none (nothing is missing)" if name == NONE else plain(str(name)) for name in names)
