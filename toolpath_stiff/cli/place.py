@@ -14,13 +14,17 @@ from toolpath_stiff.cli.arguments import (
     add_machine_options,
     add_program_options,
     finite_number,
+    length_m,
     range_argument,
     read_program_for,
 )
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
+    from toolpath_stiff.analysis import Analysis
     from toolpath_stiff.machine import Machine
+    from toolpath_stiff.machine.model import Pose
+    from toolpath_stiff.nc import Program
     from toolpath_stiff.placement.batch import Keepout
     from toolpath_stiff.placement.search import Bounds
 
@@ -29,6 +33,7 @@ examples:
   tps place programs/pocket.nc --x -300:300 --y -300:300 --z 400:1250
   tps place programs/pocket.nc --z-values 400,600,800 --rotate 0 --objective mean
   tps place programs/pocket.nc --keep-out vice:100,100,0,300,300,900
+  tps place programs/pocket.nc --rotate 0 --write placed.nc
 
 A placement is where program zero sits and how the work is turned about it: the numbers of --origin. Files written to
 --out: placements.csv (the front), placement.json, front.png, profiles.png, map.png, setup.pdf,
@@ -70,11 +75,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--points", type=int, default=60, metavar="N", help="most points of the front (default: 60)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the search (default: 1)")
     parser.add_argument("--out", metavar="DIR", help="folder (default: reports/<program>-place)")
+    _add_write_options(parser)
     parser.add_argument("--no-plots", action="store_true", help="only placements.csv and placement.json")
     add_json_option(parser, "print placement.json to standard output and nothing else")
     add_program_options(parser)
     add_machine_options(parser)
     add_load_options(parser)
+
+
+def _add_write_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("the program itself, transformed to the recommended placement")
+    group.add_argument("--write", metavar="FILE", help="write it: run at the present origin it cuts as placed")
+    group.add_argument(
+        "--decimals", type=int, metavar="N", help="of its numbers (default: 4 in mm and degrees, 5 in inch)"
+    )
+    group.add_argument(
+        "--linearise",
+        type=length_m(10.0),
+        metavar="MM",
+        help="write arcs that the turn takes out of the planes as straight moves within MM (default: refuse them)",
+    )
 
 
 def _heights(text: str) -> list[float]:
@@ -97,6 +117,7 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.analysis.loads import parse_load
     from toolpath_stiff.analysis.path_analysis import analyse
     from toolpath_stiff.cli.progress import progress_bar
+    from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.placement.batch import work_path
     from toolpath_stiff.placement.report_data import analyse_before, front_rows, placement_summary, pose_of
@@ -105,6 +126,7 @@ def run(args: argparse.Namespace) -> int:
 
     if not 2 <= args.points <= 1000:
         raise InputError(f"--points {args.points}", expected="2 to 1000")
+    _check_write(args)
     model = build_model(load_machine(args.machine), args.effects)
     program = read_program_for(args, args.program, model.machine)
     load = parse_load(args.load)
@@ -130,8 +152,11 @@ def run(args: argparse.Namespace) -> int:
     best = analyse(model, again, origin=pose_of(found.best), **options)
     front = front_rows(model, again, found, args.step)
     summary = placement_summary(program, found, best, before, reason, front, args.objective, args.seed)
+    rewritten, summary["written"] = _rewrite(args, again, best, origin)
     out = Path(args.out) if args.out else Path("reports") / f"{Path(args.program).stem}-place"
     files = _write(args, out, summary, best, before)
+    if rewritten is not None:
+        files.append(write_atomically(args.write, rewritten))
     if args.json:
         json.dump(summary, sys.stdout, indent=2)
         print()
@@ -139,6 +164,49 @@ def run(args: argparse.Namespace) -> int:
         print(_table(summary))
         print("\n".join(["written:", *(f"  {file}" for file in files)]))
     return 0
+
+
+def _check_write(args: argparse.Namespace) -> None:
+    """What can be said of --write before the search."""
+    from toolpath_stiff.placement.rewrite import check_decimals
+
+    if not args.write:
+        for option in ("decimals", "linearise"):
+            if getattr(args, option) is not None:
+                raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
+        return
+    check_decimals(args.decimals)
+    target = Path(args.write)
+    if target.exists() and target.samefile(args.program):
+        raise InputError(f"--write {args.write} would replace the program itself", hint="give another file")
+
+
+def _rewrite(
+    args: argparse.Namespace, program: Program, placed: Analysis, origin: Pose
+) -> tuple[bytes | None, dict[str, Any] | None]:
+    """The transformed program's bytes, and what `placement.json` says of it; None, None unless asked for."""
+    if not args.write:
+        return None, None
+    import numpy as np
+
+    from toolpath_stiff.nc.tables import read_offsets, read_tool_table
+    from toolpath_stiff.placement.report_data import placement_row
+    from toolpath_stiff.placement.rewrite import rewrite_program, rewriting_differences
+
+    reading: dict[str, Any] = {
+        "offsets": read_offsets(args.offsets) if args.offsets else None,
+        "tools": read_tool_table(args.tools) if args.tools else None,
+        "block_delete": args.block_delete,
+    }
+    rewritten = rewrite_program(
+        program, placed.origin, origin, decimals=args.decimals, linearise=args.linearise, **reading
+    )
+    return rewritten.content, {
+        "file": args.write,
+        "analysed_at": placement_row(np.array(origin)),
+        "relative_difference": rewriting_differences(placed, rewritten, origin, **reading),
+        "notes": list(rewritten.notes),
+    }
 
 
 def _bounds(args: argparse.Namespace, machine: Machine) -> Bounds:
@@ -224,5 +292,17 @@ def _table(summary: dict[str, Any]) -> str:
     fanuc = (blocks["fanuc"] or blocks["fanuc_reason"]).replace("\n", "\n                ")
     lines.append(f"Fanuc-style     {fanuc}")
     lines.append(f"front           {len(summary['front'])} placements, {summary['pose_evaluations']} poses evaluated")
+    lines += _written(summary["written"]) if summary["written"] else []
     lines += [f"warning         {text}" for text in summary["warnings"]]
     return "\n".join(lines)
+
+
+def _written(written: dict[str, Any]) -> list[str]:
+    """What became of the transformed program."""
+    at, apart = written["analysed_at"], written["relative_difference"]
+    figures = ", ".join(f"{name} {value:.1e}" for name, value in apart.items())
+    lines = [
+        f"rewritten       {written['file']}; at X{at['x_mm']:g} Y{at['y_mm']:g} Z{at['z_mm']:g}, "
+        f"{at['rotation_deg']:g} degrees it differs from the placed program by (relative) {figures}"
+    ]
+    return lines + [f"                {note}" for note in written["notes"]]

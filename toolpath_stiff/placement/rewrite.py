@@ -1,22 +1,28 @@
 """A program written for another placement: analysed at the original origin its tool takes the placed path.
 
-`rewrite_program` returns the text; every motion word has new numbers, everything else stays byte for byte: comments,
-line numbers, blank lines, tape marks, line ends, upper and lower case.
+`rewrite_program` returns the text. Every motion word has new numbers; everything else stays byte for byte: comments,
+line numbers, order, blank lines, tape marks, line ends, upper and lower case. The rapid with which the tool comes from
+where the control was switched on is the one move that cannot match.
 """
 
 from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from toolpath_stiff.analysis.path_analysis import Analysis, analyse
+from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.frames import Pose as ShopPose
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.source import split_lines
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.nc.words import read_block
@@ -26,11 +32,22 @@ from toolpath_stiff.placement.rewrite_turn import Turn
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 LINE_END = re.compile("\r\n|\n|\r")
+FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # 0.01 mm is no machining; beyond nine a double has no more to say
+FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_per_mm"}
+SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
 @dataclass(frozen=True)
 class Rewritten:
-    """A rewritten program: its text, how it was encoded, and what the user should hear of."""
+    """A rewritten program.
+
+    Attributes
+    ----------
+    text, encoding
+        The program with its line ends, and how the original was encoded.
+    notes
+        What the user should hear of, sentences for people.
+    """
 
     text: str
     encoding: str
@@ -53,47 +70,109 @@ def rewrite_program(
     tools: dict[int, ToolEntry] | None = None,
     block_delete: bool = False,
 ) -> Rewritten:
-    """Write a program so that at the original origin it does what it does untouched at a placement."""
+    """Write a program so that at the original origin it does what it does, untouched, at a placement.
+
+    Parameters
+    ----------
+    program
+        As read; its file is read again for the line ends.
+    placement_origin, original_origin
+        Where program zero shall sit and sits, x, y, z in m, A, B, C in rad.
+    decimals
+        Of the numbers written; unless given, 4 in mm and degrees, 5 in inch.
+    linearise
+        m: arcs that lie in no plane any more, cycles that the set-up tilts and large turns of the tool are written as
+        straight moves that stay within this of them. Unless given they are refused.
+    offsets, tools, block_delete
+        What the program was read with, as in `parse_program`.
+
+    Raises
+    ------
+    InputError
+        A block cannot be expressed at the placement, with its line and the reason.
+    """
+    check_decimals(decimals)
     text, encoding = _text_of(program)
-    placement, original = _in_mm(placement_origin), _in_mm(original_origin)
-    turn = Turn(placement, original)
-    source = Tracer(program.name, Frames(copy.deepcopy(offsets or Offsets()), placement, placement), copy.deepcopy(tools))
-    out = Interpreter(
-        program.name, Frames(copy.deepcopy(offsets or Offsets()), original, original), copy.deepcopy(tools)
+    placement, original = _in_shop_units(placement_origin), _in_shop_units(original_origin)
+
+    def frames(origin: ShopPose) -> Frames:
+        return Frames(copy.deepcopy(offsets or Offsets()), origin, origin)
+
+    rewriter = Rewriter(
+        Tracer(program.name, frames(placement), copy.deepcopy(tools)),
+        Interpreter(program.name, frames(original), copy.deepcopy(tools)),
+        Turn(placement, original),
+        decimals,
+        None if linearise is None else mm_from_m(linearise),
     )
-    rewriter = Rewriter(source, out, turn, decimals, linearise)
-    pieces = _execute(rewriter, text, program.name, block_delete)
+    pieces = list(_rewritten_lines(rewriter, text, program.name, block_delete))
     return Rewritten("".join(pieces), encoding, tuple(rewriter.notes))
 
 
-def _execute(rewriter: Rewriter, text: str, name: str, block_delete: bool) -> Iterable[str]:
-    lines = split_lines(text, name)
-    ends = LINE_END.findall(text)
+def check_decimals(decimals: int | None) -> None:
+    """Raise `InputError` for a number of decimals that makes no program."""
+    if decimals is not None and not FEWEST_DECIMALS <= decimals <= MOST_DECIMALS:
+        raise InputError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
+
+
+def _rewritten_lines(rewriter: Rewriter, text: str, name: str, block_delete: bool) -> Iterator[str]:
+    """Lines with their ends; what follows the program's end stays as it is."""
+    lines, ends = split_lines(text, name), LINE_END.findall(text)
     ends += [""] * (len(lines) - len(ends))
-    started = running = True
-    started = False
+    between = ends[0] or "\n"
+    running, started = True, False
     for number, (line, end) in enumerate(zip(lines, ends, strict=False), 1):
-        block = read_block(line, number, name) if running else None
-        if block is None:
+        if not running:
             yield line + end
             continue
+        block = read_block(line, number, name)
+        written = [line]
         if block.percent:
             running, started = not started, True
-            yield line + end
-            continue
-        started = started or bool(block.words)
-        if block.optional and block_delete:
-            if block.words:
-                raise InputError(
-                    "a block that --block-delete leaves out cannot be rewritten",
-                    hint="take it out of the program, or leave out --block-delete",
-                    file=name,
-                    line=number,
-                )
-            yield line + end
-            continue
-        written, running = rewriter.block(block, line)
-        yield (end or "\n").join(written) + end
+        elif block.optional and block_delete:
+            _refuse_left_out(bool(block.words), number, name)
+        else:
+            started = started or bool(block.words)
+            written, running = rewriter.block(block, line)
+            if block.optional and written != [line] and SLASHED not in rewriter.notes:
+                rewriter.notes.append(SLASHED)
+        yield (end or between).join(written) + end
+
+
+def _refuse_left_out(words: bool, number: int, name: str) -> None:
+    """A block that --block-delete leaves out would stay as it was, and be wrong once the switch is off."""
+    if words:
+        raise InputError(
+            "a block that --block-delete leaves out cannot be rewritten",
+            hint="take it out of the program, or do without --block-delete",
+            file=name,
+            line=number,
+        )
+
+
+def rewriting_differences(
+    placed: Analysis, rewritten: Rewritten, original_origin: Pose, **reading: Any
+) -> dict[str, float]:
+    """Relative differences of mean, range and smallest stiffness: the rewritten program against the placed one.
+
+    Parameters
+    ----------
+    placed
+        The untouched program, analysed at the placement.
+    rewritten
+        Is read and analysed at the original origin with the same load, force and step.
+    original_origin
+        m and rad, as it was given to `rewrite_program`.
+    **reading
+        `offsets`, `tools`, `block_delete`, as for `parse_program`.
+    """
+    program = parse_program(rewritten.text, placed.program.name, origin=original_origin, **reading)
+    again = analyse(
+        placed.model, program, origin=original_origin, load=placed.load, step=placed.step, force=placed.force
+    )
+    wanted, found = (stiffness_figures(analysis, analysis.counted) for analysis in (placed, again))
+    scale = {"range": wanted["range_N_per_mm"] or wanted["mean_N_per_mm"]}  # a path of one point has no range
+    return {name: abs(found[key] - wanted[key]) / scale.get(name, wanted[key]) for name, key in FIGURES.items()}
 
 
 def _text_of(program: Program) -> tuple[str, str]:
@@ -108,6 +187,6 @@ def _text_of(program: Program) -> tuple[str, str]:
         return content.decode("latin-1"), "latin-1"
 
 
-def _in_mm(origin: Pose) -> Pose:
+def _in_shop_units(origin: Pose) -> ShopPose:
     x, y, z, a, b, c = origin
     return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))

@@ -19,7 +19,7 @@ from toolpath_stiff.placement.rewrite_words import FEED_DECIMALS, SAME, LineEdit
 
 NEAR = 2.0  # units by which the centre of an arc given by R may miss its place; beyond, I, J, K are written
 SLASH = re.compile(r"\s*/\d*")
-LINEARISE = "give --linearise MM, and straight moves are written that stay within that of it"
+LINEARISE = "give --linearise MM to have straight moves within MM of it, or place the work without that turn"
 
 
 class Rewriter(Controls):
@@ -53,7 +53,9 @@ class Rewriter(Controls):
         if "G53" in once:
             self._note("moves of G53 keep their machine coordinates")
         elif any(code in USES_AXES for code in once):
-            self._note("the reference points of G28 and G30 stay where they are; intermediate points move with the work")
+            self._note(
+                "the reference points of G28 and G30 stay where they are; intermediate points move with the work"
+            )
             self._home(edit, axes)
         elif source.motion in CYCLES:
             if self._matrix[arcs.PLANES[source.plane][2], arcs.PLANES[source.plane][2]] != 1.0:
@@ -70,7 +72,7 @@ class Rewriter(Controls):
                 self._arc(codes, edit, axes, plane)
         return [self._emit(edit)]
 
-    # -- homes -----------------------------------------------------------------------------------------------------------
+    # -- homes -----------------------------------------------------------------------------------------------------
 
     def _home(self, edit: LineEdit, axes: list[str]) -> None:
         """G28, G30: the intermediate point moves with the work, the reference point does not."""
@@ -90,7 +92,7 @@ class Rewriter(Controls):
             )
         self._go(edit, self._target(self.source.segments[0].end), axes, only=named)
 
-    # -- arcs --------------------------------------------------------------------------------------------------------------
+    # -- arcs ------------------------------------------------------------------------------------------------------
 
     def _arc(self, codes: Codes, edit: LineEdit, axes: list[str], plane: str) -> None:
         source = self.source
@@ -163,7 +165,7 @@ class Rewriter(Controls):
             return False
         return math.dist(found, (center[first], center[second])) <= NEAR * self._unit
 
-    # -- cycles ------------------------------------------------------------------------------------------------------------
+    # -- cycles ----------------------------------------------------------------------------------------------------
 
     def _cycle(self, codes: Codes, edit: LineEdit, axes: list[str], plane: str) -> None:
         """The hole's place turns and moves, bottom and R plane (in G90) move along the drilling axis."""
@@ -191,7 +193,7 @@ class Rewriter(Controls):
         if self.linearise is None:
             axis = AXES[arcs.PLANES[source.plane][2]]
             raise self._refusal(
-                f"{source.motion} drills along {axis}, and the placement tilts the work out of it", LINEARISE
+                f"{source.motion} drills along {axis}, and the placement turns the work out of it", LINEARISE
             )
         self._note("drilling cycles are written as their single moves")
         rows = source.recorder
@@ -201,7 +203,7 @@ class Rewriter(Controls):
         ]
         return self._one_by_one(codes, edit, axes, pieces)
 
-    # -- pieces ------------------------------------------------------------------------------------------------------------
+    # -- pieces ----------------------------------------------------------------------------------------------------
 
     def _piece_count(self, motion: int, start: list[float], end: list[float], arc: Arc | None) -> int:
         """Into how many pieces a move must be cut; refuses those that must be, unless it was asked for."""

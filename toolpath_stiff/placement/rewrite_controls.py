@@ -49,6 +49,7 @@ class Controls:
         self.decimals, self.linearise = decimals, linearise
         self.known = [False, False, False, True, True, True]
         self.notes: list[str] = []
+        self._coarsest = 0.0  # mm, the last decimal of any block so far: inches round coarser than mm
 
     def _note(self, sentence: str) -> None:
         if sentence not in self.notes:
@@ -58,7 +59,7 @@ class Controls:
         block = self.source.block
         return InputError(found, hint=hint, file=self.source.name, line=block.line)
 
-    # -- units and axes ------------------------------------------------------------------------------------------------
+    # -- units and axes --------------------------------------------------------------------------------------------
 
     @property
     def _digits(self) -> int:
@@ -94,7 +95,7 @@ class Controls:
             if letter in AXES:
                 self.known[AXES.index(letter)] = True
 
-    # -- words ---------------------------------------------------------------------------------------------------------
+    # -- words -----------------------------------------------------------------------------------------------------
 
     def _plane_word(self, codes: Codes, edit: LineEdit, before: str) -> str:
         """Turn the plane word of the block, if it has one; the plane that will be in force."""
@@ -147,7 +148,7 @@ class Controls:
             goal = there[axis] if out.absolute else (there[axis] - here[axis]) / parts
             edit.write(letter, goal / scale)
 
-    # -- execute and check ---------------------------------------------------------------------------------------------
+    # -- execute and check -----------------------------------------------------------------------------------------
 
     def _emit(self, edit: LineEdit) -> str:
         """Have `out` execute the edited line; its text."""
@@ -165,7 +166,8 @@ class Controls:
 
     def _check(self, first: int, first_out: int, pieces: bool) -> None:
         """Every cutting move of the block must be the placed one to within the rounding; of `pieces` the two ends."""
-        shortest = SHORTEST * self._unit
+        self._coarsest = unit = max(self._coarsest, self._unit)
+        shortest = SHORTEST * unit
         wanted = list(cutting_rows(self.source.recorder, first, shortest))
         found = list(cutting_rows(self.out.recorder, first_out, shortest))
         if pieces and wanted and found:
@@ -179,7 +181,7 @@ class Controls:
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.source.block.words if word.letter == "L"), 1.0)
         for one, other in zip(wanted, found, strict=True):
-            what = difference(self.turn, one, other, self._unit * max(repeats, 1.0))
+            what = difference(self.turn, one, other, unit * max(repeats, 1.0))
             if what:
                 unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
                 raise self._refusal(

@@ -64,17 +64,19 @@ def difference(turn: Turn, wanted: Row, found: Row, unit: float) -> str:
 
     For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them.
     """
-    for place, name in ((0, "starts"), (1, "ends")):
-        target, point = turn.point(wanted[place][:3]), found[place][:3]
+    ends = ((wanted.start, found.start, "starts"), (wanted.end, found.end, "ends"))
+    for placed, written, name in ends:
+        target, point = turn.point(placed[:3]), written[:3]
         apart = math.dist(target, point)
         if apart > END_UNITS * unit:
             return f"{name} {apart:.4g} mm off"
-    for place in (0, 1):
-        if any(wanted[place][3:]) or any(found[place][3:]) or turn.turns:
-            goal = turn.rotations(np.array([wanted[place][3:]]))[0]
-            angle = angle_between(goal, rotation_matrices(np.radians(found[place][3:])))
-            if angle > END_UNITS * max(unit, 1e-9):
-                return f"leans {angle:.4g} degrees otherwise"
+    for placed, written, _ in ends:
+        if placed[3:] == written[3:] and turn.keeps(placed[3:]):
+            continue
+        goal = turn.rotations(np.array([placed[3:]]))[0]
+        angle = angle_between(goal, rotation_matrices(np.radians(written[3:])))
+        if angle > END_UNITS * unit:
+            return f"leans {angle:.4g} degrees otherwise"
     if wanted.arc is None or found.arc is None:
         return "" if wanted.arc is found.arc else "is another kind of move"
     return _arc_difference(turn, wanted.arc, found, unit)

@@ -55,14 +55,17 @@ class Turn:
 
     def angles(self, abc: Sequence[float], near: Sequence[float]) -> list[float]:
         """Rotary words a, b, c in degrees; of the many that are the same rotation, those next to `near`."""
-        upright_tool = max(abs(abc[0]), abs(abc[1])) < UPRIGHT
-        if self._never_yaws and (upright_tool or not self.turns):
+        if self.keeps(abc):
             return list(abc)
         a, b, c = np.degrees(roll_pitch_yaw(self.rotations(np.array([abc], dtype=float))[0]))
         same = [np.array([a, b, c]), np.array([a + 180.0, 180.0 - b, c + 180.0])]
         close = [angles - 360.0 * np.round((angles - np.array(near)) / 360.0) for angles in same]
         best = min(close, key=lambda angles: float(np.abs(angles - near).max()))
         return [float(v) for v in best]
+
+    def keeps(self, abc: Sequence[float]) -> bool:
+        """Whether rotary words stay as they are: a vertical platform never yaws with the work."""
+        return self._never_yaws and (not self.turns or max(abs(abc[0]), abs(abc[1])) < UPRIGHT)
 
     def in_program(self, rotation: float) -> FloatArray:
         """(3, 3) turn as it looks in program axes that a work offset's rotation (degrees) turned already."""
