@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.updating.noise import CLAMPING, STRUT_SPREAD
+from toolpath_stiff.updating.noise import STRUT_SPREAD
 from toolpath_stiff.updating.plan_menu import Costs, Matters, Menu, Visits, possible_visits
 from toolpath_stiff.updating.plan_rivals import (
     SETTLED,
@@ -34,6 +34,7 @@ from toolpath_stiff.updating.plan_rivals import (
     expected_outcome,
     forecast_all,
     pair_shares,
+    repeat_and_clamping,
 )
 
 FloatArray = NDArray[np.float64]
@@ -107,6 +108,8 @@ class Plan:
         Work.
     rivals
         Those considered, the most probable first.
+    noise
+        Repeat noise of a reading and scatter of a clamping, relative sd.
     notes
         What was assumed or left out.
     """
@@ -123,6 +126,7 @@ class Plan:
     repeats: int | None
     minutes: float
     rivals: tuple[Rival, ...]
+    noise: tuple[float, float]
     notes: tuple[str, ...]
 
     @property
@@ -171,10 +175,10 @@ def plan_measurements(
     """
     if not 1 <= n <= MOST_VISITS:
         raise InputError(f"a plan of {n} poses", expected=f"1 to {MOST_VISITS}")
-    repeat, clamping = _noise(noise_relative)
+    repeat, clamping = repeat_and_clamping(noise_relative)
     ranked, notes = _ranked(rivals)
     menu, costs = menu or Menu(), costs or Costs()
-    visits = possible_visits(machine, menu, _matters(ranked), np.random.default_rng(seed))
+    visits = possible_visits(machine, menu, matters(ranked), np.random.default_rng(seed))
     forecasts, good, scatter = forecast_all(machine, ranked, visits.readings, effect_files, strut_spread)
     usable = np.logical_and.reduceat(good[visits.members], visits.starts)
     if not usable.any():
@@ -204,20 +208,9 @@ def plan_measurements(
         repeats=_repeats(visits, picked, forecasts, noise, seed),
         minutes=plan_minutes(visits, chosen, costs, menu),
         rivals=ranked,
+        noise=(repeat, clamping),
         notes=tuple(notes),
     )
-
-
-def _noise(relative: float | tuple[float, float]) -> tuple[float, float]:
-    """Repeat noise and clamping."""
-    if isinstance(relative, tuple):
-        repeat, clamping = relative
-    else:
-        clamping = float(min(CLAMPING, relative / np.sqrt(2.0)))
-        repeat = float(np.sqrt(max(relative**2 - clamping**2, 0.0)))
-    if not (0.0 < repeat <= 1.0 and 0.0 <= clamping <= 1.0):
-        raise InputError(f"a noise of {relative!r}", expected="more than 0 and at most 1 (100 %)")
-    return repeat, clamping
 
 
 def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
@@ -239,7 +232,8 @@ def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
     return tuple(replace(rival, weight=rival.weight / total) for rival in order), notes
 
 
-def _matters(rivals: Sequence[Rival]) -> Matters:
+def matters(rivals: Sequence[Rival]) -> Matters:
+    """What the rivals' answers hang on."""
     actives = [active for rival in rivals for active in rival.effects]
     needs = {column for active in actives for column in active.effect.needs}
     # A set-up that an effect acts on is a text among its values.

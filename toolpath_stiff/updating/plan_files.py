@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ VECTOR = ("dx", "dy", "dz")
 
 
 def plan_rows(
-    visits: Visits, chosen: Sequence[int], taken: Sequence[str] = (), repeats: Sequence[int] = ()
+    visits: Visits, chosen: Sequence[int], taken: Iterable[str] = (), repeats: Sequence[int] = ()
 ) -> list[dict[str, Any]]:
     """Rows of a measurement file in shop units, in measuring order.
 

@@ -143,7 +143,7 @@ class Costs:
         Another set-up: a riser on or off.
     """
 
-    reading: float = 2.0
+    reading: float = 1.0
     pose: float = 15.0
     tool: float = 10.0
     setup: float = 45.0

@@ -35,7 +35,7 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
 from toolpath_stiff.updating.candidates import Component
 from toolpath_stiff.updating.measurements import Measurements
-from toolpath_stiff.updating.noise import JOINT_ERROR, STRUT_SPREAD
+from toolpath_stiff.updating.noise import CLAMPING, JOINT_ERROR, STRUT_SPREAD
 from toolpath_stiff.updating.plan_menu import Visits
 from toolpath_stiff.updating.predict import JOINT_STEP, Predictor
 
@@ -113,6 +113,24 @@ class ReadingNoise:
     def shared_out(self, repeats: float) -> ReadingNoise:
         """The noise of the mean of so many re-clamped readings; the machine stays as it is."""
         return ReadingNoise(self.repeat / np.sqrt(repeats), self.clamping / np.sqrt(repeats), self.machine)
+
+
+def repeat_and_clamping(relative: float | tuple[float, float]) -> tuple[float, float]:
+    """Relative sd of a reading and of a clamping, from these or from that of a reading in total.
+
+    Raises
+    ------
+    InputError
+        A noise that cannot be.
+    """
+    if isinstance(relative, tuple):
+        repeat, clamping = relative
+    else:
+        clamping = float(min(CLAMPING, relative / np.sqrt(2.0)))
+        repeat = float(np.sqrt(max(relative**2 - clamping**2, 0.0)))
+    if not (0.0 < repeat <= 1.0 and 0.0 <= clamping <= 1.0):
+        raise InputError(f"a noise of {relative!r}", expected="more than 0 and at most 1 (100 %)")
+    return repeat, clamping
 
 
 def forecast_all(

@@ -1,0 +1,333 @@
+"""`tps plan`: what to measure next, or first."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.cli.arguments import add_json_option, finite_number, positive_number
+from toolpath_stiff.errors import InputError
+
+if TYPE_CHECKING:
+    from toolpath_stiff.machine import Machine
+    from toolpath_stiff.stiffness.effects.contract import Effect
+    from toolpath_stiff.updating.measurements import Measurements
+    from toolpath_stiff.updating.plan_campaign import Campaign
+    from toolpath_stiff.updating.plan_menu import Costs, Menu
+    from toolpath_stiff.updating.plan_rivals import Rival
+
+EPILOG = """\
+examples:
+  tps plan measurements.csv                       what would tell the plausible explanations apart
+  tps plan measurements.csv --between frame_compliance,joint_moment_stiffness --n 4
+  tps plan --machine nist                         a good first campaign
+  tps plan --machine nist --between spindle_compliance,table_compliance
+
+Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png.
+"""
+COSTS = ("reading", "pose", "tool", "setup")
+PLAN_POSES, CAMPAIGN_POSES = 6, 24
+CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument("data", nargs="*", metavar="DATA", help="measurement files, or nist-table1; none: a campaign")
+    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
+    parser.add_argument("--between", type=_names, metavar="A,B", help="tell these effects apart (or `none`)")
+    parser.add_argument("--n", type=int, metavar="N", help="poses (default: 6, or 24 of a first campaign)")
+    group = parser.add_argument_group("what may vary")
+    group.add_argument("--radius", type=positive_number("mm", 1e5), metavar="MM", help="about the axis (default: 300)")
+    group.add_argument("--heights", type=_numbers, metavar="Z,Z,...", help="of the tool tip, mm (default: five levels)")
+    group.add_argument("--max-tilt", type=_tilt, metavar="DEG", help="of the spindle (default: 25)")
+    group.add_argument("--loads", type=_numbers, metavar="N,N,...", help="default: 500,1000,4000 and those of the data")
+    group.add_argument(
+        "--tools", type=_numbers, metavar="MM,MM,...",
+        help="tools, longer than the reference tool by; the first is in the spindle (default: as last, and 150)",
+    )  # fmt: skip
+    group.add_argument(
+        "--setups", type=_names, metavar="NAME,...", help="the first is on the table (default: those of the data)"
+    )
+    group.add_argument(
+        "--cost", action="append", default=[], type=_cost, metavar="WHAT=MINUTES",
+        help="of a reading (default 1), a pose (15), another tool (10), another setup (45)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--noise", type=positive_number("%", 50.0), metavar="PERCENT", help="of one reading, if the data do not tell it"
+    )
+    parser.add_argument(
+        "--strut-spread", type=float, default=1.0, metavar="PERCENT", help="between struts (default: 1)"
+    )
+    parser.add_argument("--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="accepted for uniformity; a plan needs one")
+    parser.add_argument("--out", default="reports/plan", metavar="DIR", help="folder (default: reports/plan)")
+    parser.add_argument("--no-plots", action="store_true", help="no plan.png")
+    add_json_option(parser, "print plan.json to standard output and nothing else")
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(dict.fromkeys(finite_number(part) for part in text.split(",")))
+
+
+def _tilt(text: str) -> float:
+    value = finite_number(text)
+    if not 0.0 <= value < 90.0:
+        raise argparse.ArgumentTypeError(f"{text} degrees: expected 0 or more and less than 90")
+    return value
+
+
+def _cost(text: str) -> tuple[str, float]:
+    name, _, minutes = text.partition("=")
+    if name not in COSTS:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected {', '.join(COSTS)} and =MINUTES")
+    value = finite_number(minutes)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected minutes, 0 or more")
+    return name, value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Plan, write the files, say what the plan promises."""
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.stiffness.effects.registry import known_effects
+    from toolpath_stiff.updating.plan_menu import Costs
+
+    if args.seed < 0:
+        raise InputError(f"--seed {args.seed}", expected="0 or more")
+    if not 0.0 <= args.strut_spread <= 50.0:
+        raise InputError(f"--strut-spread {args.strut_spread:g}", expected="0 to 50 %")
+    machine = load_machine(args.machine)
+    effects = known_effects(args.effects)
+    costs = Costs(**dict(args.cost))
+    if args.data or args.between:
+        document, contents = _told_apart(args, machine, effects, costs)
+    else:
+        document, contents = _campaign(args, machine, effects, costs)
+    document |= {
+        "machine": machine.name,
+        "data": list(args.data),
+        "seed": args.seed,
+        "costs_minutes": {name: getattr(costs, name) for name in COSTS},
+        "command": " ".join(["tps", *sys.argv[1:]]),
+    }
+    text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    written = _write(Path(args.out), {"plan.csv": contents["plan.csv"], "plan.json": text, **contents})
+    if args.json:
+        print(text, end="")
+    else:
+        print(_table(document))
+        print("\n".join(["written:", *(f"  {file}" for file in written)]))
+    return 0
+
+
+def _write(out: Path, contents: dict[str, str | bytes]) -> list[Path]:
+    from toolpath_stiff.files import write_atomically
+
+    return [write_atomically(out / name, content) for name, content in contents.items()]
+
+
+def _menu(args: argparse.Namespace, menu: Menu) -> Menu:
+    from toolpath_stiff.units import m_from_mm, rad_from_deg
+    from toolpath_stiff.updating.plan_menu import with_options
+
+    return with_options(
+        menu,
+        radius=None if args.radius is None else m_from_mm(args.radius),
+        heights=None if args.heights is None else tuple(m_from_mm(z) for z in args.heights),
+        max_tilt=None if args.max_tilt is None else rad_from_deg(args.max_tilt),
+        loads=args.loads,
+        tool_extensions=None if args.tools is None else tuple(m_from_mm(t) for t in args.tools),
+        setups=args.setups,
+    )
+
+
+# -- telling rivals apart ----------------------------------------------------------------------------------------------
+
+
+def _told_apart(
+    args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    from toolpath_stiff.updating.measurements import read_measurements
+    from toolpath_stiff.updating.plan import plan_document, plan_measurements
+    from toolpath_stiff.updating.plan_between import unfitted_rivals
+    from toolpath_stiff.updating.plan_files import plan_csv, plan_rows
+    from toolpath_stiff.updating.plan_menu import Menu
+
+    taken: set[str] = set()
+    noise: float | tuple[float, float]
+    if args.data:
+        data = read_measurements(args.data, machine)
+        taken = set(data.point.tolist())
+        menu = _menu(args, Menu.of(data))
+        rivals, noise, notes, verdict = _rivals(args, machine, data, effects)
+    else:
+        menu = _menu(args, Menu(setups=("table", "riser")))
+        noise = CAMPAIGN_NOISE if args.noise is None else args.noise / 100.0
+        rivals = unfitted_rivals(args.between, effects, setup=menu.setups[-1])
+        notes = ["no data: the rivals are taken at their usual sizes"]
+        notes += [] if args.noise else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
+        verdict = ""
+    n = PLAN_POSES if args.n is None else args.n
+    plan = plan_measurements(
+        machine, rivals, noise, n, menu=menu, costs=costs, seed=args.seed, effect_files=args.effects,
+        strut_spread=args.strut_spread / 100.0,
+    )  # fmt: skip
+    plan = replace(plan, notes=(*notes, *plan.notes))
+    rows = plan_rows(plan.visits, plan.chosen, taken)
+    document = {"kind": "rivals", "verdict": verdict, **plan_document(plan)}
+    document["visits"] = _visits(rows, plan.kinds, plan.why)
+    contents: dict[str, Any] = {"plan.csv": plan_csv(rows)}
+    if not args.no_plots:
+        from toolpath_stiff.report.plan_picture import plan_picture
+        from toolpath_stiff.updating.plan_map import gap_map
+
+        gap = gap_map(machine, plan, menu, args.effects)
+        title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
+        text = f"machine {machine.name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
+        contents["plan.png"] = plan_picture(plan.visits, plan.chosen, plan.kinds, gap, title, text)
+    return document, contents
+
+
+def _rivals(
+    args: argparse.Namespace, machine: Machine, data: Measurements, effects: dict[str, Effect]
+) -> tuple[list[Rival], tuple[float, float], list[str], str]:
+    """Rivals, noise (repeat, clamping), notes, the verdict of the diagnosis ("" if none was made)."""
+    import numpy as np
+
+    from toolpath_stiff.updating.evidence import Problem
+    from toolpath_stiff.updating.noise import covariance, noise_models
+    from toolpath_stiff.updating.plan_between import fitted_rivals, rivals_of
+    from toolpath_stiff.updating.predict import Predictor
+    from toolpath_stiff.updating.scatter import Scatter
+    from toolpath_stiff.updating.verdict import judge
+
+    # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
+    noise = noise_models(data, None if args.noise is None else args.noise / 100.0, args.strut_spread / 100.0)[-1]
+    notes = [f"noise: {noise.origin}"]
+    predictor = Predictor(machine, data, args.effects)
+    scatter = covariance(noise, predictor)
+    problem = Problem(predictor, Scatter.of(noise, scatter), scatter)
+    verdict = ""
+    if args.between:
+        rivals = fitted_rivals(problem, args.between, effects)
+    else:
+        own = {entry.name for entry in (*machine.effects, *machine.instruments)}
+        lacking = data.cannot_test(effects.values())
+        tested = [effect for name, effect in effects.items() if name not in own and name not in lacking]
+        judgement = judge(problem, noise, scatter, tested, args.seed)
+        rivals, verdict = rivals_of(judgement), judgement.verdict
+        if verdict != "ambiguous":
+            notes.append(f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next")
+    return rivals, (float(np.sqrt(np.mean(noise.repeat**2))), noise.clamping), notes, verdict
+
+
+# -- a first campaign --------------------------------------------------------------------------------------------------
+
+
+def _campaign(
+    args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    from toolpath_stiff.updating.plan_campaign import RISER, TABLE, first_campaign
+    from toolpath_stiff.updating.plan_files import plan_csv, plan_rows
+    from toolpath_stiff.updating.plan_menu import Menu
+
+    noise = CAMPAIGN_NOISE if args.noise is None else args.noise / 100.0
+    campaign = first_campaign(
+        machine, CAMPAIGN_POSES if args.n is None else args.n, menu=_menu(args, Menu(setups=(TABLE, RISER))),
+        costs=costs, seed=args.seed, effects=effects, noise=noise, effect_files=args.effects,
+    )  # fmt: skip
+    chosen = range(len(campaign.visits))
+    rows = plan_rows(campaign.visits, chosen, repeats=campaign.repeats)
+    document = {
+        "kind": "campaign",
+        "poses": len({row["point"] for row in rows}),
+        "readings": len(rows),
+        "minutes": campaign.minutes,
+        "sees": [{"effect": name, "gap_sigma": gap} for name, gap in campaign.sees.items()],
+        "text": _campaign_text(campaign, rows, noise),
+        "notes": [f"seen or not: at a noise of {100 * noise:g} %, each effect alone at its usual size"],
+        "visits": _visits(rows, campaign.purposes, campaign.purposes),
+    }
+    contents: dict[str, Any] = {"plan.csv": plan_csv(rows)}
+    if not args.no_plots:
+        from toolpath_stiff.report.plan_picture import plan_picture
+
+        text = f"machine {machine.name}   ·   {len(chosen)} clampings, {len(rows)} readings; lines: where spindles lean"
+        contents["plan.png"] = plan_picture(campaign.visits, chosen, campaign.purposes, None, "A first campaign", text)
+    return document, contents
+
+
+def _campaign_text(campaign: Campaign, rows: list[dict[str, Any]], noise: float) -> list[str]:
+    heights = sorted({row["z_mm"] for row in rows})
+    hidden = [name for name, gap in campaign.sees.items() if gap < 3.0]
+    lines = [
+        f"{len({row['point'] for row in rows})} poses at {len(heights)} heights, {len(campaign.visits)} clampings, "
+        f"{len(rows)} readings: about {campaign.minutes / 60.0:.0f} hours"
+    ]
+    if hidden:
+        lines.append(f"of usual size and alone, these would not show at {100 * noise:g} % noise: {', '.join(hidden)}")
+    return lines
+
+
+# -- for people --------------------------------------------------------------------------------------------------------
+
+
+def _visits(rows: list[dict[str, Any]], kinds: tuple[str, ...], why: tuple[str, ...]) -> list[dict[str, Any]]:
+    """One entry a clamping: where, how, what is read, why."""
+    from toolpath_stiff.updating.plan_files import POSE
+
+    found = []
+    for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):
+        own = [row for row in rows if row["clamp"] == clamp]
+        first = own[0]
+        found.append(
+            {
+                "clamp": clamp,
+                "point": first["point"],
+                **{name: first[name] for name in POSE},
+                "tool_extension_mm": first["tool_extension_mm"],
+                "setup": first.get("setup", ""),
+                "forces_N": sorted({row["force_N"] for row in own}),
+                "directions": list(dict.fromkeys(_direction(row) for row in own)),
+                "kind": kind,
+                "why": reason,
+            }
+        )
+    return found
+
+
+def _direction(row: dict[str, Any]) -> str:
+    if "direction" in row:
+        return str(row["direction"])
+    return "".join(axis for axis, part in zip("XYZ", (row["dx"], row["dy"], row["dz"]), strict=True) if part)
+
+
+def _table(document: dict[str, Any]) -> str:
+    """The visits in measuring order, then what is to be expected."""
+    lines = [
+        f"{'':>4} {'x':>7} {'y':>7} {'z':>7} mm {'a':>6} {'b':>6} deg {'tool':>5} mm  load N     set-up, directions"
+    ]
+    for visit in document["visits"]:
+        loads = "/".join(f"{force:g}" for force in visit["forces_N"])
+        where = ", ".join([*([visit["setup"]] if visit["setup"] else []), " ".join(visit["directions"])])
+        lines.append(
+            f"{visit['clamp']:>4} {visit['x_mm']:>7.1f} {visit['y_mm']:>7.1f} {visit['z_mm']:>7.1f}    "
+            f"{visit['a_deg']:>6.1f} {visit['b_deg']:>6.1f}     {visit['tool_extension_mm']:>5g}     {loads:<10} "
+            f"{where}"
+        )
+        if document["kind"] == "rivals":
+            lines.append(f"{'':>5}{visit['why']}")
+    lines += ["", *document["text"]]
+    lines += [f"note: {note}" for note in document["notes"]]
+    return "\n".join(lines)

@@ -1,0 +1,152 @@
+"""What to measure next, drawn: how far the rivals would be apart over the workspace, and the planned poses by kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.wording import plain, shortened
+from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.updating.plan_map import GapMap
+from toolpath_stiff.updating.plan_menu import Visits
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+
+# Colours told apart by eyes that see no red or green (Okabe and Ito 2008), and shapes beside them.
+MARKS = (
+    ("o", "#ffffff"),
+    ("^", "#e69f00"),
+    ("s", "#56b4e9"),
+    ("D", "#cc79a7"),
+    ("v", "#f0e442"),
+    ("P", "#d55e00"),
+    ("X", "#999999"),
+)
+PANEL = 3.5  # inches a side
+MOST_PANELS = 5
+ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
+
+
+def plan_picture(
+    visits: Visits,
+    chosen: Sequence[int],
+    kinds: Sequence[str],
+    gap: GapMap | None,
+    title: str,
+    subtitle: str,
+) -> bytes:
+    """PNG: a column a height; with a map one row for vertical and one for tilted poses.
+
+    Parameters
+    ----------
+    visits, chosen, kinds
+        Planned visits in measuring order, and what each changes.
+    gap
+        The gap over the workspace; None: the poses alone.
+    title, subtitle
+        Headings.
+    """
+    poses = visits.pose[list(chosen)]
+    levels = gap.levels if gap is not None else _levels(poses[:, 2])
+    rows = 1 if gap is None else 2
+    nearest = np.abs(poses[:, 2, None] - levels[None]).argmin(axis=1)
+    width, height = len(levels) * PANEL + 2.0, rows * (PANEL + 0.35) + 1.9
+    half = 1.08 * max(mm_from_m(float(np.abs(poses[:, :2]).max())), mm_from_m(gap.x[-1]) if gap is not None else 1.0)
+    numbers = _numbers(visits, chosen)
+    with house_style():
+        figure = new_figure(width, height)
+        grid = figure.add_gridspec(
+            rows, len(levels), left=0.75 / width, right=1 - 1.2 / width, bottom=1.05 / height,
+            top=1 - 1.15 / height, wspace=0.12, hspace=0.2,
+        )  # fmt: skip
+        highest = 0.0 if gap is None else float(np.nanmax([_top(gap.vertical), _top(gap.tilted), 1e-6]))
+        drawn: Any = None
+        for row in range(rows):
+            for column, level in enumerate(levels):
+                axes = figure.add_subplot(grid[row, column])
+                words = "" if gap is None else (", vertical", f", tilted {deg_from_rad(gap.max_tilt):.3g}°")[row]
+                if gap is not None:
+                    drawn = _map(axes, gap, (gap.vertical, gap.tilted)[row][column], highest)
+                tilted = poses[:, 3:5].any(axis=1)
+                own = (nearest == column) & ((tilted == bool(row)) | (gap is None))
+                _marks(axes, poses, kinds, numbers, np.flatnonzero(own), half)
+                axes.set_title(f"z = {mm_from_m(float(level)):.4g} mm{words}", fontsize=10)
+                axes.set_xlabel("X mm" if row == rows - 1 else "")
+                axes.set_ylabel("Y mm" if column == 0 else "")
+                axes.tick_params(labelleft=column == 0, labelbottom=row == rows - 1)
+        if drawn is not None:
+            bar = figure.add_axes((1 - 0.95 / width, 1.05 / height, 0.18 / width, 1 - 2.2 / height))
+            figure.colorbar(drawn, cax=bar, label="gap at one pose, standard deviations")
+            bar.grid(visible=False)
+        _legend(figure, kinds)
+        figure.text(0.75 / width, 1 - 0.42 / height, shortened(plain(title), 90), fontsize=14, weight="bold")
+        figure.text(0.75 / width, 1 - 0.72 / height, shortened(plain(subtitle), 130), fontsize=10, color=MUTED)
+        return png_bytes(figure)
+
+
+def _levels(z: FloatArray) -> FloatArray:
+    """The most frequent heights, rising; poses at others are drawn at the nearest."""
+    levels, counts = np.unique(np.round(z, 4), return_counts=True)
+    return np.sort(levels[np.argsort(-counts, kind="stable")[:MOST_PANELS]])
+
+
+def _top(values: FloatArray) -> float:
+    return float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
+
+
+def _map(axes: Axes, gap: GapMap, values: FloatArray, highest: float) -> Any:
+    x, y = mm_from_m(gap.x), mm_from_m(gap.y)
+    axes.set_facecolor("#eceff3")
+    return axes.pcolormesh(x, y, values, cmap=COLOUR_MAP, vmin=0.0, vmax=highest, shading="nearest", rasterized=True)
+
+
+def _numbers(visits: Visits, chosen: Sequence[int]) -> list[str]:
+    """Where each visit stands in measuring order; visits to one pose share a label."""
+    poses = [visits.pose[v].tobytes() for v in chosen]
+    return [", ".join(str(k + 1) for k, other in enumerate(poses) if other == pose) for pose in poses]
+
+
+def _marks(
+    axes: Axes, poses: FloatArray, kinds: Sequence[str], numbers: Sequence[str], own: NDArray[np.int64], half: float
+) -> None:
+    """Poses by kind, the tilt of the spindle as a line toward where it leans, numbered in measuring order."""
+    names = list(dict.fromkeys(kinds))
+    labelled: set[str] = set()
+    for k in own:
+        x, y = (float(v) for v in mm_from_m(poses[k, :2]))
+        # The spindle's axis R z leans toward (sin b cos a, -sin a) for small yaw.
+        lean = np.array([np.sin(poses[k, 4]) * np.cos(poses[k, 3]), -np.sin(poses[k, 3])])
+        if lean.any():
+            dx, dy = (ARROW * half * lean / np.sin(np.radians(25.0))).tolist()
+            axes.plot([x, x + dx], [y, y + dy], color=INK, lw=2.6, zorder=4)
+            axes.plot([x, x + dx], [y, y + dy], color="white", lw=1.4, zorder=5)
+        marker, colour = MARKS[names.index(kinds[k]) % len(MARKS)]
+        axes.plot(x, y, marker, ms=8, mfc=colour, mec=INK, mew=1.2, zorder=6, ls="none")
+        if numbers[k] not in labelled:
+            box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
+            axes.annotate(
+                numbers[k], (x, y), xytext=(7, 6), textcoords="offset points", fontsize=7.5, zorder=7, bbox=box
+            )
+            labelled.add(numbers[k])
+    axes.set_xlim(-half, half)
+    axes.set_ylim(-half, half)
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+
+
+def _legend(figure: Any, kinds: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+
+    names = list(dict.fromkeys(kinds))
+    handles = [
+        Line2D([], [], marker=MARKS[k % len(MARKS)][0], ls="none", ms=8, mfc=MARKS[k % len(MARKS)][1], mec=INK)
+        for k in range(len(names))
+    ]
+    figure.legend(handles, names, loc="lower left", ncol=len(names), frameon=False, fontsize=9, borderaxespad=0.6)
