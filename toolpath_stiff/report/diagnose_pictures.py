@@ -48,7 +48,7 @@ def ladder_png(document: Mapping[str, Any]) -> bytes:
         labels = figure.add_axes((0.02, bottom, 0.34, top - bottom))
         errors = figure.add_axes((0.35, bottom, 0.31, top - bottom))
         chances = figure.add_axes((0.69, bottom, 0.13, top - bottom))
-        words = figure.add_axes((0.82, bottom, 0.175, top - bottom))
+        words = figure.add_axes((0.845, bottom, 0.15, top - bottom))
         for axes in (shade, labels, words):
             axes.set_axis_off()
             axes.set_xlim(0.0, 1.0)
@@ -112,12 +112,17 @@ def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[
     floor = noise_floor_percent(document)
     end = max(end, 1.3 * floor if floor is not None else 0.0, 1e-6)
     axes.set_xlim(0.0, end)
-    for value, text, style in ((floor, "noise floor", ":"), (base, "base model", "--")):
+    for value, other, text, colour, style in (
+        (floor, base, "noise floor", SECOND_ORANGE, ":"),
+        (base, floor, "base model", INK, "--"),
+    ):
         if value is not None:
-            axes.axvline(value, color=SECOND_ORANGE if style == ":" else INK, lw=1.3, ls=style, zorder=1)
+            axes.axvline(value, color=colour, lw=1.3, ls=style, zorder=1)
+            leftwards = other is not None and value < other  # two labels turn away from each other
             axes.annotate(
-                f"{text} {percent(value)}", (value, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
-                textcoords="offset points", ha="center", size=8.5, color=SECOND_ORANGE if style == ":" else INK,
+                f"{text} {percent(value)}", (value, 1.0), xycoords=("data", "axes fraction"),
+                xytext=(4 if leftwards else -4, 3), textcoords="offset points", size=8.5, color=colour,
+                ha="right" if leftwards else "left",
             )  # fmt: skip
     for y, row in enumerate(rows):
         colour = _row_colour(row, document)
@@ -173,7 +178,7 @@ def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
         text = str(row.get("words") or "") if is_offered(row) else str(row.get("remark") or "not offered")
         if is_offered(row) and row.get("adequate") is False:
             text = f"{text}; leaves structure" if text else "leaves structure"
-        lines = textwrap.wrap(plain(text), 34, max_lines=2, placeholder=" ...")
+        lines = textwrap.wrap(plain(text), 31, max_lines=2, placeholder=" ...")
         axes.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if is_offered(row) else MUTED)
 
 

@@ -1,0 +1,335 @@
+"""Before and after: residuals on the machine on one colour scale, the ladder of errors, the paper's Figure 3."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.report.diagnose_words import best_explanation, figure_of, name_text, percent, significant
+from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.wording import number, plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from toolpath_stiff.updating.measurements import Measurements
+
+FloatArray = NDArray[np.float64]
+
+BLUE = "#2457a6"
+RESIDUAL_MAP = "RdBu"  # red: measured softer than modelled, blue: stiffer
+DIRECTION_COLOURS = {"X": "#2457a6", "Y": "#de6b12", "Z": "#2f855a", "oblique": "#7b4fa0"}
+ALONG = 0.99  # cosine from which a direction counts as that axis: 8 degrees
+MOST_LEVELS = 3  # rows of maps; more heights are put together
+SHOWN = 0.98  # share of the residuals that the colour scale holds
+BAND = 0.10  # drawn about measured = modelled
+MAP = 2.05  # inch
+
+
+def before_after_png(
+    document: Mapping[str, Any],
+    data: Measurements,
+    before: FloatArray,
+    after: FloatArray | None,
+    *,
+    names: tuple[str, str] | None = None,
+) -> bytes:
+    """PNG: where model and measurements differ, seen from above, before and after, and measured against modelled.
+
+    Parameters
+    ----------
+    document
+        Content of diagnose.json, or anything with `baseline` and the error at left-out points.
+    data
+        n readings.
+    before, after
+        (n,) ln(measured / modelled). Without `after` only the first half is drawn.
+    names
+        What the two models are called; else taken from the document.
+    """
+    halves = [np.asarray(before, dtype=float)]
+    if after is not None:
+        halves.append(np.asarray(after, dtype=float))
+    known = (document.get("baseline") or {}, best_explanation(document) or {})
+    called = names or ("strut law refitted", f"with {name_text(known[1])}")
+    directions, levels = _directions(data), _levels(data)
+    columns, rows = [d for d in DIRECTION_COLOURS if (directions == d).any()], np.unique(levels)
+    limit = _limit(halves)
+    block = MAP * len(columns) + 0.3
+    width = max(1.1 + len(halves) * block + 0.9, 11.0 if len(halves) > 1 else 8.0)
+    height = 1.35 + MAP * len(rows) + 0.4 + 4.0
+    question = "Did the error fall, and what remains?" if len(halves) > 1 else "Where does the model fail?"
+    with house_style():
+        figure = new_figure(width, height)
+        figure.text(0.25 / width, 1.0 - 0.4 / height, question, size=14, weight="bold")
+        figure.text(
+            0.25 / width, 1.0 - 0.66 / height, "maps from above, X to the right; a point: mean of its readings",
+            size=9.5, color=MUTED,
+        )  # fmt: skip
+        for half, residual in enumerate(halves):
+            left = 0.95 + half * block
+            figure.text(
+                left / width,
+                1.0 - 1.0 / height,
+                _half_title(called[half], known[half], residual),
+                size=10.5,
+                weight="bold",
+            )
+            for i, level in enumerate(rows):
+                for j, direction in enumerate(columns):
+                    bottom = height - 1.35 - MAP * (i + 1) + 0.1
+                    axes = figure.add_axes(
+                        ((left + MAP * j) / width, bottom / height, (MAP - 0.15) / width, (MAP - 0.3) / height)
+                    )
+                    chosen = (levels == level) & (directions == direction)
+                    points = _map(axes, data, residual, chosen, limit)
+                    axes.set_title(direction if i == 0 else "", size=9.5, color=MUTED)
+                    if half == 0 and j == 0:
+                        axes.set_ylabel(_level_text(data, levels == level), size=9)
+        bar = figure.add_axes(
+            ((0.95 + len(halves) * block) / width, (height - 1.35 - MAP * len(rows) + 0.1) / height, 0.16 / width,
+             (MAP * len(rows) - 0.3) / height)
+        )  # fmt: skip
+        figure.colorbar(points, cax=bar, extend="both").set_label("measured over modelled, %", size=9)
+        bar.grid(visible=False)
+        _scatter_pair(figure, data, halves, directions)
+        return png_bytes(figure)
+
+
+def _half_title(name: str, entry: Mapping[str, Any], residual: FloatArray) -> str:
+    """Name and errors: the mean as the paper counts it, and at left-out points where it is known."""
+    relative = np.expm1(-residual[np.isfinite(residual)])
+    text = f"{shortened(plain(name), 44)}   mean error {100 * float(np.mean(np.abs(relative))):.1f} %"
+    held_out = figure_of(entry, "held_out_error_percent")
+    return text + (f" (at points left out {percent(held_out)})" if held_out is not None else "")
+
+
+def _directions(data: Measurements) -> NDArray[np.str_]:
+    """(n,) X, Y, Z, or oblique."""
+    along = np.abs(data.direction)
+    names = np.array(["X", "Y", "Z"])[np.argmax(along, axis=1)]
+    return np.where(along.max(axis=1) > ALONG, names, "oblique")
+
+
+def _levels(data: Measurements) -> NDArray[np.int64]:
+    """(n,) number of the height group, the highest first: each height its own, or as many equal bands as are shown."""
+    height = np.round(data.position[:, 2], 3)
+    own = np.unique(height)
+    if len(own) > MOST_LEVELS:
+        edges = np.linspace(own[0], own[-1], MOST_LEVELS + 1)[1:-1]
+        return np.asarray(MOST_LEVELS - np.digitize(height, edges), dtype=np.int64)
+    return np.asarray(len(own) - np.searchsorted(own, height), dtype=np.int64)
+
+
+def _level_text(data: Measurements, chosen: NDArray[np.bool_]) -> str:
+    heights = mm_from_m(data.position[chosen, 2])
+    low, high = float(heights.min()), float(heights.max())
+    return f"z {low:.0f} mm" if high - low < 1.0 else f"z {low:.0f} to {high:.0f} mm"
+
+
+def _limit(halves: Sequence[FloatArray]) -> float:
+    """End of the common colour scale, %: of both halves together, few extreme readings not taking the contrast."""
+    sizes = np.abs(100.0 * np.expm1(np.concatenate(halves)))
+    sizes = sizes[np.isfinite(sizes)]
+    return max(float(np.quantile(sizes, SHOWN)), 1e-3) if len(sizes) else 1.0
+
+
+def _map(axes: Axes, data: Measurements, residual: FloatArray, chosen: NDArray[np.bool_], limit: float) -> Any:
+    """One map: a disc a pose, readings of one pose averaged; poses above each other stand side by side."""
+    everywhere = mm_from_m(data.position[:, :2])
+    poses, which = np.unique(
+        np.round(np.concatenate([data.position, data.angles], axis=1)[chosen], 6), axis=0, return_inverse=True
+    )
+    percent_ = 100.0 * np.expm1(residual[chosen])
+    places, values = (
+        mm_from_m(poses[:, :2]),
+        np.array([np.mean(percent_[which.ravel() == k]) for k in range(len(poses))]),
+    )
+    reach = 0.5 * float(np.ptp(everywhere, axis=0).max()) or 100.0
+    centre = 0.5 * (everywhere.min(axis=0) + everywhere.max(axis=0))
+    places = _spread(places, 0.09 * reach)
+    drawn = axes.scatter(
+        places[:, 0], places[:, 1], c=values, cmap=RESIDUAL_MAP, vmin=-limit, vmax=limit, s=78, edgecolors=INK,
+        linewidths=0.5, zorder=3,
+    )  # fmt: skip
+    axes.plot(0.0, 0.0, "+", color=MUTED, ms=8, zorder=2)
+    axes.set_xlim(centre[0] - 1.2 * reach, centre[0] + 1.2 * reach)
+    axes.set_ylim(centre[1] - 1.2 * reach, centre[1] + 1.2 * reach)
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    return drawn
+
+
+def _spread(places: FloatArray, step: float) -> FloatArray:
+    """Points at one place moved onto a ring about it, so that each is seen."""
+    out = places.astype(float).copy()
+    _, which, count = np.unique(np.round(places, 1), axis=0, return_inverse=True, return_counts=True)
+    for group in np.flatnonzero(count > 1):
+        members = np.flatnonzero(which.ravel() == group)
+        angle = 2.0 * np.pi * np.arange(len(members)) / len(members)
+        out[members] += step * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return out
+
+
+def _scatter_pair(
+    figure: Figure,
+    data: Measurements,
+    halves: Sequence[FloatArray],
+    directions: NDArray[np.str_],
+) -> None:
+    """Measured against modelled, both on the same scales."""
+    width, height = figure.get_size_inches()
+    measured = n_per_mm_from_n_per_m(data.stiffness)
+    modelled = [measured * np.exp(-residual) for residual in halves]
+    values = np.concatenate([measured, *modelled])
+    values = values[np.isfinite(values)]
+    low, high = 0.93 * float(values.min()), 1.07 * float(values.max())
+    side = 3.2
+    step = max((width - 1.6) / len(halves), side + 0.8)
+    for half, stiffness in enumerate(modelled):
+        axes = figure.add_axes(((0.95 + half * step) / width, 0.55 / height, (step - 0.75) / width, side / height))
+        line = np.array([low, high])
+        axes.fill_between(line, line * (1.0 - BAND), line * (1.0 + BAND), color="#eef1f4", lw=0, zorder=1)
+        axes.plot(line, line, color=MUTED, lw=1.0, zorder=2)
+        for direction, colour in DIRECTION_COLOURS.items():
+            chosen = directions == direction
+            if chosen.any():
+                axes.plot(stiffness[chosen], measured[chosen], "o", ms=4.5, mfc="none", mec=colour, label=direction)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlim(low, high)
+        axes.set_ylim(low, high)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(_round_ticks(low, high))
+            axis.set_minor_locator(_no_ticks())
+            axis.set_major_formatter(lambda value, _: number(value))
+        axes.set_xlabel("modelled, N/mm")
+        if half == 0:
+            axes.set_ylabel("measured, N/mm")
+        axes.set_title(("before", "after")[half], size=10)
+        axes.legend(frameon=False, loc="upper left", title="grey: +-10 %", title_fontsize=8, fontsize=9)
+
+
+def _round_ticks(low: float, high: float) -> Any:
+    """1, 2, 3, 5, 7 times powers of ten within the axis."""
+    from matplotlib.ticker import FixedLocator
+
+    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    steps = (1.0, 2.0, 3.0, 5.0, 7.0) if high < 12.0 * low else (1.0, 3.0)
+    return FixedLocator(sorted(v for p in powers for s in steps if low <= (v := s * p) <= high))
+
+
+def _no_ticks() -> Any:
+    from matplotlib.ticker import NullLocator
+
+    return NullLocator()
+
+
+def error_ladder_png(
+    steps: Sequence[Mapping[str, Any]], noise_floor_percent: float | None = None, title: str = "How the error falls"
+) -> bytes:
+    """PNG: mean error from the first model to the last, in sample and at left-out points, with the noise floor.
+
+    Parameters
+    ----------
+    steps
+        Each with `name`, `mean_abs_error_percent`, `held_out_error_percent`; optionally `held_out_se_percent`, the
+        standard error of the fall from the step before, and `remark`.
+    noise_floor_percent
+        Mean absolute error that scatter alone would leave: 0.80 times its standard deviation.
+    """
+    with house_style():
+        figure = new_figure(max(7.0, 2.4 + 1.9 * len(steps)), 5.2)
+        width, height = figure.get_size_inches()
+        figure.text(0.25 / width, 1.0 - 0.4 / height, plain(title), size=14, weight="bold")
+        axes = figure.add_axes((0.85 / width, 0.95 / height, 1.0 - 1.15 / width, 1.0 - 1.75 / height))
+        at = np.arange(len(steps))
+        held, inside = (
+            np.array(
+                [figure_of(step, key) if figure_of(step, key) is not None else np.nan for step in steps], dtype=float
+            )
+            for key in ("held_out_error_percent", "mean_abs_error_percent")
+        )
+        axes.plot(at, held, "o-", color=BLUE, lw=2.0, ms=9, label="at points left out", zorder=4)
+        axes.plot(at, inside, "s--", color=MUTED, lw=1.3, ms=6, mfc="white", label="in sample", zorder=3)
+        spread = np.array([figure_of(step, "held_out_se_percent") or 0.0 for step in steps])
+        if spread.any():
+            axes.errorbar(at, held, yerr=spread, fmt="none", ecolor=BLUE, elinewidth=1.5, capsize=4, zorder=4)
+        if noise_floor_percent is not None:
+            axes.axhline(
+                noise_floor_percent, color=SECOND_ORANGE, ls=":", lw=1.5,
+                label=f"noise floor {percent(noise_floor_percent)}",
+            )  # fmt: skip
+        known = np.array([*held, *inside, noise_floor_percent or 0.0])
+        top = float(np.nanmax(known)) if np.isfinite(known).any() else 1.0
+        for x, value in zip(at, held, strict=True):
+            if np.isfinite(value):
+                axes.annotate(percent(float(value)), (x, value), xytext=(9, 7), textcoords="offset points", color=BLUE)
+        for x, value in zip(at, inside, strict=True):
+            if np.isfinite(value):
+                axes.annotate(
+                    percent(float(value)),
+                    (x, value),
+                    xytext=(-9, -14),
+                    textcoords="offset points",
+                    color=MUTED,
+                    size=9,
+                    ha="right",
+                )
+        axes.set_ylim(0.0, 1.25 * top or 1.0)
+        axes.set_xlim(-0.4, len(steps) - 0.3)
+        axes.set_xticks(at, [_step_text(step) for step in steps], color=INK, size=9)
+        axes.set_ylabel("mean |model - measured| / measured, %", size=9.5)
+        axes.grid(visible=False, axis="x")
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(frameon=False, ncol=3, loc="lower left", bbox_to_anchor=(-0.01, 1.0))
+        return png_bytes(figure)
+
+
+def _step_text(step: Mapping[str, Any]) -> str:
+    lines = [shortened(plain(str(step.get("name") or "-")), 24)]
+    if step.get("remark"):
+        lines.append(shortened(plain(str(step["remark"])), 28))
+    return "\n".join(lines)
+
+
+def figure3_png(
+    bars_N_per_m: Sequence[float] | FloatArray,
+    error_percent: Sequence[float] | FloatArray,
+    printed_points: Sequence[tuple[float, float]] = (),
+) -> bytes:
+    """PNG of the paper's Figure 3: mean error against the stiffness of the platform's bars.
+
+    Parameters
+    ----------
+    bars_N_per_m
+        (n,) stiffness of each bar.
+    error_percent
+        (n,) mean error of the model with the strut law fitted to it.
+    printed_points
+        (bar stiffness N/m, error %) that the paper prints or draws.
+    """
+    bars, errors = np.asarray(bars_N_per_m, dtype=float), np.asarray(error_percent, dtype=float)
+    with house_style():
+        figure = new_figure(9.0, 5.2)
+        figure.text(0.03, 0.93, "How stiff must the platform be taken?", size=14, weight="bold")
+        figure.text(0.03, 0.88, "Figure 3 of Clinton, Zhang and Wavering (1997), computed here", size=9.5, color=MUTED)
+        axes = figure.add_axes((0.09, 0.13, 0.87, 0.68))
+        axes.plot(bars, errors, color=BLUE, lw=2.0, label="this model")
+        if len(printed_points):
+            printed = np.asarray(printed_points, dtype=float)
+            axes.plot(
+                printed[:, 0], printed[:, 1], "o", ms=8, mfc="white", mec=SECOND_ORANGE, mew=2.0, label="the paper"
+            )
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(lambda value, _: significant(value, 1))
+        axes.set_xlabel("stiffness of each platform bar, N/m")
+        axes.set_ylabel("mean |model - measured| / measured, %")
+        axes.legend(frameon=False)
+        return png_bytes(figure)
