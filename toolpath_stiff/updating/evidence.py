@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.updating.candidates import Candidate, Table
 from toolpath_stiff.updating.predict import Predictor
 from toolpath_stiff.updating.scatter import Scatter
-from toolpath_stiff.updating.size_prior import Sight, SizePrior
+from toolpath_stiff.updating.size_prior import Sight, SizePrior, log_comparable
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -176,7 +176,7 @@ class Problem:
             (), (), law, residual, scatter, likelihood,
             likelihood + float(_law_terms(law[None], information)[0]),
             self.law_jacobian(law, self.compliance(law, none[0])),
-            np.linalg.inv(information[0]),
+            np.asarray(np.linalg.inv(information[0]), dtype=float),
         )  # fmt: skip
 
     def score_single(self, table: Table, start: Score) -> Score:
@@ -202,7 +202,7 @@ class Problem:
         constant = -0.5 * scatter.log_determinant - len(scatter.wild) * scatter.price
         return Score(
             (table,), best, law, residual, scatter, float(scatter.log_likelihood(residual)), log_integral + constant,
-            jacobian, np.linalg.pinv(information), (0,), interval,
+            jacobian, np.asarray(np.linalg.pinv(information), dtype=float), (0,), interval,
         )  # fmt: skip
 
     def _scan(self, table: Table, sizes: FloatArray, inverse: FloatArray, law: FloatArray, steps: int = 3) -> _Scan:
@@ -254,8 +254,8 @@ class Problem:
             if not last or set(again.wild) == set(scatter.wild):
                 break
             scatter = again
-        covariance = np.linalg.inv(information)
-        deviations = np.sqrt(np.diag(covariance)[2:])
+        covariance = np.asarray(_scaled_inverse(information), dtype=float)
+        deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
         own = [float(sizes[id(table)][j]) for table, j in chosen]
         possible = all(_possible(table, j, size) for (table, j), size in zip(chosen, own, strict=True))
         if not possible and len(free) > 1:
@@ -269,13 +269,35 @@ class Problem:
             evidence += self.prior(table, j).log_mean_likelihood(own[0], float(deviations[0]))
         else:
             evidence -= 0.5 * np.linalg.slogdet(information)[1]
-            for (table, j), size, sd in zip(chosen, own, deviations, strict=True):
-                evidence += self.prior(table, j).log_density_around(size, float(sd))
-                evidence += 0.5 * np.log(2.0 * np.pi)
+            evidence += 0.5 * len(free) * np.log(2.0 * np.pi)
+            for table in tables:
+                mine = [i for i, (owner, _) in enumerate(chosen) if owner is table]
+                evidence += self._log_prior(
+                    table, [chosen[i][1] for i in mine], [own[i] for i in mine], deviations[mine].tolist()
+                )
         return Score(
             tuple(tables), tuple(sizes[id(t)] for t in tables), law, residual, scatter, likelihood, float(evidence),
             jacobian, covariance, free, possible=possible,
         )  # fmt: skip
+
+    def _log_prior(self, table: Table, components: list[int], sizes: list[float], sds: list[float]) -> float:
+        """Log prior density of an effect's components: the strongest by itself, the others comparable to it."""
+        if not components:
+            return 0.0
+        around = np.array([np.sign(size) * max(abs(size), sd) for size, sd in zip(sizes, sds, strict=True)])
+        changes = np.array([self._rms_alone(table, j, size) for j, size in zip(components, around, strict=True)])
+        first = int(np.argmax(changes))
+        total = self.prior(table, components[first]).log_density_around(sizes[first], sds[first])
+        for k, size in enumerate(around):
+            if k != first:
+                total += log_comparable(changes[k] / changes[first]) - np.log(abs(size))
+        return total
+
+    def _rms_alone(self, table: Table, j: int, size: float) -> float:
+        """Rms change of ln stiffness by one component alone."""
+        unit = np.zeros(len(table.candidate.components))
+        unit[j] = size
+        return float(np.sqrt(np.mean(self.sight.change(table.delta(unit)) ** 2)))
 
     def _gauss_newton(
         self,
@@ -299,7 +321,7 @@ class Problem:
             information = jacobian.T @ inverse @ jacobian + prior
             gradient = jacobian.T @ (inverse @ residual)
             gradient[:2] -= law / LAW_PRIOR**2
-            scale = np.sqrt(np.diag(information))
+            scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
             try:
                 step = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
             except np.linalg.LinAlgError:
@@ -342,6 +364,11 @@ class _Scan:
         x, y = self.sizes[peak - 1 : peak + 2], self.profile[peak - 1 : peak + 2]
         curvature = 2.0 * ((y[2] - y[1]) / (x[2] - x[1]) - (y[1] - y[0]) / (x[1] - x[0])) / (x[2] - x[0])
         return float(1.0 / np.sqrt(max(-curvature, 1e-2 / x[1] ** 2)))
+
+
+def _scaled_inverse(matrix: FloatArray) -> FloatArray:
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
 
 
 def _possible(table: Table, j: int, size: float) -> bool:

@@ -1,13 +1,13 @@
 """The final fit, with the model itself: strut law and sizes of effects by generalised least squares on ln k.
 
-The searches run on tables of added compliance; what is reported and written to machine files is refined here. Everything
-is dimensionless or scaled: with constants in N/m the gradient would fall below any default tolerance at once.
+The searches run on tables of added compliance; what is reported and written to machine files is refined here.
+Everything is dimensionless or scaled: with constants in N/m the gradient would fall below any default tolerance at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ class Fit:
         (2 + free, 2 + free) of law and free sizes.
     scatter
         The noise with the readings that this fit takes for wild.
+    absent
+        Index of a size that is not free -> (where the data would pull it, sd of that), were all sizes free.
     """
 
     candidates: tuple[Candidate, ...]
@@ -55,6 +57,7 @@ class Fit:
     covariance: FloatArray
     scatter: Scatter
     law_free: bool = True
+    absent: dict[int, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def effects(self) -> tuple[ActiveEffect, ...]:
@@ -147,10 +150,25 @@ def fit_effects(
         law,
         residual,
         jacobian,
-        np.linalg.pinv(information, hermitian=True) if _well_scaled(information) else _scaled_inverse(information),
+        _scaled_inverse(information),
         scatter,
         law_free,
+        _pulls_on_absent(replace(search, free=tuple(range(len(flat)))), law, flat, residual, scatter, tuple(free)),
     )
+
+
+def _pulls_on_absent(
+    search: _Search, law: FloatArray, flat: FloatArray, residual: FloatArray, scatter: Scatter, free: tuple[int, ...]
+) -> dict[int, tuple[float, float]]:
+    """See `Fit.absent`. `search` has all sizes free."""
+    absent = [index for index in range(len(flat)) if index not in free]
+    if not absent:
+        return {}
+    jacobian = search.jacobian(law, flat, residual)
+    information, gradient = _normal_equations(jacobian, residual, law, scatter, search.law_free)
+    inverse = _scaled_inverse(information)
+    step = inverse @ gradient
+    return {i: (float(flat[i] + step[2 + i]), float(np.sqrt(max(inverse[2 + i, 2 + i], 0.0)))) for i in absent}
 
 
 def _normal_equations(
@@ -163,11 +181,6 @@ def _normal_equations(
     information[:2, :2] += prior * np.eye(2)
     gradient[:2] -= prior * law
     return information, gradient
-
-
-def _well_scaled(matrix: FloatArray) -> bool:
-    diagonal = np.diag(matrix)
-    return bool(diagonal.max() < 1e6 * diagonal.min())
 
 
 def _scaled_inverse(matrix: FloatArray) -> FloatArray:

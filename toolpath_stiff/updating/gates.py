@@ -1,4 +1,4 @@
-"""Is a model good enough in absolute terms, and is a candidate better than chance would make the best of many?
+"""Two gates: is a model good enough, and is a candidate better than the best of many would be by chance.
 
 Both by parametric bootstrap: readings are simulated from the noise model at the fit, wild ones and the uncertainty of
 the noise itself included, and go through the same linearised refit and the same search for wild readings as the real
@@ -44,6 +44,8 @@ class Gate:
         Of the structure alone; the form that sticks out most, in words.
     gain_probability
         Of the largest gain of any candidate; 1 where it was not asked.
+    gain_threshold
+        Gain that the best of all candidates reaches by chance in one campaign of twenty; 0 where it was not asked.
     """
 
     probability: float
@@ -53,6 +55,7 @@ class Gate:
     structure_probability: float
     worst: str
     gain_probability: float = 1.0
+    gain_threshold: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,7 @@ def set_wild_aside(pulls: FloatArray, projected: FloatArray) -> tuple[FloatArray
 
 
 class Structure:
-    """Score statistics of the forms of discrepancy for one fit, as surprises: minus the logarithm of a tail probability.
+    """Score statistics of the forms of discrepancy for one fit, as surprises: -ln of a tail probability.
 
     r^T P K P r is a weighted sum of chi-squares; its tail is that of one scaled chi-square with the same mean and
     variance (Satterthwaite 1946). The bootstrap corrects what the approximation gets wrong.
@@ -163,6 +166,7 @@ def absolute_gate(
         float(ranked[0, 1]),
         worst,
         float(ranked[0, 2]) if signatures else 1.0,
+        float(np.quantile(looks[2][1:], 0.95)) if signatures else 0.0,
     )
 
 

@@ -221,9 +221,7 @@ def _contrasts(data: Measurements, groups: NDArray[np.int64]) -> tuple[FloatArra
     return contrasts, contrasts.T @ np.log(data.stiffness), data.clamp[:, None] == data.clamp[None, :]
 
 
-def _maximum_likelihood(
-    left: FloatArray, contrasts: FloatArray, same: NDArray[np.bool_]
-) -> tuple[float, float, bool]:
+def _maximum_likelihood(left: FloatArray, contrasts: FloatArray, same: NDArray[np.bool_]) -> tuple[float, float, bool]:
     """Repeat noise and clamping that make the contrasts most likely, and whether they tell of clamping at all."""
     from scipy.optimize import minimize_scalar
 
@@ -238,7 +236,7 @@ def _maximum_likelihood(
 
     def minus_log_likelihood(root: float) -> float:
         ratio = root**2
-        return len(left) * np.log(max(repeat_at(ratio), 1e-12)) + 0.5 * float(np.log1p(ratio * values).sum())
+        return len(left) * float(np.log(max(repeat_at(ratio), 1e-12))) + 0.5 * float(np.log1p(ratio * values).sum())
 
     if not tells:
         return repeat_at(0.0), 0.0, False

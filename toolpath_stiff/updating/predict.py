@@ -1,8 +1,8 @@
 """What the model says each reading should show, and how that hangs on strut law, struts and joints.
 
 Everything is on the logarithm of stiffness: effects are factors of a few to thirty per cent, and so is the noise. The
-strut law enters as the logarithms of the factors on its two stiffnesses, `law`, which are dimensionless: a least-squares
-fit of constants in N/m would stop at once, its gradient being tiny.
+strut law enters as the logarithms of the factors on its two stiffnesses, `law`, which are dimensionless: a
+least-squares fit of constants in N/m would stop at once, its gradient being tiny.
 """
 
 from __future__ import annotations
@@ -98,10 +98,7 @@ class Predictor:
             model.machine.platform_joints is self.base.machine.platform_joints
             and model.machine.frame_joints is self.base.machine.frame_joints
         )
-        if same_geometry:
-            path = replace(prepared.path, machine=model.machine)
-        else:
-            path = measured_path(model, prepared.data)
+        path = replace(prepared.path, machine=model.machine) if same_geometry else measured_path(model, prepared.data)
         return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction))
 
     def _full_path(self) -> LoadPath:

@@ -25,6 +25,9 @@ TAIL = 1.0  # sd of ln size beyond them
 USUAL = np.log(10.0)  # distance in ln size from the typical range at which the prior has halved
 
 
+# Mean and sd of ln(change by a component / change by the strongest): what gives way along X gives way along Y, too, by
+# an amount of the same order; assumed.
+COMPARABLE = (-0.7, 0.9)
 VISIBLE = 3.0  # whitened length of a signature from which on it can be seen
 FADES = 0.7  # sd by which visibility fades below
 
@@ -43,12 +46,12 @@ class Sight:
     def length(self, change: FloatArray) -> FloatArray:
         """(...,) whitened length of changes (..., n) beside the strut law."""
         squared = np.einsum("...i,...i->...", change @ self.projected, change)
-        return np.sqrt(np.maximum(squared, 0.0))
+        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
 
 
-def _log_visible(lengths: FloatArray) -> FloatArray:
-    """Log weight of sizes whose signatures have these lengths; all alike if none is visible."""
-    if lengths.max() < VISIBLE:
+def _log_visible(lengths: FloatArray, longest: float) -> FloatArray:
+    """Log weight of sizes whose signatures have these lengths; all alike if even the longest is not visible."""
+    if longest < VISIBLE:
         return np.zeros(len(lengths))
     return np.asarray(-0.5 * (np.maximum(VISIBLE - lengths, 0.0) / FADES) ** 2)
 
@@ -69,6 +72,14 @@ def _log_usual(sizes: FloatArray, typical: tuple[float, float]) -> FloatArray:
     with np.errstate(invalid="ignore"):
         beyond = np.maximum(0.0, np.maximum(low - logs, logs - high))
     return np.asarray(-np.log1p((beyond / USUAL) ** 2))
+
+
+def log_comparable(ratio: float) -> float:
+    """Log density of ln(ratio) of a component's change of stiffness to that of the effect's strongest component."""
+    return float(
+        -0.5 * ((np.log(max(ratio, 1e-9)) - COMPARABLE[0]) / COMPARABLE[1]) ** 2
+        - np.log(np.sqrt(2.0 * np.pi) * COMPARABLE[1])
+    )
 
 
 @dataclass(frozen=True)
@@ -99,11 +110,8 @@ class SizePrior:
             rms = np.sqrt(np.mean(change**2, axis=1))
             lengths[sign] = sight.length(change)
             density[sign] = _log_expected(rms) + _log_usual(sizes[:, j], component.typical())
-        visible = _log_visible(np.concatenate(list(lengths.values())))
-        for sign, part in zip(
-            lengths, np.split(visible, np.cumsum([len(x) for x in lengths.values()])[:-1]), strict=True
-        ):
-            density[sign] = density[sign] + part
+        longest = max(float(found.max()) for found in lengths.values())
+        density = {sign: density[sign] + _log_visible(lengths[sign], longest) for sign in logs}
         mass = sum(_trapezoid(logs[sign], density[sign]) for sign in logs)
         return cls(logs, {sign: density[sign] - np.log(max(mass, 1e-300)) for sign in logs})
 

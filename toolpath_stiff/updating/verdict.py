@@ -33,9 +33,13 @@ OUTSIDE = "outside the catalogue"
 # What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.10
 FALSE_ALARM = 0.05  # of the base model's gate
-ADEQUATE = 0.02  # below this probability an explanation does not explain the data
-HELD = 0.95  # probability that the plausible set holds
+ADEQUATE = 0.005  # below this probability an explanation does not explain the data
+NAMED = 0.95  # probability from which a single name is the answer
+# Probability that the plausible set adds up to where it is not a single name: to hold the truth in 95 of 100 cases it
+# must allow for priors and linearisations that are not exact.
+HELD = 0.98
 TESTED = 4  # candidates, besides all those that matter, that go through the absolute gate
+FAR = 8.0  # log evidence behind the best adequate candidate at which the others cannot matter
 SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alone
 
 
@@ -95,7 +99,9 @@ def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Seque
     work = _Work(problem, base, families, forms, simulator)
     if base_gate.probability > FALSE_ALARM:
         posterior = work.posterior(none=True, names=[f.name for f in families])
-        return work.judgement("adequate", _smallest_set(posterior), noise, base_gate, posterior, "")
+        plausible = _smallest_set(posterior)
+        plausible = plausible if NONE in plausible else (*plausible, NONE)
+        return work.judgement("adequate", plausible, noise, base_gate, posterior, "")
     # The base model stays in the running if only the gain of the best candidate, not its own residuals, spoke against.
     none_stands = min(base_gate.squares_probability, base_gate.structure_probability) > ADEQUATE
     names = work.adequate_singles(none_stands)
@@ -110,10 +116,13 @@ def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Seque
 
 
 def _smallest_set(posterior: dict[str, float]) -> tuple[str, ...]:
-    """The fewest hypotheses that hold `HELD`, pairs as their members."""
+    """The one hypothesis that holds `NAMED`, else the fewest that hold `HELD`; pairs as their members."""
+    ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
+    if ranked and ranked[0][1] >= NAMED:
+        return tuple(ranked[0][0].split(" + "))
     found: list[str] = []
     held = 0.0
-    for name, weight in sorted(posterior.items(), key=lambda item: (-item[1], item[0])):
+    for name, weight in ranked:
         if held >= HELD or weight <= 0.0:
             break
         found += [part for part in name.split(" + ") if part not in found]
@@ -156,17 +165,15 @@ class _Work:
         offered = [f for f in self.families if f.best is not None]
         if not offered:
             return []
-        top = max(offered[0].log_evidence, self.base.log_evidence if none_stands else -np.inf)
-        # A family a hundred million times less likely than the best cannot matter unless the best fail.
+        top = -np.inf
         passed: list[str] = []
         for count, family in enumerate(offered):
             assert family.best is not None
-            if count >= TESTED and (passed or family.log_evidence < top - 40.0):
-                if family.log_evidence < top - 12.0:
-                    break
+            if count >= TESTED and (not passed or family.log_evidence < top - FAR):
+                break
             if self.gate(family.name, family.best).probability > ADEQUATE:
+                top = top if passed else family.log_evidence
                 passed.append(family.name)
-                top = max(family.log_evidence, -np.inf) if len(passed) == 1 else top
         return passed
 
     def beyond_singles(self, noise: Noise, base_gate: Gate) -> Judgement:
@@ -187,10 +194,10 @@ class _Work:
             if self.gate(name, pair.score).probability > ADEQUATE and pair.log_evidence > alone + SURVIVES:
                 evidences[name], prior[name] = pair.log_evidence, PRIOR_PAIRS / number
         posterior = probabilities(evidences, prior)
-        if posterior[OUTSIDE] >= 1.0 - HELD or len(posterior) == 1:
+        if posterior[OUTSIDE] >= 1.0 - NAMED or len(posterior) == 1:
             return self.judgement("unexplained", (), noise, base_gate, posterior, form)
         posterior.pop(OUTSIDE)
-        likely = [name for name, weight in posterior.items() if weight > 1.0 - HELD]
+        likely = [name for name, weight in posterior.items() if weight > 1.0 - NAMED]
         verdict = "identified" if len(likely) == 1 else "ambiguous"
         return self.judgement(verdict, _smallest_set(posterior), noise, base_gate, posterior, form)
 
