@@ -17,6 +17,7 @@ from toolpath_stiff.placement.rewrite_controls import OFF, Controls
 from toolpath_stiff.placement.rewrite_pieces import LEAN, LEVER, chords, lean, points_between
 from toolpath_stiff.placement.rewrite_words import FEED_DECIMALS, SAME, LineEdit
 
+HALF_CIRCLE = 0.999  # chord over diameter, from which R magnifies a rounded end more than twenty times
 NEAR = 2.0  # units by which the centre of an arc given by R may miss its place; beyond, I, J, K are written
 SLASH = re.compile(r"\s*/\d*")
 LINEARISE = "give --linearise MM to have straight moves within MM of it, or place the work without that turn"
@@ -108,12 +109,12 @@ class Rewriter(Controls):
         first, second, normal = arcs.PLANES[name]
         target = self._target(last.end)
         start, end = (source.frames.to_program(point) for point in (last.start, last.end))
-        in_plane = arcs.PLANES[source.plane][:2]
-        if max(abs(start[axis] - end[axis]) for axis in in_plane) < SAME:
+        chord = math.dist(*([point[axis] for axis in arcs.PLANES[source.plane][:2]] for point in (start, end)))
+        if chord < SAME:
             self._full_circle(edit, target, axes, normal)
         else:
             self._go(edit, target, axes)
-        self._center(edit, last.arc.center, code == "G2", (first, second))
+        self._center(edit, last.arc.center, code == "G2", (first, second), chord)
 
     def _full_circle(self, edit: LineEdit, target: list[float], axes: list[str], normal: int) -> None:
         """A circle ends on its own start to the last digit, or it is none: words that cannot say so are left out."""
@@ -129,13 +130,15 @@ class Rewriter(Controls):
         along = [normal, 3, 4, 5]
         self._go(edit, target, [letter for letter in axes if AXES.index(letter) in along], only=along)
 
-    def _center(self, edit: LineEdit, center: Sequence[float], clockwise: bool, plane: tuple[int, int]) -> None:
+    def _center(
+        self, edit: LineEdit, center: Sequence[float], clockwise: bool, plane: tuple[int, int], exact_chord: float
+    ) -> None:
         """I, J, K of a centre (set-up frame of the untouched program); R stays where it says the same."""
         out = self.out
         there = out.frames.to_program(self._of_setup([*center, 0.0, 0.0, 0.0]))
         here = out.frames.to_program(out.frames.position)
         if edit.word("R") is not None:
-            if self._radius_says(edit, here, there, clockwise, plane):
+            if self._radius_says(edit, here, there, clockwise, plane, exact_chord):
                 return
             edit.remove("R")
         letters = [arcs.CENTER_WORDS[axis] for axis in plane]
@@ -146,7 +149,13 @@ class Rewriter(Controls):
                 edit.write(letter, value)
 
     def _radius_says(
-        self, edit: LineEdit, here: Sequence[float], center: Sequence[float], clockwise: bool, plane: tuple[int, int]
+        self,
+        edit: LineEdit,
+        here: Sequence[float],
+        center: Sequence[float],
+        clockwise: bool,
+        plane: tuple[int, int],
+        exact_chord: float,
     ) -> bool:
         """Whether R with the rounded ends puts the centre where it belongs; near half circles it does not."""
         radius = edit.word("R")
@@ -159,6 +168,9 @@ class Rewriter(Controls):
                 end[axis] = value if self.out.absolute else here[axis] + value
         first, second = plane
         size = radius.value * self._scale(first)
+        chord = math.dist((here[first], here[second]), (end[first], end[second]))
+        if abs(chord - exact_chord) > SAME and chord > HALF_CIRCLE * 2.0 * abs(size):
+            return False
         try:
             found = arcs.center_from_radius((here[first], here[second]), (end[first], end[second]), size, clockwise)
         except arcs.ArcError:

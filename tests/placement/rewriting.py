@@ -1,0 +1,45 @@
+"""The same path, told from the moves alone: what tests of the rewriter compare."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolpath_stiff.nc import Program
+from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.path import place, place_orientations
+from toolpath_stiff.path.rotations import rotation_matrices
+
+
+def cutting_moves(program: Program, origin, shortest: float) -> list[tuple]:
+    """Start and end (m), their rotations, arc of every cutting move; straight ones below `shortest` (m) left out."""
+    moves = place(program.moves, origin)
+    found = []
+    for i in np.flatnonzero(moves.motion != RAPID):
+        start, end = moves.start[i], moves.end[i]
+        if moves.arc_sweep[i] == 0.0 and np.abs(end - start).max() < shortest:
+            continue
+        turned = rotation_matrices(place_orientations(np.stack([start[3:], end[3:]]), origin))
+        found.append((start[:3], end[:3], turned, moves.arc_center[i], moves.arc_normal[i], moves.arc_sweep[i]))
+    return found
+
+
+def assert_same_path(program: Program, placement, written: Program, origin, unit_mm: float) -> None:
+    """The cutting moves of both lie on each other but for the rounding to `unit_mm` (mm and degrees).
+
+    Half a unit per axis, of start and end each, is 1.7 units; a centre adds its own words and what an R may miss.
+    """
+    unit = unit_mm * 1e-3
+    wanted, found = (cutting_moves(p, o, 3.0 * unit) for p, o in ((program, placement), (written, origin)))
+    assert len(found) == len(wanted)
+    for one, other in zip(wanted, found, strict=True):
+        np.testing.assert_allclose(other[0], one[0], atol=2.0 * unit, rtol=0)
+        np.testing.assert_allclose(other[1], one[1], atol=2.0 * unit, rtol=0)
+        np.testing.assert_allclose(other[2], one[2], atol=4.0 * np.radians(unit_mm) + 1e-12, rtol=0)
+        normal, sweep = one[4], one[5]
+        assert (sweep == 0.0) == (other[5] == 0.0)
+        if sweep:
+            sense = float(normal @ other[4])
+            assert abs(abs(sense) - 1.0) < 1e-9
+            assert np.linalg.norm(np.cross(one[3] - other[3], normal)) < 6.0 * unit
+            radius = np.linalg.norm(np.cross(one[0] - one[3], normal))
+            assert abs(sweep - sense * other[5]) * radius < 24.0 * unit
