@@ -14,6 +14,7 @@ from toolpath_stiff.report.diagnose_words import (
     NONE,
     entries,
     figure_of,
+    hidden_name,
     is_offered,
     is_plausible,
     name_text,
@@ -21,7 +22,9 @@ from toolpath_stiff.report.diagnose_words import (
     parameter_texts,
     percent,
     probability_text,
+    remark_text,
     significant,
+    size_text,
 )
 from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
 from toolpath_stiff.report.wording import plain, shortened
@@ -32,6 +35,7 @@ if TYPE_CHECKING:
 
 BLUE, PALE_BLUE, GREY, GREEN = "#2457a6", "#e3edfa", "#9aa5b1", "#2f855a"
 ROW = 0.47  # inch a candidate
+OUTSIDE = "outside the catalogue"
 MOST_PAIRS = 5  # of the ladder; all are in diagnose.json
 BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and arrows stand for more
 
@@ -70,9 +74,11 @@ def ladder_png(document: Mapping[str, Any]) -> bytes:
 
 
 def ladder_rows(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The base model, then pairs and effects as the document orders them."""
+    """The base model, what no effect describes (if it was weighed), then pairs and effects as the document has them."""
     base = {**(document.get("baseline") or {}), "effect": NONE}
-    return [base, *entries(document, "pairs")[:MOST_PAIRS], *entries(document, "candidates")]
+    outside = figure_of(base, "probability_outside")
+    beyond = [{"effect": OUTSIDE, "title": "a smooth unknown", "probability": outside}] if outside else []
+    return [base, *beyond, *entries(document, "pairs")[:MOST_PAIRS], *entries(document, "candidates")]
 
 
 def _marked(row: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
@@ -175,10 +181,7 @@ def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
     import textwrap
 
     for y, row in enumerate(rows):
-        text = str(row.get("words") or "") if is_offered(row) else str(row.get("remark") or "not offered")
-        if is_offered(row) and row.get("adequate") is False:
-            text = f"{text}; leaves structure" if text else "leaves structure"
-        lines = textwrap.wrap(plain(text), 31, max_lines=2, placeholder=" ...")
+        lines = textwrap.wrap(remark_text(row), 31, max_lines=2, placeholder=" ...")
         axes.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if is_offered(row) else MUTED)
 
 
@@ -287,17 +290,17 @@ def detectable_png(document: Mapping[str, Any]) -> bytes:
         axes.set_xlim(0.0, 1.32 * reach)
         axes.set_ylim(len(rows) - 0.4, -0.6)
         for y, entry in enumerate(rows):
-            size = f"{significant(figure_of(entry, 'size'))} {plain(str(entry.get('unit') or ''))}".rstrip()
             if entry in seen:
                 value = figure_of(entry, "rms_percent") or 0.0
                 axes.barh(y, value, height=0.6, color=BLUE, zorder=2)
-                axes.text(value + 0.012 * reach, y, size, va="center", size=9.5)
+                axes.text(value + 0.012 * reach, y, size_text(entry), va="center", size=9.5)
             else:
-                text = "not seen at any size that can be"
-                if figure_of(entry, "size") is not None:
-                    text += f", up to {size}"
+                largest = figure_of(entry, "rms_percent")
+                text = "not seen at any size within its bounds"
+                if largest is not None:
+                    text += f", which change the stiffness by {percent(largest)}"
                 axes.text(0.012 * reach, y, text, va="center", size=9.5, color="#a3333d")
-        axes.set_yticks(range(len(rows)), [shortened(_detectable_name(e), 42) for e in rows], color=INK)
+        axes.set_yticks(range(len(rows)), [shortened(hidden_name(e), 42) for e in rows], color=INK)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
         axes.spines[["top", "right"]].set_visible(False)
@@ -305,31 +308,42 @@ def detectable_png(document: Mapping[str, Any]) -> bytes:
         return png_bytes(figure)
 
 
-def _detectable_name(entry: Mapping[str, Any]) -> str:
-    parameter = str(entry.get("parameter") or "").replace("_", " ")
-    return plain(f"{name_text(entry)}: {parameter}" if parameter else name_text(entry))
-
-
 def envelope_png(document: Mapping[str, Any]) -> bytes | None:
-    """PNG: the weighted sum of squares of base and best explanation among simulated ones; None without `gates`."""
-    gates = [gate for gate in entries(document, "gates") if isinstance(gate, Mapping) and gate.get("simulated")][:2]
-    if not gates:
+    """PNG: the base model's weighted sum of squares among simulated ones; None where `gates` does not hold them."""
+    gates = document.get("gates") or {}
+    simulated = np.asarray(gates.get("simulated_squares") or [], dtype=float)
+    if not np.isfinite(simulated).any():
         return None
+    observed = figure_of(gates, "squares")
     with house_style():
-        figure = new_figure(11.0, 4.0)
-        _title(figure, "Is it good enough?", "weighted sum of squares: simulated if the model were right, and observed")
-        for place, gate in enumerate(gates):
-            axes = figure.add_axes((0.07 + 0.47 * place, 0.16, 0.42, 0.56))
-            simulated = np.asarray(gate["simulated"], dtype=float)
-            axes.hist(simulated, bins=30, color="#b8c9e4", zorder=2)
-            observed = figure_of(gate, "squares")
-            if observed is not None:
-                axes.axvline(observed, color=SECOND_ORANGE, lw=2.2, zorder=3)
-            chance = probability_text(figure_of(gate, "probability"))
-            axes.set_title(f"{plain(str(gate.get('model') or '-'))}: probability {chance}", size=10)
-            axes.set_yticks([])
-            axes.spines[["top", "right", "left"]].set_visible(False)
-            axes.set_xlabel("weighted sum of squares (orange: observed)")
+        figure = new_figure(8.4, 4.2)
+        _title(
+            figure,
+            "Is the model without a further effect good enough?",
+            "weighted sum of squares: simulated as if the model were right (grey), and observed (orange)",
+        )
+        axes = figure.add_axes((0.04, 0.13, 0.92, 0.62))
+        shown = simulated[np.isfinite(simulated)]
+        axes.hist(shown, bins=30, color="#b8c4d6", zorder=2)
+        if observed is not None:
+            # Far outside, the observed value would squeeze the simulated ones into one bar.
+            edge = float(shown.max()) + 1.5 * float(np.ptp(shown))
+            inside = observed <= edge
+            axes.axvline(min(observed, edge), color=SECOND_ORANGE, lw=2.2, ls="-" if inside else ":", zorder=3)
+            text = f"{observed:.4g}" if inside else f"{observed:.4g}, far to the right \N{RIGHTWARDS ARROW}"
+            axes.annotate(
+                text, (min(observed, edge), 0.97), xycoords=("data", "axes fraction"), xytext=(-6, 0),
+                textcoords="offset points", ha="right", va="top", color=SECOND_ORANGE,
+            )  # fmt: skip
+        chances = [
+            (name, figure_of(gates, f"{key}_probability"))
+            for name, key in (("all", "baseline"), ("squares", "squares"), ("structure", "structure"), ("gain", "gain"))
+        ]
+        lines = [f"{name}: p = {significant(value, 2)}" for name, value in chances if value is not None]
+        axes.text(0.005, 0.97, "\n".join(lines), transform=axes.transAxes, va="top", size=9, color=MUTED)
+        axes.set_yticks([])
+        axes.grid(visible=False, axis="y")
+        axes.spines[["top", "right", "left"]].set_visible(False)
         return png_bytes(figure)
 
 

@@ -75,11 +75,10 @@ def effect_names(entry: Mapping[str, Any]) -> list[str]:
 
 def name_text(entry: Mapping[str, Any]) -> str:
     """Name with what it acts on: "weak_strut (strut 3)"; a pair as "a + b"."""
-    chosen: Mapping[str, Any] = entry.get("choice") or {}
     parts = []
     for name in effect_names(entry):
-        inner = chosen.get(name)
-        own = inner if isinstance(inner, Mapping) else chosen
+        inner = (entry.get("parameters") or {}).get(name)  # of a pair: sizes and choices together
+        own: Mapping[str, Any] = inner if isinstance(inner, Mapping) else entry.get("choice") or {}
         acts_on = [f"{key} {value}" for key, value in own.items() if _says_something(value)]
         parts.append(plain(f"{name} ({', '.join(acts_on)})") if acts_on else name)
     return " + ".join(parts)
@@ -135,15 +134,49 @@ def is_plausible(entry: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
 
 
 def best_explanation(document: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """The pair or the candidate that the data favour, if one is offered."""
-    found = [e for e in (*entries(document, "pairs"), *entries(document, "candidates")) if is_offered(e)]
-    return max(found, key=lambda e: figure_of(e, "probability") or 0.0, default=None)
+    """The entry that `best` names; else the likeliest candidate or pair that is offered, the first of equals."""
+    found = [*entries(document, "candidates"), *entries(document, "pairs")]
+    for entry in found:
+        if " + ".join(effect_names(entry)) == document.get("best"):
+            return dict(entry)
+    offered = [entry for entry in found if is_offered(entry)]
+    return max(offered, key=lambda e: figure_of(e, "probability") or 0.0, default=None)
+
+
+def remark_text(entry: Mapping[str, Any]) -> str:
+    """How it stands, and what speaks against it."""
+    own = str(entry.get("remark") or "")
+    if not is_offered(entry):
+        return plain(own or "not offered")
+    against = own or ("leaves structure" if entry.get("adequate") is False else "")
+    return plain("; ".join(part for part in (str(entry.get("words") or ""), against) if part))
 
 
 def noise_floor_percent(document: Mapping[str, Any]) -> float | None:
     """Mean absolute error that scatter alone would leave."""
+    stated = figure_of(document.get("baseline"), "noise_floor_percent")
     noise = figure_of(document.get("baseline"), "noise_percent")
+    if stated is not None:
+        return stated
     return None if noise is None else MEAN_OVER_SD * noise
+
+
+def missing_text(entry: Mapping[str, Any]) -> str:
+    """An effect that cannot be tested and why: "thermal_drift (no time_min)"."""
+    columns = [str(name) for name in entry.get("missing") or []]
+    reason = f"no {', '.join(columns)}" if columns else "nothing in these data depends on it"
+    return plain(f"{entry.get('effect', '?')} ({reason})")
+
+
+def size_text(entry: Mapping[str, Any]) -> str:
+    """The smallest size of an effect that would have been seen."""
+    return plain(f"{significant(figure_of(entry, 'size'))} {entry.get('unit') or ''}".rstrip())
+
+
+def hidden_name(entry: Mapping[str, Any]) -> str:
+    """Effect and parameter of an entry of `detectable`."""
+    parameter = str(entry.get("parameter") or "").replace("_", " ")
+    return plain(f"{entry.get('effect', '?')} {parameter}".rstrip())
 
 
 def plausible_text(names: Sequence[str]) -> str:

@@ -1,0 +1,286 @@
+"""A diagnosis as a page: the verdict, then each picture under the question that it answers. One file, no network.
+
+Everything from a file is escaped, and a content security policy lets the page load nothing and run nothing.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import re
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.report.diagnose_words import (
+    HEADLINES,
+    NONE,
+    best_explanation,
+    entries,
+    figure_of,
+    hidden_name,
+    is_offered,
+    is_plausible,
+    name_text,
+    noise_floor_percent,
+    parameter_texts,
+    percent,
+    plausible_text,
+    probability_text,
+    remark_text,
+    significant,
+)
+from toolpath_stiff.report.wording import plain
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from toolpath_stiff.updating.measurements import Measurements
+
+# Picture -> the question that it answers, and how it is read.
+QUESTIONS = {
+    "ladder.png": (
+        "Which effect explains the data, and how surely?",
+        "Every effect is fitted together with the strut law. The error at points that the fit has not seen falls only "
+        "if the effect carries over from point to point; the noise floor is what scatter alone would leave.",
+    ),
+    "before_after.png": (
+        "Where does the model fail, and what is left?",
+        "Red: measured softer than modelled; blue: stiffer. Colour that forms a pattern is physics, colour that is "
+        "sprinkled is scatter.",
+    ),
+    "confounding.png": (
+        "What can these data not tell apart?",
+        "How alike two effects make these readings change, the strut law refitted: near 1 no fit can tell which of the "
+        "two it is, whatever the noise. Other poses, loads or tools can.",
+    ),
+    "detectable.png": (
+        "What could be there unseen?",
+        "Smaller than this, an effect could be in the machine and these data would not show it.",
+    ),
+    "envelope.png": (
+        "Is the model good enough as it is?",
+        "Readings were simulated from the noise alone and went through the same fit.",
+    ),
+}
+
+
+def diagnose_pictures(
+    document: Mapping[str, Any],
+    data: Measurements,
+    before: NDArray[np.float64],
+    after: NDArray[np.float64] | None,
+) -> dict[str, bytes]:
+    """File name -> PNG, all that there are for this diagnosis; arrays as for `before_after_png`."""
+    from toolpath_stiff.report.diagnose_pictures import confounding_png, detectable_png, envelope_png, ladder_png
+    from toolpath_stiff.report.update_pictures import before_after_png
+
+    pictures = {
+        "ladder.png": ladder_png(document),
+        "before_after.png": before_after_png(document, data, before, after),
+        "confounding.png": confounding_png(document),
+        "detectable.png": detectable_png(document),
+        "envelope.png": envelope_png(document),
+    }
+    return {name: png for name, png in pictures.items() if png is not None}
+
+
+def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
+    """The page's text.
+
+    Parameters
+    ----------
+    document
+        As in `diagnose.json`.
+    pictures
+        File name -> PNG, as `diagnose_pictures` gives them; those in `QUESTIONS` are shown.
+    """
+    verdict = str(document.get("verdict") or "-")
+    files = ", ".join(str(name) for name in entries(document, "data"))
+    readings = figure_of(document, "readings")
+    about = [f"{readings:.0f} readings" if readings is not None else "", files, f"machine {document.get('machine')}"]
+    sections = [
+        _section("Why", _bullets(entries(document, "why"))),
+        _picture("ladder.png", pictures),
+        _section("What the fits say", _candidates(document)),
+        _picture("before_after.png", pictures),
+        _pair(_picture("confounding.png", pictures), _picture("detectable.png", pictures)),
+        _section("What to measure or do next", _next(document)),
+        _section("What these data cannot test", _cannot_test(document)),
+        _section("How much the choice matters on the tool path", _path(document)),
+        _picture("envelope.png", pictures),
+        _section("How much readings scatter", _noise(document)),
+        _section("Assumptions", _bullets([*entries(document, "assumptions"), *entries(document, "notes")])),
+    ]
+    parts = {
+        "title": _text(files or verdict),
+        "verdict": _text(verdict),
+        "verdict_class": verdict if verdict in HEADLINES else "",
+        "headline": _text(HEADLINES.get(verdict, verdict)),
+        "text": _text(document.get("text") or ""),
+        "about": _text("   ·   ".join(part for part in about if part)),
+        "figures": _figures(document),
+        "warnings": "\n".join(f'<p class="warning">{_text(warning)}</p>' for warning in entries(document, "warnings")),
+        "sections": "\n".join(section for section in sections if section),
+        "footer": f"<code>{_text(document.get('command') or '')}</code> seed {_text(document.get('seed', '-'))}",
+    }
+    template = resources.files("toolpath_stiff.report").joinpath("assets", "diagnose.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+
+
+def _text(value: object) -> str:
+    return html.escape(plain(str(value)))
+
+
+def _section(title: str, body: str) -> str:
+    return f"<section><h2>{_text(title)}</h2>{body}</section>" if body else ""
+
+
+def _pair(first: str, second: str) -> str:
+    return f'<div class="two">{first}{second}</div>' if first and second else first + second
+
+
+def _bullets(sentences: Sequence[object]) -> str:
+    return "<ul>" + "".join(f"<li>{_text(sentence)}</li>" for sentence in sentences) + "</ul>" if sentences else ""
+
+
+def _picture(name: str, pictures: Mapping[str, bytes]) -> str:
+    if name not in pictures:
+        return ""
+    question, reading = QUESTIONS[name]
+    source = base64.b64encode(pictures[name]).decode("ascii")
+    image = f'<img alt="{_text(question)}" src="data:image/png;base64,{source}">'
+    # The picture shows its question itself, for whoever opens it alone.
+    return f'<section><h2 class="unseen">{_text(question)}</h2>{image}<p class="muted">{_text(reading)}</p></section>'
+
+
+def _table(head: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]], numeric: Sequence[int] = ()) -> str:
+    """A table of (class, cells that are HTML already); the columns `numeric` are aligned to the right."""
+
+    def cells(tag: str, row: Sequence[str]) -> str:
+        return "".join(f"<{tag}{' class=num' if i in numeric else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
+
+    body = "".join(f'<tr class="{kind}">{cells("td", row)}</tr>' for kind, row in rows)
+    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _figures(document: Mapping[str, Any]) -> str:
+    """The few figures that say it all."""
+    base = document.get("baseline") or {}
+    best = best_explanation(document)
+    found = [(percent(figure_of(base, "held_out_error_percent")), "mean error at points left out, strut law refitted")]
+    if best is not None and document.get("verdict") in ("identified", "ambiguous"):
+        found.append((percent(figure_of(best, "held_out_error_percent")), f"the same with {name_text(best)}"))
+    found.append((percent(noise_floor_percent(document)), "would be left by scatter alone"))
+    found.append((plausible_text(entries(document, "plausible")), "hold the truth with 95 % probability"))
+    if not entries(document, "plausible"):
+        found[-1] = ("no effect", "of the catalogue explains these data")
+    return "".join(f"<li><b>{_text(value)}</b><span>{_text(name)}</span></li>" for value, name in found)
+
+
+def _candidates(document: Mapping[str, Any]) -> str:
+    """Base model, pairs and all candidates."""
+    base = {**(document.get("baseline") or {}), "effect": NONE}
+    rows = []
+    for entry in [base, *entries(document, "pairs"), *entries(document, "candidates")]:
+        is_base = entry.get("effect") == NONE
+        name = "model without a further effect" if is_base else name_text(entry)
+        title = "strut law refitted" if is_base else str(entry.get("title") or "")
+        gain = figure_of(entry, "held_out_gain_in_se")
+        kind = "plausible" if is_plausible(entry, document) else "" if is_offered(entry) else "out"
+        rows.append(
+            (
+                kind,
+                (
+                    f"{_text(name)}<small>{_text(title)}</small>",
+                    "<br>".join(f"<span class=whole>{_text(size)}</span>" for size in parameter_texts(entry)) or "-",
+                    _text(probability_text(figure_of(entry, "probability"))),
+                    _text(percent(figure_of(entry, "mean_abs_error_percent"), 2)),
+                    _text(percent(figure_of(entry, "held_out_error_percent"), 2)),
+                    "-" if gain is None else f"{gain:.1f}",
+                    _text({True: "yes", False: "no"}.get(entry.get("adequate"), "-")),
+                    _text(remark_text(entry)),
+                ),
+            )
+        )
+    head = ("effect", "size (95 % interval)", "probability", "mean error", "at points left out",
+            "fall in standard errors", "leaves scatter only", "remark")  # fmt: skip
+    return _table(head, rows, range(2, 6))
+
+
+def _next(document: Mapping[str, Any]) -> str:
+    """What to do, and the readings that tell most."""
+    readings = [entry for entry in entries(document, "next_measurements") if isinstance(entry, Mapping)]
+    body = _bullets(entries(document, "next"))
+    if readings:
+        keys = list(dict.fromkeys(key for entry in readings for key in entry if key != "why"))
+        keys = [key for key in keys if any(entry.get(key) not in ("", None) for entry in readings)]
+        rows = [("", [*(_cell(entry.get(key)) for key in keys), _cell(entry.get("why"))]) for entry in readings]
+        numeric = [i for i, key in enumerate(keys) if all(_is_number(entry.get(key)) for entry in readings)]
+        body += _table([*map(_text, keys), "why"], rows, numeric)
+    return body
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return _text(f"{value:.6g}" if isinstance(value, float) else value)
+
+
+def _cannot_test(document: Mapping[str, Any]) -> str:
+    rows = []
+    for entry in entries(document, "cannot_test"):
+        columns = ", ".join(f"<code>{_text(name)}</code>" for name in entry.get("missing") or [])
+        rows.append(("", [_text(entry.get("effect", "?")), columns or "nothing in these data depends on it"]))
+    never = [e for e in entries(document, "detectable") if isinstance(e, Mapping) and e.get("detectable") is False]
+    rows += [
+        ("", [_text(hidden_name(e)), "hidden by the strut law or by scatter at any size that can be"]) for e in never
+    ]
+    return _table(("effect", "the column that is missing"), rows) if rows else ""
+
+
+def _path(document: Mapping[str, Any]) -> str:
+    """What the plausible explanations predict on the path: whatever figures there are."""
+    path = document.get("path")
+    if not isinstance(path, Mapping):
+        return ""
+    rows = [("", [_text(key.replace("_", " ")), _cell(value)]) for key, value in path.items() if not _nested(value)]
+    return _table(("", ""), rows, (1,)) if rows else ""
+
+
+def _nested(value: object) -> bool:
+    return isinstance(value, Mapping | list | tuple)
+
+
+def _noise(document: Mapping[str, Any]) -> str:
+    """Where the noise comes from, and the verdict under each guess."""
+    noise = document.get("noise") or {}
+    parts = [
+        f"{word} {percent(value)}"
+        for word, key in (("repeats", "repeat_percent"), ("clamping", "clamping_percent"),
+                          ("struts among themselves", "strut_spread_percent"))
+        if (value := figure_of(noise, key)) is not None
+    ]  # fmt: skip
+    if (joints := figure_of(noise, "joint_error_mm")) is not None:
+        parts.append(f"joints {significant(joints, 2)} mm")
+    origin = str(noise.get("origin") or "")
+    body = f"<p>Standard deviations: {_text(', '.join(parts))}. {_text(origin)}</p>" if parts else ""
+    found = document.get("by_noise") or {}
+    if found:
+        rows = []
+        for name, one in found.items():
+            likely = one.get("probability")
+            shown = [f"{key} {probability_text(value)}" for key, value in likely.items()] if likely else []
+            rows.append(
+                ("", [_text(name), _text(percent(figure_of(one, "noise_percent"))), _text(one.get("verdict", "-")),
+                      _text(plausible_text(one.get("plausible") or [])), _text(", ".join(shown[:4]))])
+            )  # fmt: skip
+        body += _table(("noise", "one reading", "verdict", "plausible", "probability"), rows, (1,))
+    if len(found) > 1:
+        body += '<p class="muted">The noise is a guess: the verdict is what both guesses have in common.</p>'
+    return body
