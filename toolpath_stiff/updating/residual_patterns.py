@@ -140,5 +140,5 @@ def percent(log_ratio: float) -> float:
 
 
 def signed(value: float) -> str:
-    """ "+3.1 %"."""
+    """A size in per cent with its sign."""
     return f"{value:+.2g} %"

@@ -89,7 +89,21 @@ class Found:
 
 @dataclass(frozen=True)
 class Structure:
-    """All answers: `found` one after the other, `tests` of every pattern on its own, the excess scatter."""
+    """All answers.
+
+    Attributes
+    ----------
+    found
+        Patterns that stand out, one after the other.
+    tests
+        Every pattern on its own.
+    excess, excess_left
+        Relative sd from place to place beyond the noise, before and after taking the patterns out.
+    probability
+        Of residuals this large in scatter alone.
+    scatter_square
+        (n,) mean square of each residual in scatter alone.
+    """
 
     found: tuple[Found, ...]
     tests: tuple[Found, ...]
@@ -127,6 +141,7 @@ class Scattering:
         spread, turn = np.linalg.eigh(inverse @ same @ inverse.T)
         self.turn = turn.T @ inverse
         self.weights = 1.0 / np.sqrt(1.0 + EXCESSES[:, None] ** 2 * np.maximum(spread, 0.0))  # (g, n)
+        self.covariance = covariance
         self.sd = np.sqrt(np.diag(covariance))
         self.repeated = len(place) - len(set(place.tolist()))
         rng = np.random.default_rng(seed)
@@ -227,7 +242,11 @@ def _orthonormal(columns: FloatArray) -> FloatArray:
 
 
 def find_structure(
-    residual: FloatArray, patterns: list[Pattern], scattering: Scattering, fixed: FloatArray | None = None
+    residual: FloatArray,
+    patterns: list[Pattern],
+    scattering: Scattering,
+    fixed: FloatArray | None = None,
+    most: int = MOST_PATTERNS,
 ) -> Structure:
     """Which patterns residuals (n,) show beyond scatter.
 
@@ -241,6 +260,8 @@ def find_structure(
         The scatter.
     fixed
         (m, n) columns that are free anyway, such as those of the strut law.
+    most
+        So many patterns are taken out one after the other.
     """
     n = len(residual)
     columns = np.array([one.values for one in patterns])
@@ -248,7 +269,7 @@ def find_structure(
     found: list[Found] = []
     tests: tuple[Found, ...] = ()
     excess = left = 0.0
-    for step in range(MOST_PATTERNS + 1):
+    for step in range(most + 1):
         fit = _Fit(scattering, columns, base)
         statistic, grid, factor = fit.statistics(residual[None])
         t, at = statistic[0], int(grid[0])
@@ -260,14 +281,14 @@ def find_structure(
             excess = left
             tests = tuple(one for one in answers if one.standard_error > 0.0)
         best = int(np.argmax(np.abs(t)))
-        if p[best] >= SIGNIFICANT or step == MOST_PATTERNS:
+        if p[best] >= SIGNIFICANT or step == most:
             break
         found.append(answers[best])
         base = np.concatenate([base, columns[[best]]])
     square = scattering.turned(residual[None])[0] ** 2
     simulated = (scattering.turned(scattering.draws(0.0)) ** 2).sum(axis=1)
     probability = (1.0 + float((simulated >= square.sum()).sum())) / (1.0 + len(simulated))
-    return Structure(tuple(found), tests, excess, left, probability, (scattering.draws(0.0) ** 2).mean(axis=1))
+    return Structure(tuple(found), tests, excess, left, probability, (scattering.draws(0.0) ** 2).mean(axis=0))
 
 
 def _answers(fit: _Fit, at: int, factor: float, t: FloatArray, p: FloatArray) -> list[Found]:
