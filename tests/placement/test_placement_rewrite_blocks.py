@@ -162,6 +162,12 @@ def test_no_axis_is_moved_that_the_program_left_alone():
     assert rewrite("G0 X1 Y1\nZ5\nG1 Z-1 F100\n", at(1, 1, -50, 30))[0] == "G0 X1.366 Y2.366"
 
 
+def test_a_tolerance_below_the_rounding_is_refused():
+    program = parse_program(START + "G18 G2 X8 I4\n", origin=at(turn=37))
+    with pytest.raises(InputError, match="rounding to 4 decimals"):
+        rewrite_program(program, at(turn=37), HERE, linearise=1e-7)
+
+
 def test_blocks_left_out_are_refused_and_taken_ones_noted():
     text = START + "/G1 X5\nG1 X6\n"
     program = parse_program(text, origin=at(10), block_delete=True)
@@ -214,14 +220,14 @@ def test_large_turns_of_the_tool_are_cut_until_they_lean_no_more():
     text = START + "G1 X10 A30 B40\nM2\n"
     lines = rewrite(text, there, linearise=1e-5, decimals=6)
     program, again = parse_program(text, origin=there), parse_program("\n".join(lines) + "\n")
-    wanted = cutting_moves(program, there, 0.0)[0]
-    found = cutting_moves(again, HERE, 0.0)
+    wanted = cutting_moves(program, there)[0]
+    found = cutting_moves(again, HERE)
     np.testing.assert_allclose(found[-1][2][1], wanted[2][1], atol=1e-6)
     assert len(found) > 3
     middle = len(found) // 2
     share = np.linalg.norm(found[middle][0] - wanted[0]) / 0.010
     half = parse_program(START + f"G1 X{10 * share:.9f} A{30 * share:.9f} B{40 * share:.9f}\n", origin=there)
-    np.testing.assert_allclose(found[middle][2][0], cutting_moves(half, there, 0.0)[0][2][1], atol=1e-6)
+    np.testing.assert_allclose(found[middle][2][0], cutting_moves(half, there)[0][2][1], atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(25))

@@ -221,6 +221,11 @@ class Rewriter(Controls):
         """Into how many pieces a move must be cut; refuses those that must be, unless it was asked for."""
         count = 1
         tolerance = math.nan if self.linearise is None else self.linearise - self._unit
+        if tolerance < self._unit:
+            raise self._refusal(
+                f"--linearise {self.linearise:g} mm is no more than the rounding to {self._digits} decimals",
+                "give more of it, or more --decimals",
+            )
         if arc is not None and self._image(self.source.plane) is None:
             if self.linearise is None:
                 raise self._refusal(

@@ -18,7 +18,7 @@ from toolpath_stiff.nc.blocks import AXES, Codes
 from toolpath_stiff.nc.codes import MOTION, PLANE
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.words import read_block
-from toolpath_stiff.placement.rewrite_trace import Tracer, cutting_rows, difference
+from toolpath_stiff.placement.rewrite_trace import Tracer, cutting_rows, differences
 from toolpath_stiff.placement.rewrite_turn import Turn
 from toolpath_stiff.placement.rewrite_words import LineEdit
 from toolpath_stiff.units import MM_PER_INCH
@@ -28,7 +28,6 @@ FloatArray = NDArray[np.float64]
 DECIMALS_MM, DECIMALS_INCH = 4, 5
 # Of the last decimal: an axis that its block does not name gets a word where it is off by more than rounding.
 OFF = 0.75
-SHORTEST = 3.0  # units: straight moves shorter than that may vanish by rounding, or come to be
 
 
 class Controls:
@@ -167,24 +166,21 @@ class Controls:
     def _check(self, first: int, first_out: int, pieces: bool) -> None:
         """Every cutting move of the block must be the placed one to within the rounding; of `pieces` the two ends."""
         self._coarsest = unit = max(self._coarsest, self._unit)
-        shortest = SHORTEST * unit
-        wanted = list(cutting_rows(self.source.recorder, first, shortest))
-        found = list(cutting_rows(self.out.recorder, first_out, shortest))
+        wanted = cutting_rows(self.source.recorder, first)
+        found = cutting_rows(self.out.recorder, first_out)
         if pieces and wanted and found:
             wanted = [wanted[0]._replace(end=wanted[-1].end, arc=None)]
             found = [found[0]._replace(end=found[-1].end)]
-        if len(wanted) != len(found):
-            raise self._refusal(
-                f"the block, rewritten, would make {len(found)} cutting moves, and not {len(wanted)}",
-                "give more --decimals",
-            )
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.source.block.words if word.letter == "L"), 1.0)
-        for one, other in zip(wanted, found, strict=True):
-            what = difference(self.turn, one, other, unit * max(repeats, 1.0))
-            if what:
-                unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
-                raise self._refusal(
-                    f"the block cannot be rewritten: its move {what}",
-                    f"position {unknown} in rapid before the first cutting move" if unknown else "",
-                )
+        what = differences(self.turn, wanted, found, unit * max(repeats, 1.0))
+        if what:
+            raise self._refusal(f"the block cannot be rewritten: its cutting move {what}", self._remedy(what))
+
+    def _remedy(self, what: str) -> str:
+        unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
+        if unknown:
+            return f"position {unknown} in rapid before the first cutting move"
+        if what.startswith(("starts", "leans")):
+            return "position X, Y, Z and the rotary axes in rapid before it"
+        return "" if what.startswith("ends") else "give more --decimals"

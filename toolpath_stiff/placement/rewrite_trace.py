@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from toolpath_stiff.placement.rewrite_turn import Turn
 # In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start; a centre
 # given by I, J, K adds that of its own words, one given by R what `rewrite_blocks.NEAR` allows.
 END_UNITS, CENTER_UNITS = 2.0, 6.0
+SHORTEST_UNITS = 4.0
 
 
 class Segment(NamedTuple):
@@ -48,15 +48,38 @@ class Row(NamedTuple):
     arc: Arc | None
 
 
-def cutting_rows(recorder: Recorder, first: int, shortest: float) -> Iterator[Row]:
-    """Cutting moves recorded from `first` on; straight ones shorter than `shortest` are left out."""
-    for i in range(first, len(recorder.line)):
-        start, end, arc = recorder.start[i], recorder.end[i], recorder.arc[i]
-        if recorder.motion[i] == RAPID:
-            continue
-        if arc is None and max(abs(e - s) for s, e in zip(start, end, strict=True)) < shortest:
-            continue
-        yield Row(start, end, arc)
+def cutting_rows(recorder: Recorder, first: int) -> list[Row]:
+    """Cutting moves recorded from `first` on."""
+    return [
+        Row(recorder.start[i], recorder.end[i], recorder.arc[i])
+        for i in range(first, len(recorder.line))
+        if recorder.motion[i] != RAPID
+    ]
+
+
+def differences(turn: Turn, wanted: list[Row], found: list[Row], unit: float) -> str:
+    """How the written cutting moves of a block differ from the placed ones beyond the rounding to `unit` mm, or "".
+
+    Straight moves of a few units may vanish by rounding, or come to be.
+    """
+    left, right = list(wanted), list(found)
+    while left and right:
+        what = difference(turn, left[0], right[0], unit)
+        if not what:
+            del left[0], right[0]
+        elif _short(left[0], unit):
+            del left[0]
+        elif _short(right[0], unit):
+            del right[0]
+        else:
+            return what
+    if all(_short(row, unit) for row in (*left, *right)):
+        return ""
+    return f"would be {len(found)} moves and not {len(wanted)}"
+
+
+def _short(row: Row, unit: float) -> bool:
+    return row.arc is None and max(abs(e - s) for s, e in zip(row.start, row.end, strict=True)) < SHORTEST_UNITS * unit
 
 
 def difference(turn: Turn, wanted: Row, found: Row, unit: float) -> str:
