@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,17 @@ Pose = tuple[float, float, float, float, float, float]
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 LOADS_HELP = "tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ"
+
+
+def limit_threads(jobs: int) -> None:
+    """Let linear algebra use `jobs` threads, if it is not loaded yet: on small matrices more only cost time.
+
+    Raises `InputError` for fewer than one.
+    """
+    if jobs < 1:
+        raise InputError(f"--jobs {jobs}", expected="1 or more")
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, str(jobs))
 
 
 def finite_number(text: str) -> float:

@@ -42,6 +42,9 @@ COMMANDS = (
     Command("case-study", "the paper's four regions: one path at two heights, displaced and turned", "A placement"),
     Command("effects", "physical effects that a machine can carry; write your own", "A machine"),
     Command("reduce", "raw force and displacement records to measured stiffnesses, lost motion, loops", "Measurements"),
+    Command(
+        "diagnose", "which physical effect the model lacks, if any: verdict, candidates, confounding", "Measurements"
+    ),
     Command("plan", "what to measure next to tell explanations apart, or a first campaign", "Measurements"),
     Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements"),
 )

@@ -8,7 +8,7 @@ import json
 import math
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -65,13 +65,26 @@ def write_analysis(
     InputError
         The folder cannot be written; `table="parquet"` without pyarrow.
     """
-    folder = Path(out_dir)
+    return _all_or_nothing(Path(out_dir), _contents(analysis, plots, table, required, other), OWN_FILES)
+
+
+def write_folder(folder: str | Path, contents: Mapping[str, str | bytes], own: Iterable[str] = ()) -> list[Path]:
+    """Write files into a folder, all or none; made if need be. Raises `InputError` where that cannot be done.
+
+    `own`: names that an earlier run may have left and that are removed unless written again.
+    """
+    return _all_or_nothing(Path(folder), contents.items(), own)
+
+
+def _all_or_nothing(
+    folder: Path, contents: Iterable[tuple[str, str | bytes | Iterable[str]]], own: Iterable[str]
+) -> list[Path]:
     try:
         made = _make_parents(folder)
     except OSError as error:
         raise InputError(f"cannot write to {str(folder)!r}: {error.strerror}") from None
     try:
-        return _write_and_move(folder, _contents(analysis, plots, table, required, other))
+        return _write_and_move(folder, contents, own)
     except BaseException as error:
         for parent in made:
             with suppress(OSError):  # not empty: someone else uses it by now
@@ -157,7 +170,9 @@ def _make_parents(folder: Path) -> list[Path]:
     return made
 
 
-def _write_and_move(folder: Path, contents: Iterable[tuple[str, str | bytes | Iterable[str]]]) -> list[Path]:
+def _write_and_move(
+    folder: Path, contents: Iterable[tuple[str, str | bytes | Iterable[str]]], own: Iterable[str]
+) -> list[Path]:
     """Write to a temporary folder on the same file system, then rename: a new report folder in one go."""
     exists = folder.is_dir()
     stage = Path(tempfile.mkdtemp(dir=folder if exists else folder.absolute().parent, prefix=".tps-"))
@@ -168,7 +183,7 @@ def _write_and_move(folder: Path, contents: Iterable[tuple[str, str | bytes | It
         if exists:
             for name in names:
                 (report / name).replace(folder / name)
-            for name in set(OWN_FILES) - set(names):
+            for name in set(own) - set(names):
                 (folder / name).unlink(missing_ok=True)
         else:
             report.rename(folder)

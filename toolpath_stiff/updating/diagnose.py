@@ -44,7 +44,7 @@ class Diagnosis:
     judgements
         Name of the noise model -> judgement. The one that is written out in full is `main`.
     main
-        The judgement of the measured or stated noise, else of the low guess.
+        The judgement of the measured or stated noise, else of the high guess.
     data, machine, effects
         What was diagnosed, with the effects that these data can test.
     cannot_test
@@ -194,12 +194,8 @@ def diagnose(
         problem = Problem(predictor, Scatter.of(one, spread), spread)
         judgements[one.name] = judge(problem, one, spread, effects, seed)
     verdict, plausible = common_verdict(list(judgements.values()))
-    main = next(iter(judgements.values()))
-    for judgement in judgements.values():
-        # Of several noise models the one that leads to the common verdict is written out.
-        if judgement.verdict == verdict:
-            main = judgement
-            break
+    # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
+    main = max(judgements.values(), key=lambda judgement: judgement.noise.typical)
     say("final fits, errors held out by point")
     base = refine(main.problem, main.base)
     fits = dict(main.fits)

@@ -36,6 +36,9 @@ OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0  # share of wild readings, and how much wide
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
 LOW_GUESS, HIGH_GUESS = 0.02, 0.10
 LARGEST = 0.5  # relative sd that a user may state
+# Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
+# states it, within a third where it is guessed; assumed.
+STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
@@ -59,7 +62,7 @@ class Noise:
     outliers, outlier_width
         Share of wild readings and how many times wider they scatter.
     freedom
-        Degrees of freedom behind `repeat`; inf if it was stated or guessed.
+        Degrees of freedom behind `repeat`: how far it is to be trusted.
     origin
         Where the figures come from, a sentence.
     """
@@ -120,7 +123,7 @@ def noise_models(
         both = stated if isinstance(stated, tuple) else _shared(stated)
         if not (0.0 < both[0] <= LARGEST and 0.0 <= both[1] <= LARGEST):
             raise InputError(f"a noise of {stated!r}", expected=f"more than 0 and at most {100 * LARGEST:g} %")
-        return (model("stated", np.full(n, both[0]), both[1], np.inf, f"stated: {_percent(*both)}"),)
+        return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}"),)
     repeats = estimate_from_repeats(data)
     if repeats is not None:
         repeat, clamping, freedom, clamps = repeats
@@ -135,12 +138,12 @@ def noise_models(
             f"sd_N_per_mm of the readings, {100 * float(np.sqrt(np.mean(relative**2))):.2g} % in the mean, of which "
             f"{100 * clamping:.2g} % is assumed to be clamping"
         )
-        return (model("stated", repeat, float(clamping), np.inf, origin),)
+        return (model("stated", repeat, float(clamping), STATED_FREEDOM, origin),)
     guesses = []
     for name, guess in (("low", LOW_GUESS), ("high", HIGH_GUESS)):
         both = _shared(guess)
         origin = f"a {name} guess, {_percent(*both)}: the data hold neither repeats nor sd_N_per_mm"
-        guesses.append(model(name, np.full(n, both[0]), both[1], np.inf, origin))
+        guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
     return tuple(guesses)
 
 

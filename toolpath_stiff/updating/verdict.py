@@ -1,7 +1,7 @@
 """From fits, probabilities and gates to a verdict.
 
 Two gates. Absolute: a hypothesis must leave residuals that its own noise explains. Relative: among those that do, the
-posterior probabilities decide; only a single name that holds 95 % is given as the answer.
+posterior probabilities decide; only a name far ahead of all others is given as the answer.
 
 adequate      nothing is missing that these data could show
 identified    one effect (or one pair) explains the data, and no other does
@@ -34,10 +34,9 @@ OUTSIDE = "outside the catalogue"
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.10
 FALSE_ALARM = 0.05  # of the base model's gate
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
-NAMED = 0.95  # probability from which a single name is the answer
-# Probability that the plausible set adds up to where it is not a single name: to hold the truth in 95 of 100 cases it
-# must allow for priors and linearisations that are not exact.
-HELD = 0.98
+NAMED = 0.90  # probability from which a single name is the answer
+HELD = 0.95  # probability that the plausible set adds up to where it is not a single name
+STANDS = 0.05  # probability from which something outside the catalogue, or another pair, is not ruled out
 TESTED = 4  # candidates, besides all those that matter, that go through the absolute gate
 FAR = 8.0  # log evidence behind the best adequate candidate at which the others cannot matter
 SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alone
@@ -96,7 +95,7 @@ def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Seque
     base_gate = absolute_gate(
         problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain
     )
-    work = _Work(problem, base, families, forms, simulator)
+    work = _Work(problem, noise, base, families, forms, simulator)
     if base_gate.probability > FALSE_ALARM:
         posterior = work.posterior(none=True, names=[f.name for f in families])
         plausible = _smallest_set(posterior)
@@ -109,7 +108,7 @@ def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Seque
         posterior = work.posterior(none=none_stands, names=names)
         plausible = _smallest_set(posterior)
         verdict = "identified" if len(plausible) == 1 else "ambiguous"
-        if plausible == (NONE,):
+        if posterior[NONE] > 0.5:  # what spoke against the model is likelier chance than any effect
             verdict = "adequate"
         return work.judgement(verdict, plausible, noise, base_gate, posterior, "")
     return work.beyond_singles(noise, base_gate)
@@ -136,12 +135,13 @@ class _Work:
     def __init__(
         self,
         problem: Problem,
+        noise: Noise,
         base: Score,
         families: list[Family],
         forms: dict[str, FloatArray],
         simulator: Simulator,
     ) -> None:
-        self.problem, self.base, self.families = problem, base, families
+        self.problem, self.noise, self.base, self.families = problem, noise, base, families
         self.forms, self.simulator = forms, simulator
         self.gates: dict[str, Gate] = {}
         self.fits: dict[str, Fit] = {}
@@ -154,11 +154,26 @@ class _Work:
             self.gates[name] = absolute_gate(self.problem, fit.residual, fit.jacobian, self.simulator, self.forms)
         return self.gates[name]
 
+    def evidence(self, log_evidence: float, score: Score) -> float:
+        """Log evidence when the size of the noise is itself known to `noise.freedom` degrees of freedom only.
+
+        Integrated over it, the normal likelihood exp(-q / 2) of the weighted squares q of n readings becomes Student's,
+        (1 + q / freedom)^(-(freedom + n) / 2): many readings that fit badly say as much of the noise as of the model.
+        """
+        freedom, n = self.noise.freedom, len(score.residual)
+        if not np.isfinite(freedom):
+            return log_evidence
+        squares = -2.0 * score.log_likelihood - self.problem.scatter.log_determinant
+        return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
+
     def posterior(self, none: bool, names: Sequence[str]) -> dict[str, float]:
         """Probabilities of the base model (if it stands) and of single effects; 0 for all others."""
-        evidence = {f.name: f.log_evidence for f in self.families}
+        evidence = {f.name: self.evidence(f.log_evidence, f.best or self.base) for f in self.families}
         prior = {name: PRIOR_SINGLES / max(len(self.families), 1) for name in names}
-        return probabilities({NONE: self.base.log_evidence} | evidence, prior | ({NONE: PRIOR_NONE} if none else {}))
+        return probabilities(
+            {NONE: self.evidence(self.base.log_evidence, self.base)} | evidence,
+            prior | ({NONE: PRIOR_NONE} if none else {}),
+        )
 
     def adequate_singles(self, none_stands: bool) -> list[str]:
         """Effects that pass the absolute gate, among all that could matter."""
@@ -194,10 +209,10 @@ class _Work:
             if self.gate(name, pair.score).probability > ADEQUATE and pair.log_evidence > alone + SURVIVES:
                 evidences[name], prior[name] = pair.log_evidence, PRIOR_PAIRS / number
         posterior = probabilities(evidences, prior)
-        if posterior[OUTSIDE] >= 1.0 - NAMED or len(posterior) == 1:
+        if posterior[OUTSIDE] >= STANDS or len(posterior) == 1:
             return self.judgement("unexplained", (), noise, base_gate, posterior, form)
         posterior.pop(OUTSIDE)
-        likely = [name for name, weight in posterior.items() if weight > 1.0 - NAMED]
+        likely = [name for name, weight in posterior.items() if weight > STANDS]
         verdict = "identified" if len(likely) == 1 else "ambiguous"
         return self.judgement(verdict, _smallest_set(posterior), noise, base_gate, posterior, form)
 

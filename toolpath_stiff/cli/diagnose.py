@@ -1,0 +1,187 @@
+"""`tps diagnose`: the physical effect that the model lacks, if any."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.cli.arguments import add_json_option, finite_number, limit_threads, pose_argument
+from toolpath_stiff.errors import InputError
+
+if TYPE_CHECKING:
+    from toolpath_stiff.updating.diagnose import Diagnosis
+
+EPILOG = """\
+examples:
+  tps diagnose measurements.csv
+  tps diagnose nist-table1 --noise 5
+  tps diagnose first.csv second.csv --effects my_effect.py --out reports/again
+
+The verdict: adequate (nothing is missing that these data could show), identified, ambiguous (several explain the data
+equally well), unexplained (something is missing that no effect of the catalogue describes). Files written to --out:
+diagnose.json, residuals.csv, ladder.png, confounding.png, detectable.png, before_after.png, envelope.png,
+report.html.
+"""
+
+OWN_FILES = (
+    "diagnose.json", "residuals.csv", "ladder.png", "confounding.png", "detectable.png", "before_after.png",
+    "envelope.png", "report.html",
+)  # fmt: skip
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument("data", nargs="+", metavar="DATA", help="measurement files, or nist-table1")
+    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
+    parser.add_argument(
+        "--effects", action="append", default=[], metavar="FILE.py", help="your own effects; they take part"
+    )
+    group = parser.add_argument_group("noise")
+    group.add_argument(
+        "--noise", type=noise_argument, metavar="PERCENT[,PERCENT]",
+        help="sd of one reading, re-clamping included; or of the reading alone and of a clamping "
+        "(default: from repeats, else from sd_N_per_mm, else a low and a high guess)",
+    )  # fmt: skip
+    group.add_argument(
+        "--strut-spread",
+        type=spread_argument,
+        default=0.01,
+        metavar="PERCENT",
+        help="of the struts' stiffness (default: 1)",
+    )
+    group = parser.add_argument_group("how much the choice matters")
+    group.add_argument(
+        "--program", metavar="PROGRAM", help="NC program to try it on (default: the packaged case study)"
+    )
+    group.add_argument("--origin", type=pose_argument, metavar="X,Y,Z[,A,B,C]", help="its program zero, mm and degrees")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the bootstrap (default: 0)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
+    parser.add_argument("--out", default="reports/diagnose", metavar="DIR", help="folder (default: reports/diagnose)")
+    parser.add_argument("--no-plots", action="store_true", help="only diagnose.json and residuals.csv")
+    add_json_option(parser, "print diagnose.json to standard output and nothing else")
+
+
+def noise_argument(text: str) -> float | tuple[float, float]:
+    """One or two percentages as relative standard deviations."""
+    parts = [finite_number(part) / 100.0 for part in text.split(",")]
+    if len(parts) > 2 or not all(0.0 <= part <= 0.5 for part in parts) or parts[0] <= 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected one or two percentages, more than 0 and at most 50")
+    return parts[0] if len(parts) == 1 else (parts[0], parts[1])
+
+
+def spread_argument(text: str) -> float:
+    """A percentage from 0 to 50 as a relative standard deviation."""
+    value = finite_number(text)
+    if not 0.0 <= value <= 50.0:
+        raise argparse.ArgumentTypeError(f"{text} %: expected 0 to 50 %")
+    return value / 100.0
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, write, say what was found. Any verdict is success."""
+    limit_threads(args.jobs)
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.report.write import write_folder
+    from toolpath_stiff.updating.diagnose import diagnose
+    from toolpath_stiff.updating.diagnosis_document import document
+    from toolpath_stiff.updating.measurements import read_measurements
+
+    if args.seed < 0:
+        raise InputError(f"--seed {args.seed}", expected="0 or more")
+    machine = load_machine(args.machine)
+    data = read_measurements(args.data, machine)
+    diagnosis = diagnose(
+        machine, data, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed,
+        files=args.data, progress=_say,
+    )  # fmt: skip
+    found = document(diagnosis, " ".join(["tps", *sys.argv[1:]]))
+    _complete(found, diagnosis, args)
+    contents: dict[str, str | bytes] = {
+        "diagnose.json": json.dumps(found, indent=2, ensure_ascii=False) + "\n",
+        "residuals.csv": _residuals(diagnosis),
+    }
+    if not args.no_plots:
+        _say("drawing")
+        contents |= _pictures(found, diagnosis)
+    _say("")
+    written = write_folder(args.out, contents, OWN_FILES)
+    if args.json:
+        print(contents["diagnose.json"], end="")
+    else:
+        from toolpath_stiff.report.diagnose_text import terminal_text
+
+        print(terminal_text(found))
+        print("\n".join(["written:", *(f"  {file}" for file in written)]))
+    return 0
+
+
+def _say(text: str) -> None:
+    """One line of progress, where someone watches."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\x1b[K{text}")
+        sys.stderr.flush()
+
+
+def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namespace) -> None:
+    """Add what needs other rooms: the next measurements, and the choice's weight on a tool path."""
+    from toolpath_stiff.updating.next_measurements import choice_on_path, next_measurements
+
+    if diagnosis.verdict != "ambiguous":
+        return
+    _say("planning the next measurements")
+    found["next_measurements"], remarks = next_measurements(diagnosis, seed=args.seed)
+    found["why"] += remarks
+    if args.program is None:
+        from toolpath_stiff.placement.case_study import case_study_program
+
+        program = case_study_program()
+    else:
+        from toolpath_stiff.nc import read_program
+
+        program = read_program(args.program, origin=args.origin, default_origin=diagnosis.machine.default_origin)
+    found["path"] = choice_on_path(diagnosis, program, args.origin)
+
+
+def _residuals(diagnosis: Diagnosis) -> str:
+    """One row a reading: measured, modelled before and after, in shop units."""
+    import numpy as np
+
+    from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+
+    data = diagnosis.data
+    after = diagnosis.before if diagnosis.after is None else diagnosis.after
+    lines = [
+        "file,line,point,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,dx,dy,dz,stiffness_N_per_mm,before_N_per_mm,after_N_per_mm,"
+        "before_percent,after_percent"
+    ]
+    for i in range(len(data)):
+        pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
+        measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
+        modelled = [measured * float(np.exp(-r[i])) for r in (diagnosis.before, after)]
+        numbers = [f"{value:.6g}" for value in pose]
+        numbers += [f"{value:.1f}" for value in (measured, *modelled)]
+        numbers += [f"{100.0 * (value / measured - 1.0):.3f}" for value in modelled]
+        name = '"' + str(data.file[i]).replace('"', '""') + '"'
+        point = '"' + str(data.point[i]).replace('"', '""') + '"'
+        lines.append(",".join([name, str(data.line[i]), point, *numbers]))
+    return "\n".join(lines) + "\n"
+
+
+def _pictures(found: dict[str, Any], diagnosis: Diagnosis) -> dict[str, str | bytes]:
+    from toolpath_stiff.report.diagnose_page import diagnose_html
+    from toolpath_stiff.report.diagnose_pictures import confounding_png, detectable_png, envelope_png, ladder_png
+    from toolpath_stiff.report.update_pictures import before_after_png
+
+    pictures: dict[str, bytes | None] = {
+        "ladder.png": ladder_png(found),
+        "confounding.png": confounding_png(found),
+        "detectable.png": detectable_png(found),
+        "before_after.png": before_after_png(found, diagnosis.data, diagnosis.before, diagnosis.after),
+        "envelope.png": envelope_png(found),
+    }
+    drawn = {name: picture for name, picture in pictures.items() if picture is not None}
+    return {**drawn, "report.html": diagnose_html(found, drawn)}
