@@ -31,6 +31,7 @@ from toolpath_stiff.updating.residual_variables import Label, Variable, directio
 FloatArray = NDArray[np.float64]
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
+HINTS = 3  # patterns named where none stands out
 FAR_OFF = 4.0  # standard deviations, of a reading that is named
 GAUSS_NEWTON_STEPS = 8
 FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
@@ -267,6 +268,7 @@ def _document(
         "warnings": list(data.warnings),
         "notes": list(data.notes),
     }
+    document["hints"] = _hints(answers[-1], document, looked_for, numbers, residual)
     document["text"] = overall_text(document)
     return document
 
@@ -300,6 +302,24 @@ def _tests(answers: list[_Answer], looked_for: list[Pattern]) -> list[dict[str, 
             }
         )
     return sorted(rows, key=lambda row: -abs(row["statistic"]))
+
+
+def _hints(
+    one: _Answer, document: dict[str, Any], looked_for: list[Pattern], numbers: list[Variable], residual: FloatArray
+) -> list[dict[str, Any]]:
+    """The strongest patterns, each of another variable and not like one before, where nothing stands out."""
+    kept: list[dict[str, Any]] = []
+    alike: set[int] = set()
+    by_name = {row["pattern"]: row["p_adjusted"] for row in document["tests"]}
+    for test in sorted(one.structure.tests, key=lambda t: -abs(t.statistic)):
+        if len(kept) == HINTS or document["findings"]:
+            break
+        if test.pattern not in alike:
+            entry = as_finding(test, 0, one.structure, None, looked_for, numbers, residual)
+            kept.append({**entry, "p_adjusted": by_name[entry["pattern"]]})
+            alike |= {test.pattern, *test.alike}
+            alike |= {i for i, p in enumerate(looked_for) if p.variable == entry["variable"]}
+    return kept
 
 
 def _far_off(residual: FloatArray, one: _Answer, looked_for: list[Pattern], data: Measurements) -> list[dict[str, Any]]:

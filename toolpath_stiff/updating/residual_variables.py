@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.predict import Predictor
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FloatArray = NDArray[np.float64]
 TextArray = NDArray[np.str_]
@@ -162,14 +162,18 @@ def varies(values: FloatArray) -> bool:
 
 def labels(data: Measurements) -> tuple[list[Label], list[str]]:
     """Names to hold residuals against, only those with two levels or more; notes about those with too many."""
+    clamp, file = data.clamp, data.file
+    if len(set(file.tolist())) == 1:
+        prefix = f"{file[0]}: "
+        clamp = np.array([name.removeprefix(prefix) for name in clamp.tolist()])
     found = [
         Label("plane", "at the {}", planes(data), True),
         Label("zone", "{}", zones(data), True),
         Label("setup", "with set-up {}", data.setup, True),
         Label("loop", "read {}", data.loop, True),
-        Label("file", "in {}", data.file, True),
+        Label("file", "in {}", file, True),
         Label("repeat", "in repeat {}", data.repeat, True),
-        Label("clamp", "in clamping ({})", data.clamp, False),
+        Label("clamp", "in clamping ({})", clamp, False),
         Label("point", "at point {}", data.point, False),
     ]
     kept, notes = [], []
