@@ -42,6 +42,7 @@ COMMANDS = (
     Command("case-study", "the paper's four regions: one path at two heights, displaced and turned", "A placement"),
     Command("effects", "physical effects that a machine can carry; write your own", "A machine"),
     Command("reduce", "raw force and displacement records to measured stiffnesses, lost motion, loops", "Measurements"),
+    Command("compare", "where the model fails: errors, structure in the residuals, pictures, page", "Measurements"),
     Command(
         "diagnose", "which physical effect the model lacks, if any: verdict, candidates, confounding", "Measurements"
     ),
