@@ -240,8 +240,9 @@ def _visits(stops: Sequence[_Stop], menu: Menu, rng: Generator) -> Visits:
     )
     v = len(stops)
     return Visits(
-        pose, extension, np.zeros(v), setup, np.full(v, ""), readings, names, np.arange(v * count), np.arange(v) * count
-    )
+        pose, extension, np.zeros(v), setup, np.full(v, ""), readings, names, np.ones(v * count, dtype=np.int64),
+        np.arange(v * count), np.arange(v) * count,
+    )  # fmt: skip
 
 
 def _minutes(stops: Sequence[_Stop], visits: Visits, costs: Costs) -> float:

@@ -28,7 +28,7 @@ def plan_rows(
     taken
         Names of points that new points must not bear.
     repeats
-        Which repeat of its place each visit is; none given: the first.
+        Which repeat of its place each visit is, where places are clamped several times; else the rounds of a visit.
     """
     names = _point_names(visits, chosen, set(taken))
     timed = not np.isnan(visits.readings.time).any()
@@ -47,7 +47,7 @@ def plan_rows(
             entry["force_N"] = _round(visits.readings.force[row])
             entry["setup"] = str(visits.setup[visit])
             entry["clamp"] = clamp
-            entry["repeat"] = repeats[clamp - 1] if len(repeats) else 1
+            entry["repeat"] = repeats[clamp - 1] if len(repeats) else int(visits.rounds[row])
             entry["point"] = names[clamp - 1]
             if timed:
                 entry["time_min"] = _round(visits.readings.time[row] / 60.0)

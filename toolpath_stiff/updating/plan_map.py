@@ -104,5 +104,14 @@ def _visits(poses: FloatArray, setups: Sequence[str], loads: Sequence[float], me
     )
     members = np.arange(v * count)
     return Visits(
-        pose, np.zeros(v), np.zeros(v), setup, np.full(v, ""), readings, names, members, members[::count].copy()
+        pose,
+        np.zeros(v),
+        np.zeros(v),
+        setup,
+        np.full(v, ""),
+        readings,
+        names,
+        np.ones(v * count, dtype=np.int64),
+        members,
+        members[::count].copy(),
     )

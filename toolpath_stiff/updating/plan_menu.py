@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.random import Generator
@@ -45,6 +45,7 @@ MOST_PLACES = 400  # places with their tool, set-up and waiting; more would cost
 MARGIN = 0.02  # share of each limit's span that planned poses keep clear of it; assumed
 ROUND, ROUND_ANGLE = 5e-3, 0.5 * RAD_PER_DEG  # planned poses are round figures, which a person keys in
 UPRIGHT_SHARE = 0.25  # share of the poses with a vertical spindle
+STEEP_SHARE = 0.5  # share of the others with the largest tilt
 SETUP_ELSEWHERE = "table"  # the work on the bare table, where the data know only one set-up, with a name
 
 
@@ -70,6 +71,8 @@ class Menu:
         s between zeroing and the first reading; more than one lets a drift show.
     oblique
         Whether readings along the diagonals XY, XZ, YZ may be planned.
+    rounds
+        How often a reading may be taken in one clamping.
     measured
         Poses (m, 6) in m and rad that have been measured before, and may be again in another way.
     labels
@@ -88,12 +91,15 @@ class Menu:
     setups: tuple[str, ...] = ("",)
     waits: tuple[float, ...] = (0.0, 10.0 * MINUTE)
     oblique: bool = True
+    rounds: int = 2
     measured: FloatArray = field(default_factory=lambda: np.zeros((0, 6)))
     labels: tuple[str, ...] = ()
     timed: bool = True
     usual_load: float = DEFAULT_FORCE
 
     def __post_init__(self) -> None:
+        if self.rounds < 1:
+            raise InputError(f"{self.rounds} rounds of readings in a plan", expected="1 or more")
         for name in ("loads", "tool_extensions", "setups", "waits"):
             if not getattr(self, name):
                 raise InputError(f"a plan without {name.replace('_', ' ')}", expected="at least one")
@@ -167,8 +173,8 @@ class Visits:
         (v,) name of the set-up; of the point, if it was measured before.
     readings
         The m readings that the visits are made of, stiffness empty.
-    names
-        (m,) direction of each reading: a key of `VECTORS`.
+    names, rounds
+        (m,) direction of each reading, a key of `VECTORS`; which reading it is of its kind in the clamping.
     members
         Indices into `readings`, visit after visit.
     starts
@@ -182,6 +188,7 @@ class Visits:
     label: NDArray[np.str_]
     readings: Measurements
     names: NDArray[np.str_]
+    rounds: IntArray
     members: IntArray
     starts: IntArray
 
@@ -240,9 +247,9 @@ def possible_visits(machine: Machine, menu: Menu, matters: Matters, rng: Generat
     which = np.array([place[0] for place in places])
     loads = menu.loads if matters.load else (menu.usual_load,)
     directions = AXES + DIAGONALS if menu.oblique else AXES
-    jobs = list(product(directions, loads))
-    readings, names = _readings(poses[which], places, jobs, menu.timed, rng)
-    members, starts, owner = _variants(len(places), jobs, loads, directions)
+    jobs = [Job(*job) for job in product(range(1, menu.rounds + 1), directions, loads)]
+    readings = _readings(poses[which], places, jobs, menu.timed, rng)
+    members, starts, owner = _variants(len(places), jobs, loads)
     return Visits(
         pose=poses[which][owner],
         extension=np.array([place[1] for place in places])[owner],
@@ -250,26 +257,33 @@ def possible_visits(machine: Machine, menu: Menu, matters: Matters, rng: Generat
         setup=np.array([place[2] for place in places], dtype=str)[owner],
         label=np.array([labels[i] for i in which], dtype=str)[owner],
         readings=readings,
-        names=names,
+        names=np.tile([job.direction for job in jobs], len(places)),
+        rounds=np.tile([job.round for job in jobs], len(places)),
         members=members,
         starts=starts,
     )
 
 
-def _variants(
-    places: int, jobs: Sequence[tuple[str, float]], loads: Sequence[float], directions: Sequence[str]
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Members, starts and place of the visits: each place with every choice of directions and loads.
+class Job(NamedTuple):
+    """One reading at a visit: which round it belongs to, its direction (a key of `VECTORS`), its load in N."""
+
+    round: int
+    direction: str
+    load: float
+
+
+def _variants(places: int, jobs: Sequence[Job], loads: Sequence[float]) -> tuple[IntArray, IntArray, IntArray]:
+    """Members, starts and place of the visits: each place with every choice of directions, loads and rounds.
 
     X, Y, Z are always read: what the rivals do not think of shows there.
     """
     load_choices: list[tuple[float, ...]] = [(load,) for load in loads]
     if len(loads) > 1:
         load_choices.append((min(loads), max(loads)))
+    named = [AXES, VECTORS] if any(job.direction not in AXES for job in jobs) else [AXES]
     choices = [
-        np.array([k for k, (name, load) in enumerate(jobs) if name in named and load in chosen])
-        for named in ([AXES] if len(directions) == len(AXES) else [AXES, tuple(directions)])
-        for chosen in load_choices
+        np.array([k for k, job in enumerate(jobs) if job.direction in names and job.load in some and job.round <= last])
+        for names, some, last in product(named, load_choices, sorted({job.round for job in jobs}))
     ]
     members, starts, owner, at = [], [], [], 0
     for place, choice in product(range(places), choices):
@@ -281,34 +295,29 @@ def _variants(
 
 
 def _readings(
-    poses: FloatArray,
-    places: Sequence[tuple[int, float, str, float]],
-    jobs: Sequence[tuple[str, float]],
-    timed: bool,
-    rng: Generator,
-) -> tuple[Measurements, NDArray[np.str_]]:
-    """Every place with every job, in that order, and the names of the directions.
+    poses: FloatArray, places: Sequence[tuple[int, float, str, float]], jobs: Sequence[Job], timed: bool, rng: Generator
+) -> Measurements:
+    """Every place with every job, in that order.
 
-    The axes come first after zeroing, in random order, so that a drift does not look like a direction.
+    Round by round, the axes before the diagonals, in random order: a drift does not look like a direction.
     """
     count = len(jobs)
-    axes = np.array([k for k, (name, _) in enumerate(jobs) if name in AXES])
-    others = np.array([k for k in range(count) if k not in axes], dtype=int)
+    groups = [
+        np.array([k for k, job in enumerate(jobs) if job.round == last and (job.direction in AXES) == axes], dtype=int)
+        for last, axes in product(sorted({job.round for job in jobs}), (True, False))
+    ]
     slots = np.empty((len(places), count))
     for place in range(len(places)):
-        order = np.concatenate([rng.permutation(axes), rng.permutation(others)])
-        slots[place, order.astype(int)] = np.arange(1, count + 1)
+        slots[place, np.concatenate([rng.permutation(group) for group in groups])] = np.arange(1, count + 1)
     waits = np.array([place[3] for place in places])
-    time = (waits[:, None] + slots * READING_EVERY).ravel() if timed else np.full(len(places) * count, np.nan)
-    names = np.tile([name for name, _ in jobs], len(places))
     return planned_readings(
         np.repeat(poses, count, axis=0),
-        names,
-        np.tile([load for _, load in jobs], len(places)),
+        np.tile([job.direction for job in jobs], len(places)),
+        np.tile([job.load for job in jobs], len(places)),
         np.repeat([place[1] for place in places], count),
         np.repeat(np.array([place[2] for place in places], dtype=str), count),
-        time,
-    ), names
+        (waits[:, None] + slots * READING_EVERY).ravel() if timed else np.full(len(places) * count, np.nan),
+    )
 
 
 def planned_readings(
@@ -367,8 +376,9 @@ def draw_poses(machine: Machine, menu: Menu, count: int, rng: Generator) -> Floa
     for batch in range(8):
         m = count
         radius, azimuth = menu.radius * np.sqrt(rng.random(m)), rng.uniform(0.0, 2.0 * np.pi, m)
-        # The largest tilts tell the most, and all of them look the same to a model without tilt in it.
+        # The largest tilts mostly tell the most.
         tilt, about = menu.max_tilt * np.sqrt(rng.uniform(0.16, 1.0, m)), rng.uniform(0.0, 2.0 * np.pi, m)
+        tilt[rng.random(m) < STEEP_SHARE] = menu.max_tilt
         tilt[rng.random(m) < UPRIGHT_SHARE] = 0.0
         position = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), rng.choice(levels, m)], axis=1)
         # Toward zero: rounding never tilts further than allowed.
