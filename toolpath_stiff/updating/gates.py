@@ -28,6 +28,7 @@ FloatArray = NDArray[np.float64]
 DRAWS = 400
 WILD_SQUARED = 11.3  # squared deleted residual beyond which a reading is set aside; pays the price of `scatter`
 MOST_WILD = 0.05
+HOPELESS = 1.3  # times the largest simulated sum of squares
 
 
 @dataclass(frozen=True)
@@ -114,18 +115,26 @@ class Structure:
         for form in self.forms:
             product = projected @ form
             self.means.append(float(np.trace(product)))
-            self.variances.append(float(max(2.0 * np.einsum("ij,ji->", product, product), 1e-300)))
+            self.variances.append(float(max(2.0 * (product * product.T).sum(), 1e-300)))
 
     def surprises(self, pulls: FloatArray) -> FloatArray:
         """(s, forms) of pulls (s, n)."""
-        from scipy.stats import chi2
-
         columns = []
         for form, mean, variance in zip(self.forms, self.means, self.variances, strict=True):
             value = np.einsum("si,si->s", pulls @ form, pulls)
-            surprise = -chi2.logsf(value * 2.0 * mean / variance, 2.0 * mean**2 / variance)
-            columns.append(np.minimum(np.nan_to_num(surprise, nan=0.0, posinf=1e6), 1e6))
+            columns.append(_surprise(value * 2.0 * mean / variance, 2.0 * mean**2 / variance))
         return np.stack(columns, axis=1) if columns else np.zeros((len(pulls), 1))
+
+
+def _surprise(value: FloatArray, freedom: float) -> FloatArray:
+    """-ln P(chi-square of `freedom` > value), with the leading term of its asymptote where that underflows."""
+    from scipy.special import gammaincc, gammaln
+
+    half, x = 0.5 * freedom, np.maximum(0.5 * value, 1e-300)
+    tail = gammaincc(half, x)
+    far = x - (half - 1.0) * np.log(x) + gammaln(half)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.where(tail > 1e-290, -np.log(tail), far))
 
 
 def absolute_gate(
@@ -149,7 +158,10 @@ def absolute_gate(
     squares = _quadratic(problem, pulls) + WILD_SQUARED * count
     observed_squares = float((_quadratic(problem, observed) + WILD_SQUARED * wild)[0])
     structure = Structure(forms, projected)
-    seen, simulated = structure.surprises(observed), structure.surprises(pulls)
+    seen = structure.surprises(observed)
+    # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
+    hopeless = not signatures and observed_squares > HOPELESS * squares.max()
+    simulated = np.zeros((len(pulls), seen.shape[1])) if hopeless else structure.surprises(pulls)
     # Rows: the data, then every draw; columns: what may look bad, larger is worse.
     looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
     if signatures:

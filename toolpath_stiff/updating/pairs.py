@@ -20,8 +20,8 @@ from toolpath_stiff.updating.ranking import Family
 
 FloatArray = NDArray[np.float64]
 
-STARTS = 6  # singles from which pairs are built
-PARTNERS = 8  # partners tried for each
+STARTS = 5  # singles from which pairs are built
+PARTNERS = 6  # partners tried for each
 AMPLITUDES = np.geomspace(0.003, 0.3, 9)  # rms of a discrepancy of ln k; as wide as the effects' own prior
 FORMS = 5  # forms of discrepancy that are weighed, those that stick out most
 
