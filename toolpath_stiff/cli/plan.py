@@ -132,8 +132,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(out: Path, contents: dict[str, str | bytes]) -> list[Path]:
+    """The files; a picture of an earlier plan would contradict the new one."""
     from toolpath_stiff.files import write_atomically
 
+    if "plan.png" not in contents:
+        (out / "plan.png").unlink(missing_ok=True)
     return [write_atomically(out / name, content) for name, content in contents.items()]
 
 

@@ -46,6 +46,7 @@ MARGIN = 0.02  # share of each limit's span that planned poses keep clear of it;
 ROUND, ROUND_ANGLE = 5e-3, 0.5 * RAD_PER_DEG  # planned poses are round figures, which a person keys in
 UPRIGHT_SHARE = 0.25  # share of the poses with a vertical spindle
 STEEP_SHARE = 0.5  # share of the others with the largest tilt
+LOADS = (1e-3, 1e6)  # N, that a plan may ask for
 SETUP_ELSEWHERE = "table"  # the work on the bare table, where the data know only one set-up, with a name
 
 
@@ -103,8 +104,13 @@ class Menu:
         for name in ("loads", "tool_extensions", "setups", "waits"):
             if not getattr(self, name):
                 raise InputError(f"a plan without {name.replace('_', ' ')}", expected="at least one")
-        if min(self.loads) <= 0.0 or min(self.waits) < 0.0 or self.radius < 0.0 or self.max_tilt < 0.0:
-            raise InputError("a plan with a negative load, waiting time, radius or tilt", expected="0 or more")
+        if not LOADS[0] <= min(self.loads) <= max(self.loads) <= LOADS[1]:
+            raise InputError(
+                f"a plan with loads of {', '.join(f'{load:g}' for load in self.loads)} N",
+                expected=f"{LOADS[0]:g} to {LOADS[1]:g} N",
+            )
+        if min(self.waits) < 0.0 or self.radius < 0.0 or self.max_tilt < 0.0:
+            raise InputError("a plan with a negative waiting time, radius or tilt", expected="0 or more")
 
     @classmethod
     def of(cls, data: Measurements) -> Menu:
