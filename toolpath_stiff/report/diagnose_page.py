@@ -18,11 +18,12 @@ from toolpath_stiff.report.diagnose_words import (
     best_explanation,
     entries,
     figure_of,
+    floor_text,
+    headline,
     hidden_name,
     is_offered,
     is_plausible,
     name_text,
-    noise_floor_percent,
     parameter_texts,
     percent,
     plausible_text,
@@ -47,8 +48,8 @@ QUESTIONS = {
     ),
     "before_after.png": (
         "Where does the model fail, and what is left?",
-        "Red: measured softer than modelled; blue: stiffer. Colour that forms a pattern is physics, colour that is "
-        "sprinkled is scatter.",
+        "Red: measured softer than modelled; blue: stiffer. A pattern points to physics, colours sprinkled at "
+        "random to scatter.",
     ),
     "confounding.png": (
         "What can these data not tell apart?",
@@ -72,13 +73,18 @@ def diagnose_pictures(
     before: NDArray[np.float64],
     after: NDArray[np.float64] | None,
 ) -> dict[str, bytes]:
-    """File name -> PNG, all that there are for this diagnosis; arrays as for `before_after_png`."""
+    """File name -> PNG, all that there are for this diagnosis; arrays as for `before_after_png`.
+
+    Of an adequate model only the residuals that it leaves are drawn: nothing is to be added to it.
+    """
     from toolpath_stiff.report.diagnose_pictures import confounding_png, detectable_png, envelope_png, ladder_png
     from toolpath_stiff.report.update_pictures import before_after_png
 
     pictures = {
         "ladder.png": ladder_png(document),
-        "before_after.png": before_after_png(document, data, before, after),
+        "before_after.png": before_after_png(
+            document, data, before, None if document.get("verdict") == "adequate" else after
+        ),
         "confounding.png": confounding_png(document),
         "detectable.png": detectable_png(document),
         "envelope.png": envelope_png(document),
@@ -105,7 +111,8 @@ def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) ->
         _picture("ladder.png", pictures),
         _section("What the fits say", _candidates(document)),
         _picture("before_after.png", pictures),
-        _pair(_picture("confounding.png", pictures), _picture("detectable.png", pictures)),
+        _picture("confounding.png", pictures),
+        _picture("detectable.png", pictures),
         _section("What to measure or do next", _next(document)),
         _section("What these data cannot test", _cannot_test(document)),
         _section("How much the choice matters on the tool path", _path(document)),
@@ -117,7 +124,7 @@ def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) ->
         "title": _text(files or verdict),
         "verdict": _text(verdict),
         "verdict_class": verdict if verdict in HEADLINES else "",
-        "headline": _text(HEADLINES.get(verdict, verdict)),
+        "headline": _text(headline(document)),
         "text": _text(document.get("text") or ""),
         "about": _text("   ·   ".join(part for part in about if part)),
         "figures": _figures(document),
@@ -135,10 +142,6 @@ def _text(value: object) -> str:
 
 def _section(title: str, body: str) -> str:
     return f"<section><h2>{_text(title)}</h2>{body}</section>" if body else ""
-
-
-def _pair(first: str, second: str) -> str:
-    return f'<div class="two">{first}{second}</div>' if first and second else first + second
 
 
 def _bullets(sentences: Sequence[object]) -> str:
@@ -172,7 +175,7 @@ def _figures(document: Mapping[str, Any]) -> str:
     found = [(percent(figure_of(base, "held_out_error_percent")), "mean error at points left out, strut law refitted")]
     if best is not None and document.get("verdict") in ("identified", "ambiguous"):
         found.append((percent(figure_of(best, "held_out_error_percent")), f"the same with {name_text(best)}"))
-    found.append((percent(noise_floor_percent(document)), "would be left by scatter alone"))
+    found.append((floor_text(document), "would be left by scatter alone"))
     found.append((plausible_text(entries(document, "plausible")), "hold the truth with 95 % probability"))
     if not entries(document, "plausible"):
         found[-1] = ("no effect", "of the catalogue explains these data")

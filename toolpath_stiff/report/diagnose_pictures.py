@@ -14,6 +14,7 @@ from toolpath_stiff.report.diagnose_words import (
     NONE,
     entries,
     figure_of,
+    floor_text,
     hidden_name,
     is_offered,
     is_plausible,
@@ -119,14 +120,14 @@ def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[
     end = max(end, 1.3 * floor if floor is not None else 0.0, 1e-6)
     axes.set_xlim(0.0, end)
     for value, other, text, colour, style in (
-        (floor, base, "noise floor", SECOND_ORANGE, ":"),
-        (base, floor, "base model", INK, "--"),
+        (floor, base, f"noise floor {floor_text(document)}", SECOND_ORANGE, ":"),
+        (base, floor, f"base model {percent(base)}", INK, "--"),
     ):
         if value is not None:
             axes.axvline(value, color=colour, lw=1.3, ls=style, zorder=1)
             leftwards = other is not None and value < other  # two labels turn away from each other
             axes.annotate(
-                f"{text} {percent(value)}", (value, 1.0), xycoords=("data", "axes fraction"),
+                text, (value, 1.0), xycoords=("data", "axes fraction"),
                 xytext=(4 if leftwards else -4, 3), textcoords="offset points", size=8.5, color=colour,
                 ha="right" if leftwards else "left",
             )  # fmt: skip
@@ -181,7 +182,7 @@ def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
     import textwrap
 
     for y, row in enumerate(rows):
-        lines = textwrap.wrap(remark_text(row), 31, max_lines=2, placeholder=" ...")
+        lines = textwrap.wrap(remark_text(row).split(":")[0], 31, max_lines=2, placeholder=" ...")
         axes.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if is_offered(row) else MUTED)
 
 
@@ -322,12 +323,12 @@ def envelope_png(document: Mapping[str, Any]) -> bytes | None:
             "Is the model without a further effect good enough?",
             "weighted sum of squares: simulated as if the model were right (grey), and observed (orange)",
         )
-        axes = figure.add_axes((0.04, 0.13, 0.92, 0.62))
+        axes = figure.add_axes((0.04, 0.1, 0.92, 0.62))
         shown = simulated[np.isfinite(simulated)]
         axes.hist(shown, bins=30, color="#b8c4d6", zorder=2)
         if observed is not None:
             # Far outside, the observed value would squeeze the simulated ones into one bar.
-            edge = float(shown.max()) + 1.5 * float(np.ptp(shown))
+            edge = float(shown.max()) + 3.0 * float(np.ptp(shown))
             inside = observed <= edge
             axes.axvline(min(observed, edge), color=SECOND_ORANGE, lw=2.2, ls="-" if inside else ":", zorder=3)
             text = f"{observed:.4g}" if inside else f"{observed:.4g}, far to the right \N{RIGHTWARDS ARROW}"
@@ -339,8 +340,8 @@ def envelope_png(document: Mapping[str, Any]) -> bytes | None:
             (name, figure_of(gates, f"{key}_probability"))
             for name, key in (("all", "baseline"), ("squares", "squares"), ("structure", "structure"), ("gain", "gain"))
         ]
-        lines = [f"{name}: p = {significant(value, 2)}" for name, value in chances if value is not None]
-        axes.text(0.005, 0.97, "\n".join(lines), transform=axes.transAxes, va="top", size=9, color=MUTED)
+        said = [f"{name} {significant(value, 2)}" for name, value in chances if value is not None]
+        figure.text(0.25 / 8.4, 1.0 - 0.93 / 4.2, f"p values: {', '.join(said) or '-'}", size=9.5, color=MUTED)
         axes.set_yticks([])
         axes.grid(visible=False, axis="y")
         axes.spines[["top", "right", "left"]].set_visible(False)

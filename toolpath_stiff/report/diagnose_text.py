@@ -11,17 +11,16 @@ from toolpath_stiff.report.diagnose_words import (
     best_explanation,
     entries,
     figure_of,
+    floor_text,
     hidden_name,
     is_offered,
     is_plausible,
     missing_text,
     name_text,
-    noise_floor_percent,
     parameter_texts,
     percent,
     plausible_text,
     probability_text,
-    remark_text,
     size_text,
 )
 from toolpath_stiff.report.wording import plain, shortened
@@ -31,6 +30,7 @@ LABEL = 12  # columns of the left-hand words
 MOST_CANDIDATES = 5  # in the table; all are in diagnose.json
 MOST_PAIRS = 2
 MOST_SIZES = 6
+LONGEST_NAME = 45
 
 
 def terminal_text(document: Mapping[str, Any]) -> str:
@@ -95,9 +95,7 @@ def _error(document: Mapping[str, Any]) -> str:
     best = best_explanation(document)
     if best is not None and document.get("verdict") != "adequate":
         parts.append(_pair_of_errors(best) + f" with {name_text(best)}")
-    floor = noise_floor_percent(document)
-    end = f"; scatter alone leaves {percent(floor)}" if floor is not None else ""
-    return "mean " + ", ".join(parts) + end
+    return "mean " + ", ".join(parts) + f"; scatter alone leaves {floor_text(document)}"
 
 
 def _pair_of_errors(entry: Mapping[str, Any]) -> str:
@@ -111,20 +109,21 @@ def _table(document: Mapping[str, Any]) -> list[str]:
     candidates, pairs = entries(document, "candidates"), entries(document, "pairs")
     shown = [base, *pairs[:MOST_PAIRS], *candidates[:MOST_CANDIDATES]]
     shown += [entry for entry in candidates[MOST_CANDIDATES:] if is_plausible(entry, document)]
-    rows = [["", "probability", "error %", "left out %", "gain/SE", "size", "remark"]]
+    rows = [["", "probab.", "error %", "left out %", "gain/SE", "", ""]]
     for entry in shown:
         mark = "* " if is_plausible(entry, document) else "  "
         name = "none" if entry.get("effect") == NONE else name_text(entry)
         figures = [figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out")]
         gain = figure_of(entry, "held_out_gain_in_se")
+        remark = str(entry.get("remark") or "") or ("" if is_offered(entry) else "not offered")
         rows.append(
             [
-                shortened(mark + name, 34),
+                shortened(mark + name, LONGEST_NAME),
                 probability_text(figure_of(entry, "probability")),
                 *("-" if value is None else f"{value:.2f}" for value in figures),
                 "-" if gain is None else f"{gain:.1f}",
-                ", ".join(parameter_texts(entry, intervals=False)),
-                remark_text(entry) if not is_offered(entry) or entry.get("remark") else str(entry.get("words") or ""),
+                plain(str(entry.get("words") or "")),
+                "; ".join(part for part in (", ".join(parameter_texts(entry, intervals=False)), plain(remark)) if part),
             ]
         )
     widths = [max(len(row[i]) for row in rows) for i in range(5)]
@@ -132,9 +131,9 @@ def _table(document: Mapping[str, Any]) -> list[str]:
     for row in rows:
         figures_text = "  ".join(f"{cell:>{width}}" for cell, width in zip(row[1:5], widths[1:], strict=True))
         left = f"{row[0]:<{widths[0]}}  {figures_text}  "
-        lines.append((left + shortened(row[6], WIDTH - len(left))).rstrip())
-        if row is not rows[0] and row[5]:
-            lines.append(shortened("    " + row[5], WIDTH))
+        lines.append((left + shortened(row[5], WIDTH - len(left))).rstrip())
+        if row[6]:
+            lines.append(shortened("      " + row[6], WIDTH))
     more = len(candidates) + len(pairs) + 1 - len(shown)
     if more > 0:
         lines.append(f"  and {more} less likely, in diagnose.json")

@@ -45,7 +45,7 @@ def significant(value: float | None, digits: int = 3) -> str:
         return "0"
     size = math.floor(math.log10(abs(value)))
     if -4 < size < 5:
-        return f"{value:.{max(digits - 1 - size, 0)}f}"
+        return f"{float(f'{value:.{digits - 1}e}'):.{max(digits - 1 - size, 0)}f}"
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa}e{int(exponent)}"
 
@@ -177,6 +177,22 @@ def hidden_name(entry: Mapping[str, Any]) -> str:
     """Effect and parameter of an entry of `detectable`."""
     parameter = str(entry.get("parameter") or "").replace("_", " ")
     return plain(f"{entry.get('effect', '?')} {parameter}".rstrip())
+
+
+def floor_text(document: Mapping[str, Any]) -> str:
+    """The noise floor in words; a guess says so."""
+    name = str((document.get("noise") or {}).get("name") or "")
+    guess = f" ({plain(name)} guess)" if name in ("low", "high") else ""
+    return percent(noise_floor_percent(document)) + guess
+
+
+def headline(document: Mapping[str, Any]) -> str:
+    """The verdict as one sentence that needs no figures."""
+    verdict = str(document.get("verdict") or "-")
+    found = document.get("by_noise") or {}
+    if verdict == "ambiguous" and len({str(one.get("verdict")) for one in found.values()}) > 1:
+        return "It depends on how much the readings scatter, which these data do not tell"
+    return plain(HEADLINES.get(verdict, verdict))
 
 
 def plausible_text(names: Sequence[str]) -> str:

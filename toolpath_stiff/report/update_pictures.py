@@ -56,7 +56,8 @@ def before_after_png(
     if after is not None:
         halves.append(np.asarray(after, dtype=float))
     known = (document.get("baseline") or {}, best_explanation(document) or {})
-    called = names or ("strut law refitted", f"with {name_text(known[1])}")
+    word = "best of the catalogue:" if document.get("verdict") == "unexplained" else "with"
+    called = names or ("strut law refitted", f"{word} {name_text(known[1])}")
     directions, levels = _directions(data), _levels(data)
     columns, rows = [d for d in DIRECTION_COLOURS if (directions == d).any()], np.unique(levels)
     limit = _limit(halves)
@@ -64,11 +65,12 @@ def before_after_png(
     width = max(1.1 + len(halves) * block + 0.9, 11.0 if len(halves) > 1 else 8.0)
     height = 1.35 + MAP * len(rows) + 0.4 + 4.0
     question = "Did the error fall, and what remains?" if len(halves) > 1 else "Where does the model fail?"
+    note = f"maps from above, X to the right, {2.4 * _reach(data):.0f} mm wide; a point: mean of its readings"
     with house_style():
         figure = new_figure(width, height)
         figure.text(0.25 / width, 1.0 - 0.4 / height, question, size=14, weight="bold")
         figure.text(
-            0.25 / width, 1.0 - 0.66 / height, "maps from above, X to the right; a point: mean of its readings",
+            0.25 / width, 1.0 - 0.66 / height, note,
             size=9.5, color=MUTED,
         )  # fmt: skip
         for half, residual in enumerate(halves):
@@ -150,7 +152,7 @@ def _map(axes: Axes, data: Measurements, residual: FloatArray, chosen: NDArray[n
         mm_from_m(poses[:, :2]),
         np.array([np.mean(percent_[which.ravel() == k]) for k in range(len(poses))]),
     )
-    reach = 0.5 * float(np.ptp(everywhere, axis=0).max()) or 100.0
+    reach = _reach(data)
     centre = 0.5 * (everywhere.min(axis=0) + everywhere.max(axis=0))
     places = _spread(places, 0.09 * reach)
     drawn = axes.scatter(
@@ -164,6 +166,11 @@ def _map(axes: Axes, data: Measurements, residual: FloatArray, chosen: NDArray[n
     axes.set_xticks([])
     axes.set_yticks([])
     return drawn
+
+
+def _reach(data: Measurements) -> float:
+    """Half the larger extent of the measured positions in X and Y, mm."""
+    return 0.5 * float(np.ptp(mm_from_m(data.position[:, :2]), axis=0).max()) or 100.0
 
 
 def _spread(places: FloatArray, step: float) -> FloatArray:
