@@ -52,11 +52,16 @@ def differences(name: str, there, **options) -> dict[str, float]:
     return rewriting_differences(placed, rewritten, origin, tools=tools_for(name))
 
 
-@pytest.mark.parametrize("turn", [0.0, 37.0, 90.0, 180.0, 270.0])
-@pytest.mark.parametrize("name", SHORT)
+@pytest.mark.parametrize(
+    ("name", "turn"),  # arcs in G18 turned by 37 degrees leave their planes: test_chords_cost_little
+    [
+        (name, turn)
+        for name in SHORT
+        for turn in (0.0, 37.0, 90.0, 180.0, 270.0)
+        if turn != 37.0 or name not in OFF_PLANE
+    ],
+)
 def test_round_trip(name, turn):
-    if name in OFF_PLANE and turn == 37.0:
-        pytest.skip("its arcs leave their planes: test_arcs_out_of_the_planes")
     for decimals, bar in ((7, 1e-6), (None, 1e-4)):
         found = differences(name, placement(turn), decimals=decimals)
         assert found.keys() == {"mean", "range", "min"}

@@ -9,7 +9,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tests.nc.test_nc_against_rs274 import TOOLS, Writer, cycle_program
+from tests.nc import rs274
+from tests.nc.test_nc_against_rs274 import TABLE_RS274, TOOLS, Writer, cycle_program
+from tests.nc.test_nc_against_rs274 import assert_same_path as assert_linuxcnc_agrees
 from tests.placement.rewriting import assert_same_path, cutting_moves
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.reader import parse_program
@@ -230,6 +232,18 @@ def test_large_turns_of_the_tool_are_cut_until_they_lean_no_more():
     np.testing.assert_allclose(found[middle][2][0], cutting_moves(half, there)[0][2][1], atol=1e-6)
 
 
+def test_an_arc_during_which_the_tool_turns_stays_within_the_tolerance():
+    """Its plane is turned into itself, but the turn of the tool wants pieces: these are chords of the circle."""
+    there = at(turn=90)
+    lines = rewrite(START + "G3 X0 Y0 I20 A8 B10\n", there, linearise=1e-5, decimals=6)
+    program = parse_program("\n".join(lines) + "\n")
+    ends = 1e3 * np.array([(move[0][:2], move[1][:2]) for move in cutting_moves(program, HERE)])
+    centre = np.array([0.0, 20.0])
+    middles = np.linalg.norm(ends.mean(axis=1) - centre, axis=1)
+    np.testing.assert_allclose(np.linalg.norm(ends[:, 1] - centre, axis=1), 20.0, atol=2e-6)
+    assert middles.min() > 20.0 - 0.01
+
+
 @pytest.mark.parametrize("seed", range(25))
 def test_random_programs_of_every_code_keep_their_path_or_are_refused(seed):
     """Those that LinuxCNC reads as we do, with offsets, rotations, G92, tool lengths, G53, G28, inches."""
@@ -294,3 +308,17 @@ def small_programs(draw) -> str:
 @example(text=START + "G1 X1\nG3 X1 Y0 I-1\nG1 X2\nM2\n", shift=(1, 1, 1), turn=1e-7, decimals=4)
 def test_any_small_program_keeps_its_path(text, shift, turn, decimals):
     rewrite(text, at(*(v / 1000 for v in shift), turn), decimals=decimals)
+
+
+@pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
+@pytest.mark.parametrize("seed", range(12))
+def test_linuxcnc_reads_random_rewritten_programs_as_we_do(seed, tmp_path):
+    """What rs274 makes of the written text is what we make of it; that this is the placed path is tested above."""
+    text, there = Writer(seed).program(12), at(30, -20, 0, turn=180.0 if seed % 2 else 0.0)
+    program = parse_program(text, origin=there, tools=TOOL_TABLE)
+    rewritten = rewrite_program(program, there, HERE, tools=TOOL_TABLE, linearise=1e-4)
+    path = tmp_path / "written.ngc"
+    path.write_bytes(rewritten.content)
+    canon = rs274.run(path, tmp_path, TABLE_RS274)
+    assert not canon.error, canon.error
+    assert_linuxcnc_agrees(parse_program(rewritten.text, tools=TOOL_TABLE), canon)

@@ -179,7 +179,10 @@ def _text_of(program: Program) -> tuple[str, str]:
     """The program's text with its line ends, and its encoding."""
     if not program.path:
         return "\n".join([*program.source, ""]), "utf-8"
-    content = Path(program.path).read_bytes()
+    try:
+        content = Path(program.path).read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {program.path!r}: {error.strerror}") from None
     encoding = "utf-8-sig" if content.startswith(b"\xef\xbb\xbf") else "utf-8"
     try:
         return content.decode(encoding), encoding

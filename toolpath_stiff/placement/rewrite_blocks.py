@@ -218,36 +218,42 @@ class Rewriter(Controls):
     # -- pieces ----------------------------------------------------------------------------------------------------
 
     def _piece_count(self, motion: int, start: list[float], end: list[float], arc: Arc | None) -> int:
-        """Into how many pieces a move must be cut; refuses those that must be, unless it was asked for."""
-        count = 1
-        tolerance = math.nan if self.linearise is None else self.linearise - self._unit
+        """Into how many pieces a move must be cut; those that must be are refused, unless it was asked for."""
+        off_plane = arc is not None and self._image(self.source.plane) is None
+        leaning = 0.0
+        if motion != RAPID and self.turn.turns and start[3:] != end[3:]:
+            written = self.out.frames.position[3:], self._target(end)[3:]
+            leaning = lean(self.turn, (start[3:], end[3:]), written)
+        if not off_plane and leaning == 0.0:
+            return 1
+        if self.linearise is None:
+            self._refuse_to_cut(off_plane, leaning)
+            return 1
+        tolerance = self.linearise - self._unit
         if tolerance < self._unit:
             raise self._refusal(
                 f"--linearise {self.linearise:g} mm is no more than the rounding to {self._digits} decimals",
                 "give more of it, or more --decimals",
             )
-        if arc is not None and self._image(self.source.plane) is None:
-            if self.linearise is None:
-                raise self._refusal(
-                    f"an arc of {self.source.plane}, turned with the work, lies in none of the planes G17, G18, G19",
-                    LINEARISE,
-                )
-            count = chords(arc, self.source.frames.to_setup(start), end, tolerance)
-            self._note(f"arcs out of the planes are written as chords within {self.linearise:g} mm")
-            count = max(count, 2)
-        if motion == RAPID or not self.turn.turns or start[3:] == end[3:]:
-            return count
-        written = self.out.frames.position[3:], self._target(end)[3:]
-        angle = lean(self.turn, (start[3:], end[3:]), written)
-        if self.linearise is None and angle > LEAN:
+        count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
+        if arc is not None and (off_plane or count > 1):
+            self._note(f"arcs that the turn takes out of the planes are written as chords within {self.linearise:g} mm")
+            frames = self.source.frames
+            count = max(count, chords(arc, frames.to_setup(start), frames.to_setup(end), tolerance), 2)
+        return count
+
+    def _refuse_to_cut(self, off_plane: bool, leaning: float) -> None:
+        if off_plane:
             raise self._refusal(
-                f"between its ends the tool would lean {angle:.3g} degrees otherwise than placed, as a control "
+                f"an arc of {self.source.plane}, turned with the work, lies in none of the planes G17, G18, G19",
+                LINEARISE,
+            )
+        if leaning > LEAN:
+            raise self._refusal(
+                f"between its ends the tool would lean {leaning:.3g} degrees otherwise than placed, as a control "
                 "interpolates A, B and C",
                 LINEARISE,
             )
-        if self.linearise is not None:
-            count = max(count, math.ceil(math.sqrt(angle / math.degrees(tolerance / LEVER))))
-        return count
 
     def _in_pieces(self, codes: Codes, edit: LineEdit, axes: list[str], count: int) -> list[str]:
         """A cutting move as `count` straight ones."""

@@ -1,0 +1,92 @@
+"""`tps place --write`: the file, the difference printed, and nothing written where it is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from toolpath_stiff.analysis import analyse
+from toolpath_stiff.analysis.statistics import stiffness_figures
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.nc import read_program
+
+PROGRAMS = Path(__file__).parents[2] / "programs"
+FIXED = ["--x", "30", "--y=-45", "--z", "900", "--rotate", "37", "--no-plots", "--step", "2"]
+
+
+def place(name: str, *more: str) -> int:
+    return main(["place", str(PROGRAMS / name), *FIXED, "--out", "out", *more])
+
+
+@pytest.fixture(autouse=True)
+def in_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("decimals", "bar"), [("7", 1e-6), (None, 1e-4)])
+def test_the_written_program_has_the_figures_of_the_placement(capsys, decimals, bar):
+    options = ["--decimals", decimals] if decimals else []
+    assert place("pocket.nc", "--write", "sub/placed.nc", *options) == 0
+    summary = json.loads(Path("out/placement.json").read_text())
+    machine = load_machine("nist")
+    written = read_program("sub/placed.nc", default_origin=machine.default_origin)
+    again = analyse(machine, written, step=2e-3)
+    figures = stiffness_figures(again, again.counted)
+    for short, key in (("mean", "mean_N_per_mm"), ("range", "range_N_per_mm"), ("min", "min_N_per_mm")):
+        assert figures[key] == pytest.approx(summary["recommended"][key], rel=bar)
+        assert summary["written"]["relative_difference"][short] < bar
+    printed = capsys.readouterr().out
+    assert "sub/placed.nc" in printed
+    assert f"mean {summary['written']['relative_difference']['mean']:.1e}" in printed
+
+
+def test_written_where_the_program_is_told_to_sit():
+    """With --origin the written program belongs at that origin, not at the machine's default."""
+    assert place("case_study.nc", "--write", "placed.nc", "--origin", "10,20,850") == 0
+    summary = json.loads(Path("out/placement.json").read_text())
+    at = summary["written"]["analysed_at"]
+    assert (at["x_mm"], at["y_mm"], at["z_mm"]) == pytest.approx((10.0, 20.0, 850.0))
+    moved = Path("placed.nc").read_text()
+    assert "Z70." in moved  # Z20 of the program, 50 mm higher
+
+
+def test_tool_lengths_reach_the_rewriter():
+    table = str(PROGRAMS / "tools.tbl")
+    assert place("three_tools.nc", "--write", "placed.nc", "--tools", table, "--linearise", "0.001") == 0
+    summary = json.loads(Path("out/placement.json").read_text())
+    assert summary["written"]["relative_difference"]["mean"] < 1e-4
+    assert any("chords within 0.001 mm" in note for note in summary["written"]["notes"])
+
+
+def test_nothing_asked_nothing_written():
+    assert place("case_study.nc") == 0
+    assert json.loads(Path("out/placement.json").read_text())["written"] is None
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("arcs_in_planes.nc", ["--write", "placed.nc"], "arcs_in_planes.nc:10: an arc of G18"),
+        ("pocket.nc", ["--decimals", "5"], "--decimals without --write"),
+        ("pocket.nc", ["--linearise", "0.01"], "--linearise without --write"),
+        ("pocket.nc", ["--write", "placed.nc", "--decimals", "0"], "0 decimals"),
+        ("pocket.nc", ["--write", str(PROGRAMS / "pocket.nc")], "would replace the program itself"),
+        ("pocket.nc", ["--write", "placed.nc", "--linearise", "nan"], "--linearise"),
+    ],
+)
+def test_refusals_leave_nothing_behind(in_empty_folder, capsys, name, options, message):
+    before = (PROGRAMS / name).read_bytes()
+    try:
+        code = place(name, *options)
+    except SystemExit as end:  # argparse's own
+        code = end.code
+    assert code == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+    assert list(in_empty_folder.iterdir()) == []
+    assert (PROGRAMS / name).read_bytes() == before
