@@ -10,7 +10,7 @@ import html
 import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from toolpath_stiff.report.diagnose_words import (
     HEADLINES,
@@ -32,12 +32,6 @@ from toolpath_stiff.report.diagnose_words import (
     significant,
 )
 from toolpath_stiff.report.wording import plain
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from toolpath_stiff.updating.measurements import Measurements
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
@@ -67,31 +61,6 @@ QUESTIONS = {
 }
 
 
-def diagnose_pictures(
-    document: Mapping[str, Any],
-    data: Measurements,
-    before: NDArray[np.float64],
-    after: NDArray[np.float64] | None,
-) -> dict[str, bytes]:
-    """File name -> PNG, all that there are for this diagnosis; arrays as for `before_after_png`.
-
-    Of an adequate model only the residuals that it leaves are drawn: nothing is to be added to it.
-    """
-    from toolpath_stiff.report.diagnose_pictures import confounding_png, detectable_png, envelope_png, ladder_png
-    from toolpath_stiff.report.update_pictures import before_after_png
-
-    pictures = {
-        "ladder.png": ladder_png(document),
-        "before_after.png": before_after_png(
-            document, data, before, None if document.get("verdict") == "adequate" else after
-        ),
-        "confounding.png": confounding_png(document),
-        "detectable.png": detectable_png(document),
-        "envelope.png": envelope_png(document),
-    }
-    return {name: png for name, png in pictures.items() if png is not None}
-
-
 def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
     """The page's text.
 
@@ -100,7 +69,7 @@ def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) ->
     document
         As in `diagnose.json`.
     pictures
-        File name -> PNG, as `diagnose_pictures` gives them; those in `QUESTIONS` are shown.
+        File name -> PNG; those in `QUESTIONS` are shown.
     """
     verdict = str(document.get("verdict") or "-")
     files = ", ".join(str(name) for name in entries(document, "data"))

@@ -48,12 +48,13 @@ def before_after_png(
     data
         n readings.
     before, after
-        (n,) ln(measured / modelled). Without `after` only the first half is drawn.
+        (n,) ln(measured / modelled). Without `after`, or where the verdict is `adequate` and nothing is to be added,
+        only the first half is drawn.
     names
         What the two models are called; else taken from the document.
     """
     halves = [np.asarray(before, dtype=float)]
-    if after is not None:
+    if after is not None and document.get("verdict") != "adequate":
         halves.append(np.asarray(after, dtype=float))
     known = (document.get("baseline") or {}, best_explanation(document) or {})
     word = "best of the catalogue:" if document.get("verdict") == "unexplained" else "with"

@@ -33,6 +33,7 @@ def document(diagnosis: Diagnosis, command: str = "") -> dict[str, Any]:
         "candidates": _candidates(diagnosis),
         "pairs": _pairs(diagnosis),
         "plausible": list(diagnosis.plausible),
+        "best": diagnosis.best,
         "why": why(diagnosis),
         "cannot_test": [
             {"effect": name, "missing": list(columns)} for name, columns in sorted(diagnosis.cannot_test.items())
