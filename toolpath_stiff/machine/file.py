@@ -1,6 +1,6 @@
 """Machine files: TOML in shop units to `Machine` in SI, checked key by key, and back.
 
-Each section names the origin of its figures ("published", "recovered", "assumed"). A key that is not known
+Each section names the origin of its figures ("published", "recovered", "assumed", "fitted"). A key that is not known
 is an error, so that a typing mistake cannot fall back to a default; the message has section, key, value and
 bound.
 """
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, Pose, StrutLaw
+from toolpath_stiff.machine.uncertainty import read_uncertainty
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, mm_from_m, rad_from_deg
 
 DEFAULT_MACHINE = "nist"
@@ -167,6 +168,7 @@ class _Reader:
         sections = self.sections(table)
         values = {name: self.section(name, content) for name, content in sections.items()}
         top = values[""]
+        effects, instruments = self.entries(table, "effect"), self.entries(table, "instrument")
         machine = Machine(
             name=top["name"],
             title=top.get("title", top["name"]),
@@ -181,8 +183,13 @@ class _Reader:
             rapid_feed=m_per_s_from_mm_per_min(values.get("setup", {}).get("rapid_mm_per_min", 10000.0)),
             origins={name: v["origin"] for name, v in values.items() if name and "origin" in v},
             remarks={name: v["remark"] for name, v in values.items() if name and "remark" in v},
-            effects=self.entries(table, "effect"),
-            instruments=self.entries(table, "instrument"),
+            effects=effects,
+            instruments=instruments,
+            uncertainty=read_uncertainty(
+                table.get("uncertainty"),
+                (*effects, *instruments),
+                lambda key, found, expected: self.fail("uncertainty", key, found, expected),
+            ),
         )
         self.check_law(machine)
         self.check_neutral_pose(machine)
@@ -220,7 +227,7 @@ class _Reader:
         """Split the file into the sections of the schema; unknown and missing ones are errors."""
         found: dict[str, dict[str, Any]] = {"": {}}
         for name, content in table.items():
-            if name in ("effect", "instrument"):
+            if name in ("effect", "instrument", "uncertainty"):
                 continue
             if name == "limits" and isinstance(content, dict):
                 for sub, inner in content.items():
@@ -251,7 +258,7 @@ class _Reader:
         sections = ", ".join(f"[{n}]" for n in known if n)
         return InputError(
             f"unknown section [{name}]",
-            expected=f"one of {sections}, [[effect]], [[instrument]]",
+            expected=f"one of {sections}, [[effect]], [[instrument]], [uncertainty]",
             file=self.file,
             line=self.line_of(name, ""),
         )

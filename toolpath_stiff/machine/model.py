@@ -1,21 +1,25 @@
 """What a six-strut machine is: joints, tool, strut law, platform bars, limits. SI units.
 
-Every quantity carries its origin: "published", "recovered" (from published figures) or "assumed".
+Every quantity carries its origin: "published", "recovered" (from published figures), "assumed", or "fitted" (to
+measurements, by `tps update`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    from toolpath_stiff.machine.uncertainty import Uncertainty
+
 FloatArray = NDArray[np.float64]
 Pose = tuple[float, float, float, float, float, float]
 
-ORIGINS = ("published", "recovered", "assumed")
+ORIGINS = ("published", "recovered", "assumed", "fitted")
 
 
 @dataclass(frozen=True)
@@ -114,11 +118,13 @@ class Machine:
     rapid_feed
         m/s, for the time of rapid moves.
     origins
-        Quantity -> "published", "recovered" or "assumed".
+        Quantity -> one of `ORIGINS`.
     remarks
         Quantity -> a sentence about its source.
     effects, instruments
         Physical effects that the machine file carries; instruments act on readings only.
+    uncertainty
+        Of parameters that were fitted to measurements; None if none were.
     """
 
     name: str
@@ -136,6 +142,7 @@ class Machine:
     remarks: Mapping[str, str] = field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()
     instruments: tuple[EffectEntry, ...] = ()
+    uncertainty: Uncertainty | None = None
 
     def platform_joints_for(self, tool_length: float) -> FloatArray:
         """(6, 3) m, platform joints relative to the tip of a tool of that length; nan: the reference tool.

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.machine.model import EffectEntry, Machine, Pose
+from toolpath_stiff.machine.uncertainty import Uncertainty
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +32,7 @@ HEADINGS = {
     "limits.singularity": "Smallest |det J| relative to the neutral pose; 0 is singular.",
     "setup": "Where program zero sits unless the user or the program says so (x, y, z in mm[, A, B, C in degrees]);\n"
     "# feed of rapid moves in mm/min, for times only.",
+    "uncertainty": "What was fitted to measurements: standard deviations in the units of the keys, and correlations.",
 }
 
 
@@ -76,6 +78,8 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
     for kind, entries in (("effect", machine.effects), ("instrument", machine.instruments)):
         for entry in entries:
             lines += ["", *_entry(kind, entry)]
+    if machine.uncertainty is not None:
+        lines += ["", f"# {HEADINGS['uncertainty']}", *_uncertainty(machine.uncertainty)]
     return "\n".join([*lines, ""])
 
 
@@ -85,6 +89,15 @@ def _entry(kind: str, entry: EffectEntry) -> list[str]:
     if entry.provenance:
         lines += [f"[{kind}.provenance]", *(f"{key} = {_value(value)}" for key, value in entry.provenance.items())]
     return lines
+
+
+def _uncertainty(uncertainty: Uncertainty) -> list[str]:
+    return [
+        "[uncertainty]",
+        f"parameters = {_value(uncertainty.names)}",
+        f"sd = {_list(uncertainty.sd)}",
+        f"correlation = {_rows(uncertainty.correlation)}",
+    ]
 
 
 def _pose(pose: Pose) -> list[float]:

@@ -107,11 +107,14 @@ def _search(predictor: Predictor, start: FloatArray) -> tuple[FloatArray, float]
     """Where one search ends, and the mean error there."""
     from scipy.optimize import minimize
 
+    def objective(law: FloatArray) -> float:
+        return mean_error(predictor, law)
+
     at, error = start, np.inf
     # A second search from the first one's end: a simplex can collapse on a kink.
     for _ in range(2):
         options: Any = {"xatol": 1e-7, "fatol": 1e-10, "initial_simplex": at + FIRST_STEPS}
-        found = minimize(lambda law: mean_error(predictor, law), at, method="Nelder-Mead", options=options)
+        found = minimize(objective, at, method="Nelder-Mead", options=options)
         at, error = np.asarray(found.x), float(found.fun)
     return at, error
 
