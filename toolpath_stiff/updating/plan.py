@@ -190,6 +190,12 @@ def plan_measurements(
     # A reading without an answer belongs to visits that are never chosen; its numbers only must not spread.
     forecasts = [_cleaned(f, good) for f in forecasts]
     noise = ReadingNoise(repeat, clamping, scatter)
+    floors = {name: low for name, low in menu.floors.items() if name in visits.setup}
+    if floors:
+        words = ", ".join(
+            f"{1e3 * low:.4g} mm" + (f" in set-up {name}" if name else "") for name, low in floors.items()
+        )
+        notes.append(f"no pose lower than was measured before: {words}; name heights to go lower")
     shares = {(f.name, g.name): pair_shares(visits, f, g, noise) for f, g in combinations(forecasts, 2)}
     weights = {f.name: f.weight for f in forecasts}
     picked = _greedy(visits, usable, shares, weights, n, costs, menu)
@@ -255,9 +261,10 @@ def _cleaned(forecast: Forecast, good: NDArray[np.bool_]) -> Forecast:
 # -- choosing ----------------------------------------------------------------------------------------------------------
 
 
-def confusion(gaps: dict[tuple[str, str], FloatArray], weights: dict[str, float]) -> FloatArray:
-    """Bound on the chance of taking one rival for another, of any shape that the gaps have."""
-    return np.asarray(sum(np.sqrt(weights[i] * weights[j]) * np.exp(-(g**2) / 4.0) for (i, j), g in gaps.items()))
+def log_confusion(gaps: dict[tuple[str, str], FloatArray], weights: dict[str, float]) -> FloatArray:
+    """Logarithm of the bound on the chance of taking one rival for another, of any shape that the gaps have."""
+    each = [0.5 * np.log(weights[i] * weights[j]) - gap**2 / 4.0 for (i, j), gap in gaps.items()]
+    return np.asarray(np.logaddexp.reduce(each, axis=0))
 
 
 def _greedy(
@@ -271,11 +278,10 @@ def _greedy(
 ) -> tuple[int, ...]:
     chosen: list[int] = []
     free = usable.copy()
-    now = float(confusion({pair: np.zeros(()) for pair in shares}, weights))
+    now = float(log_confusion({pair: np.zeros(()) for pair in shares}, weights))
     for _ in range(min(n, int(usable.sum()))):
-        after = confusion({pair: share.gaps_with(chosen) for pair, share in shares.items()}, weights)
-        gain = np.log(now) - np.log(np.maximum(after, 1e-300))
-        gain = np.where(free, gain / further_minutes(visits, chosen, costs, menu), -np.inf)
+        after = log_confusion({pair: share.gaps_with(chosen) for pair, share in shares.items()}, weights)
+        gain = np.where(free, (now - after) / further_minutes(visits, chosen, costs, menu), -np.inf)
         best = int(np.argmax(gain))
         if not np.isfinite(gain[best]):
             break

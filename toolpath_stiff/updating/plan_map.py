@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.updating.plan import Plan, matters
-from toolpath_stiff.updating.plan_menu import AXES, READING_EVERY, Menu, Visits, planned_readings, reachable
+from toolpath_stiff.updating.plan_menu import AXES, READING_EVERY, ROUND, Menu, Visits, planned_readings, reachable
 from toolpath_stiff.updating.plan_rivals import ReadingNoise, forecast_all, pair_shares
 
 FloatArray = NDArray[np.float64]
@@ -83,6 +83,8 @@ def gap_map(machine: Machine, plan: Plan, menu: Menu, effect_files: Sequence[str
         share = pair_shares(visits, forecasts[0], forecasts[1], ReadingNoise(*plan.noise, scatter))
         usable = np.logical_and.reduceat(answered, visits.starts)
         gaps[:, good] = np.where(usable, share.gaps_with(()), np.nan).reshape(len(setups), -1)
+    for k, setup in enumerate(setups):
+        gaps[k, poses[:, 2] < menu.floors.get(setup, -np.inf) - ROUND] = np.nan
     best = np.fmax.reduce(gaps, axis=0).reshape(len(angles), len(levels), ACROSS, ACROSS)
     return GapMap(names, side, side, levels, best[0], np.fmax.reduce(best[1:], axis=0), menu.max_tilt)
 

@@ -7,10 +7,10 @@ cheap.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.random import Generator
@@ -78,6 +78,8 @@ class Menu:
         Poses (m, 6) in m and rad that have been measured before, and may be again in another way.
     labels
         Names of these poses.
+    floors
+        Set-up -> m, below which the tool tip shall not go in it: a riser has a height that no column tells.
     timed
         Whether readings carry a time.
     usual_load
@@ -95,6 +97,7 @@ class Menu:
     rounds: int = 2
     measured: FloatArray = field(default_factory=lambda: np.zeros((0, 6)))
     labels: tuple[str, ...] = ()
+    floors: Mapping[str, float] = field(default_factory=dict)
     timed: bool = True
     usual_load: float = DEFAULT_FORCE
 
@@ -129,6 +132,7 @@ class Menu:
             setups=setups,
             measured=poses[first],
             labels=tuple(data.point[first].tolist()),
+            floors={name: _lowest(data, name) for name in setups},
             timed="time_min" not in data.missing,
             usual_load=float(counted[0][np.argmax(counted[1])]),
         )
@@ -137,6 +141,12 @@ class Menu:
 def _by_last_use(values: Iterable[T]) -> tuple[T, ...]:
     """Distinct values, the one of the last reading first."""
     return tuple(dict.fromkeys(reversed(list(values))))
+
+
+def _lowest(data: Measurements, setup: str) -> float:
+    """Lowest tool tip measured in a set-up; in one that was never used, the lowest of all."""
+    own = data.setup == setup
+    return float(data.position[own if own.any() else slice(None), 2].min())
 
 
 @dataclass(frozen=True)
@@ -244,6 +254,7 @@ def possible_visits(machine: Machine, menu: Menu, matters: Matters, rng: Generat
         for tool in tools
         for pose in np.flatnonzero(reachable(machine, poses, tool)).tolist()
         for setup, wait in product(setups, waits)
+        if poses[pose, 2] >= menu.floors.get(setup, -np.inf) - ROUND
     ]
     if not places:
         raise InputError(
@@ -440,6 +451,7 @@ def images(pose: FloatArray) -> FloatArray:
     return turned
 
 
-def with_options(menu: Menu, **changes: Iterable[float] | float | bool | None) -> Menu:
-    """The menu with those options that are not None."""
-    return replace(menu, **{name: value for name, value in changes.items() if value is not None})  # type: ignore[arg-type]
+def with_options(menu: Menu, **changes: Any) -> Menu:
+    """The menu with those options that are not None. Who names the heights knows how low a set-up may be used."""
+    given = {name: value for name, value in changes.items() if value is not None}
+    return replace(menu, **given | ({"floors": {}} if "heights" in given else {}))
