@@ -1,0 +1,138 @@
+"""What the tests of the diagnosis share: rig campaigns, readings by hand, a hexapod solved by hand."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tests.effects.cases import neutral_values
+from tests.stiffness.cases import nist
+from toolpath_stiff import rig
+from toolpath_stiff.machine import Machine
+from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.measurements import Measurements, read_measurements
+from toolpath_stiff.updating.noise import Noise
+
+FloatArray = NDArray[np.float64]
+
+OPTIONAL_COLUMNS = (
+    "force_N", "sd_N_per_mm", "setup", "clamp", "repeat", "point", "time_min", "tool_extension_mm", "loop",
+    "temperature_C",
+)  # fmt: skip
+
+
+def read_text(text: str, machine: Machine | None = None) -> Measurements:
+    """Measurements from the text of a file."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "measurements.csv"
+        file.write_text(text, encoding="utf-8")
+        return read_measurements(str(file), machine or nist())
+
+
+@cache
+def campaign(
+    seed: int,
+    layout: str = "tilted",
+    hidden: str = "none",
+    size: float | None = None,
+    nuisances: rig.Nuisances | None = None,
+) -> tuple[Measurements, dict[str, Any]]:
+    """A blind campaign on the NIST machine and its truth."""
+    rows, truth = rig.make_case(seed, layout=layout, hidden=hidden, size=size, nuisances=nuisances)
+    return read_text(rig.csv_text(rows)), truth
+
+
+@cache
+def table_1() -> Measurements:
+    """The paper's own 42 readings."""
+    return read_measurements("nist-table1", nist())
+
+
+def readings_by_hand(
+    stiffness: ArrayLike,
+    position: ArrayLike = (0.0, 0.0, 0.0),
+    direction: ArrayLike = (1.0, 0.0, 0.0),
+    point: Sequence[Any] | None = None,
+    clamp: Sequence[Any] | None = None,
+    setup: Sequence[str] | None = None,
+    minutes: ArrayLike | None = None,
+    force: ArrayLike | None = None,
+    sd: ArrayLike | None = None,
+) -> Measurements:
+    """Readings (n,) in N/m, columns that are not given missing; without clampings each reading has its own."""
+    n = len(np.asarray(stiffness))
+
+    def column(value: ArrayLike | None, missing: float = np.nan) -> FloatArray:
+        return np.array(np.broadcast_to(missing if value is None else np.asarray(value, dtype=float), (n,)))
+
+    def labels(value: Sequence[Any] | None) -> NDArray[np.str_]:
+        return np.array([""] * n if value is None else [str(one) for one in value])
+
+    given = {"point": point, "clamp": clamp, "setup": setup, "time_min": minutes, "force_N": force, "sd_N_per_mm": sd}
+    rows = np.broadcast_to(np.asarray(direction, dtype=float), (n, 3))
+    return Measurements(
+        position=np.array(np.broadcast_to(np.asarray(position, dtype=float), (n, 3))),
+        angles=np.zeros((n, 3)),
+        direction=rows / np.linalg.norm(rows, axis=1, keepdims=True),
+        stiffness=np.array(stiffness, dtype=float),
+        force=column(force, 1000.0),
+        sd=column(sd),
+        tool_extension=np.zeros(n),
+        time=column(minutes) * 60.0,
+        temperature=np.full(n, np.nan),
+        setup=labels(setup),
+        loop=labels(None),
+        repeat=labels(None),
+        point=labels(range(n) if point is None else point),
+        clamp=labels(range(n) if clamp is None else clamp),
+        file=np.array(["by hand"] * n),
+        line=np.arange(n) + 2,
+        extra={},
+        missing=tuple(name for name in OPTIONAL_COLUMNS if given.get(name) is None),
+    )
+
+
+def oblique_directions(n: int, seed: int = 0) -> FloatArray:
+    """(n, 3) unit vectors."""
+    found = np.random.default_rng(seed).normal(size=(n, 3))
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def orthogonal_compliance(direction: FloatArray, first: float = 0.0, second: float = 0.0) -> FloatArray:
+    """(n,) m/N at the origin of `tests.stiffness.cases.orthogonal_hexapod`, by hand.
+
+    The two struts along an axis share the load: 1 / (2 k), with k of 10, 20, 30 N/um at 1, 2, 3 m; the law's
+    constants sit at 1 and 3 m and are multiplied by exp(first), exp(second).
+    """
+    ends = 10e6 * np.exp(first), 30e6 * np.exp(second)
+    along = np.array([ends[0], 0.5 * (ends[0] + ends[1]), ends[1]])
+    return np.asarray((direction**2 / (2.0 * along)).sum(axis=1))
+
+
+def active(name: str, choice: dict[str, Any] | None = None, **values: float) -> ActiveEffect:
+    """An effect with SI values; those not given are neutral."""
+    effect = find_effect(name)
+    assert {*values, *(choice or {})} <= {parameter.name for parameter in effect.parameters}
+    return ActiveEffect(effect, neutral_values(effect) | (choice or {}) | values)
+
+
+def simple_noise(
+    n: int,
+    repeat: float = 0.02,
+    clamping: float = 0.0,
+    strut_spread: float = 0.0,
+    joint_error: float = 0.0,
+    outliers: float = 0.0,
+    freedom: float = np.inf,
+) -> Noise:
+    """Only what is asked for."""
+    return Noise(
+        "stated", np.full(n, repeat), clamping, strut_spread, joint_error, outliers, 4.0, freedom, "made for a test"
+    )
