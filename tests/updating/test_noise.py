@@ -1,0 +1,194 @@
+"""The noise: estimated from simulated repeats whose noise is known, assembled, inverted, wild readings set aside."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, multivariate_normal
+
+from tests.stiffness.cases import nist
+from tests.updating.cases import campaign, readings_by_hand, simple_noise, table_1
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.rig import Nuisances
+from toolpath_stiff.updating.noise import covariance, estimate_from_repeats, noise_models, repeat_groups
+from toolpath_stiff.updating.predict import Predictor
+from toolpath_stiff.updating.scatter import Scatter
+
+REPEAT, CLAMPING = 0.02, 0.03
+
+
+def repeated(seed: int, repeat=REPEAT, clamping=CLAMPING, clamps_a_point=2, points=15, wild=0, drift=0.0):
+    """Each point along X, Y, Z, clamped anew for every repeat; ln k known but for the noise."""
+    rng = np.random.default_rng(seed)
+    rows = [(p, c, axis) for c in range(clamps_a_point) for p in range(points) for axis in range(3)]
+    point, clamp, axis = (np.array(column) for column in zip(*rows, strict=True))
+    n = len(rows)
+    true = rng.uniform(np.log(2e7), np.log(8e7), (points, 3))[point, axis]
+    shared = clamping * rng.standard_normal((points, clamps_a_point))[point, clamp]
+    own = repeat * rng.standard_normal(n)
+    own[rng.choice(n, wild, replace=False)] += 0.3
+    minutes = np.linspace(0.0, 100.0, n)
+    deflection = 1000.0 / np.exp(true) + drift * minutes
+    return readings_by_hand(
+        1000.0 / deflection * np.exp(shared + own),
+        position=np.stack([0.01 * point, 0.0 * point, 0.8 + 0.0 * point], axis=1),
+        direction=np.eye(3)[axis],
+        point=point.tolist(),
+        clamp=[f"{p}-{c}" for p, c in zip(point, clamp, strict=True)],
+        minutes=minutes,
+        force=1000.0,
+    )
+
+
+def mean_of_estimates(count=60, **how):
+    """Root mean squares of the estimated repeat noise and clamping, and the degrees of freedom."""
+    found = [estimate_from_repeats(repeated(seed, **how)) for seed in range(count)]
+    repeat, clamping, freedom, told = zip(*found, strict=True)
+    assert all(told)
+    return math.sqrt(np.mean(np.square(repeat))), math.sqrt(np.mean(np.square(clamping))), min(freedom)
+
+
+def test_restricted_likelihood_finds_repeat_noise_and_clamping():
+    """Its variances are unbiased. The mean of 60 variances with 30 and 15 degrees of freedom: sd 3 % and 5 %."""
+    repeat, clamping, freedom = mean_of_estimates()
+    assert repeat == pytest.approx(REPEAT, rel=0.10)
+    assert clamping == pytest.approx(CLAMPING, rel=0.15)
+    assert freedom in (40, 41)  # 90 readings, 45 means, order in time and drift
+
+
+def test_no_clamping_is_found_where_there_is_none():
+    repeat, clamping, _ = mean_of_estimates(clamping=0.0)
+    assert repeat == pytest.approx(REPEAT, rel=0.10)
+    assert clamping < 0.4 * REPEAT  # of estimates that cannot be negative, half of them 0
+
+
+def test_wild_readings_and_a_drift_are_not_taken_for_noise():
+    calm = mean_of_estimates(count=20)
+    repeat, clamping, _ = mean_of_estimates(count=20, wild=2)
+    assert repeat < 1.25 * calm[0] and clamping < 1.35 * calm[1]
+    # 2 um in all, on deflections of 12 to 50 um: 4 to 16 %, half of it between repeats.
+    drifting = mean_of_estimates(count=20, drift=2e-8)
+    assert drifting[:2] == pytest.approx(calm[:2], rel=0.10)
+
+
+def test_a_clamping_that_the_repeats_cannot_tell_is_assumed():
+    """All repeats in one clamping: what it adds is common to them."""
+    data = repeated(3, repeat=0.005, clamping=0.05)
+    one = readings_by_hand(
+        data.stiffness, data.position, data.direction, point=data.point.tolist(), clamp=data.point.tolist()
+    )
+    (noise,) = noise_models(one)
+    assert noise.name == "measured" and "no point was clamped twice" in noise.origin
+    assert noise.clamping == pytest.approx(min(0.01, noise.repeat[0]))
+
+
+def test_the_rigs_campaign_gives_its_noise_away():
+    """2 % a reading, 1 % a clamping, 2 % of readings four times as wide."""
+    found = [noise_models(campaign(seed)[0])[0] for seed in range(10)]
+    assert {noise.name for noise in found} == {"measured"}
+    assert np.mean([noise.repeat[0] for noise in found]) == pytest.approx(0.02, rel=0.08)
+    assert np.mean([noise.clamping for noise in found]) == pytest.approx(0.01, rel=0.25)
+
+
+def test_stated_noise_wins_over_the_file_and_the_file_over_guesses():
+    data = campaign(1, "paper")[0]
+    (noise,) = noise_models(data)
+    assert noise.name == "stated" and "sd_N_per_mm" in noise.origin
+    assert noise.reading == pytest.approx(data.sd / data.stiffness, rel=1e-9)
+    (noise,) = noise_models(data, 0.05)
+    assert noise.reading == pytest.approx(0.05) and 0.0 < noise.clamping < 0.05
+    (noise,) = noise_models(data, (0.05, 0.002))
+    assert (noise.repeat[0], noise.clamping) == (0.05, 0.002)
+    (noise,) = noise_models(data, (0.05, 0.0), strut_spread=0.03, joint_error=1e-3)
+    assert (noise.clamping, noise.strut_spread, noise.joint_error) == (0.0, 0.03, 1e-3)
+
+
+def test_nothing_known_gives_a_low_and_a_high_guess():
+    low, high = noise_models(table_1())
+    assert (low.name, high.name) == ("low", "high")
+    assert low.typical < high.typical
+    assert all("guess" in noise.origin and noise.freedom < 10 for noise in (low, high))
+
+
+@pytest.mark.parametrize("stated", [0.0, -0.01, 0.6, (0.02, -0.01), (0.0, 0.01), (0.02, 0.7), math.nan])
+def test_a_noise_that_cannot_be_is_refused(stated):
+    with pytest.raises(InputError, match="noise of"):
+        noise_models(table_1(), stated)
+
+
+def test_repeats_are_what_differs_in_nothing_but_time_and_clamping():
+    same = {"position": (0.0, 0.0, 0.8), "direction": (0.0, 0.0, 1.0)}
+    assert len(set(repeat_groups(readings_by_hand([4e7, 4.1e7], minutes=[0, 9], clamp=[1, 2], **same)))) == 1
+    assert len(set(repeat_groups(readings_by_hand([4e7, 4.1e7], force=[500, 4000], **same)))) == 2
+    assert len(set(repeat_groups(readings_by_hand([4e7, 4.1e7], setup=["riser", "table"], **same)))) == 2
+    assert len(set(repeat_groups(readings_by_hand([4e7, 4.1e7], (0, 0, 0.8), np.eye(3)[:2])))) == 2
+
+
+def test_covariance_is_that_of_simulated_campaigns():
+    """The rig's campaigns with nothing hidden, 400 machines, against the assembled matrix: whitened they are unit."""
+    nuisances = Nuisances(repeat=0.01, clamping=0.02, strut_spread=0.03, joint_error=1e-3, outliers=0.0)
+    data = campaign(0, "paper", nuisances=nuisances)[0]
+    predictor = Predictor(nist(), data)
+    noise = simple_noise(len(data), 0.01, 0.02, 0.03, 1e-3)
+    root = np.linalg.inv(np.linalg.cholesky(covariance(noise, predictor)))
+    model = predictor.log_stiffness()
+    count = 60
+    logs = [np.log(campaign(seed, "paper", nuisances=nuisances)[0].stiffness) - model for seed in range(count)]
+    white = np.array(logs) @ root.T
+    # The sum of squares of count x 42 standard normal numbers, with room for what is not linear in the nuisances.
+    low, high = chi2.ppf([1e-4, 1.0 - 1e-4], white.size) / white.size
+    assert 0.98 * low < np.mean(white**2) < 1.02 * high
+    # No direction in reading space stands out: largest eigenvalue of a random matrix (Marchenko and Pastur 1967).
+    values = np.linalg.eigvalsh(white.T @ white / count)
+    assert values.max() < 1.25 * (1.0 + math.sqrt(white.shape[1] / count)) ** 2
+    # Each part is needed: without it something stands out far.
+    for without in ({"clamping": 0.0}, {"strut_spread": 0.0}, {"joint_error": 0.0}):
+        parts = {"repeat": 0.01, "clamping": 0.02, "strut_spread": 0.03, "joint_error": 1e-3} | without
+        bare = np.linalg.inv(np.linalg.cholesky(covariance(simple_noise(len(data), **parts), predictor)))
+        assert np.mean((np.array(logs) @ bare.T) ** 2) > 1.2 * high
+
+
+def correlated(n: int = 30, outliers: float = 0.02) -> tuple[Scatter, np.ndarray, np.ndarray]:
+    """Scatter, covariance and a draw with reading 7 wild."""
+    rng = np.random.default_rng(4)
+    noise = simple_noise(n, 0.02, outliers=outliers)
+    shared = rng.normal(size=(n, 5)) * 0.02
+    matrix = np.diag(noise.repeat**2) + shared @ shared.T
+    residual = rng.multivariate_normal(np.zeros(n), matrix)
+    residual[7] += 0.25
+    return Scatter.of(noise, matrix), matrix, residual
+
+
+def test_scatter_is_the_multivariate_normal():
+    scatter, matrix, residual = correlated()
+    expected = multivariate_normal(np.zeros(len(residual)), matrix).logpdf(residual)
+    found = float(scatter.log_likelihood(residual)) - 0.5 * len(residual) * math.log(2.0 * math.pi)
+    assert found == pytest.approx(expected, rel=1e-10)
+    assert scatter.inverse == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
+
+
+def test_a_wild_reading_is_found_and_its_own_scatter_widened():
+    scatter, matrix, residual = correlated()
+    wild = scatter.with_wild(residual)
+    assert wild.wild == (7,)
+    matrix[7, 7] += (4.0**2 - 1.0) * 0.02**2
+    assert wild.inverse == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
+    assert wild.log_determinant == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-10)
+    price = math.log(0.98 / 0.02)
+    normal = multivariate_normal(np.zeros(len(residual)), matrix).logpdf(residual)
+    constant = 0.5 * len(residual) * math.log(2.0 * math.pi)
+    assert float(wild.log_likelihood(residual)) == pytest.approx(normal + constant - price, rel=1e-9)
+    # It pays: likelier than before in spite of the price.
+    assert float(wild.log_likelihood(residual)) > float(scatter.log_likelihood(residual)) + price
+
+
+def test_nothing_is_called_wild_without_need():
+    scatter, matrix, _ = correlated()
+    calm = np.random.default_rng(2).multivariate_normal(np.zeros(len(matrix)), matrix, 200)
+    assert np.mean([len(scatter.with_wild(one).wild) for one in calm]) < 0.03
+    never, _, residual = correlated(outliers=0.0)
+    assert never.with_wild(residual).wild == ()
+    everywhere = correlated(n=40)[2] + 0.5 * (-1.0) ** np.arange(40)
+    assert len(correlated(n=40)[0].with_wild(everywhere).wild) <= 0.05 * 40 + 1
