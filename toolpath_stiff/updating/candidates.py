@@ -28,6 +28,7 @@ FloatArray = NDArray[np.float64]
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
 POINTS = 9  # sizes a sign
+CROWDED = 2.5  # power by which they crowd towards large ones: delta / size is constant first and bends at the end
 MOST_COMPONENTS = 4  # effects with more real parameters are tried in full and one by one only
 INVISIBLE = 1e-7  # rms change of ln stiffness below which a choice does nothing to these data
 
@@ -267,7 +268,8 @@ def _knots(
         if found is not None and _rms(found, compliance) < 2.0:
             break
         end = max(0.7 * end, start)
-    sizes = np.geomspace(start, max(end, 1.01 * start), POINTS)
+    share = 1.0 - (1.0 - np.linspace(0.0, 1.0, POINTS)) ** CROWDED
+    sizes = start * (max(end, 1.01 * start) / start) ** share
     sizes[-1] = min(sizes[-1], component.reach(sign))
     logs, ratios = [], []
     for size in sizes:
