@@ -112,7 +112,7 @@ def test_shuffled_readings_get_the_same_answers():
     effects = [
         active("joint_clearance", lost_motion=3e-6),
         active("thermal_drift", rate=1e-9),
-        active("gauge_scale", {"direction": 2, "setup": ""}, scale=1.1),
+        active("gauge_scale", {"direction": 2, "setup": ""}, scale=0.1),
     ]
     plain, shuffled = tilted(), Predictor(nist(), data.select(order))
     assert shuffled.log_stiffness((0.1, 0.0), effects) == pytest.approx(
