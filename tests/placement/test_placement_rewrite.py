@@ -126,7 +126,8 @@ def test_everything_but_the_numbers_stays(name):
 
 def test_line_ends_encoding_and_letters_stay(tmp_path):
     content = (
-        "%\r\nn1 g21 g90 (Stück ½)\r\n\r\nn2 g0x10y20z5;hin\r\n n3 g1 z-1 f300\r\nn4x0 ( ab ) y2.50\r\nm2\r\n%\r\nX9"
+        "%\r\nn1 g21 g90 (Stück ½)\r\n\r\nn2 g0x10y20z5;hin\r\n n3 g1 z-1 f300\r\nn4x0 ( ab ) y2.50\r\nm2\r\n%\r\n"
+        "X9\x1a"
     )
     path = tmp_path / "posted.nc"
     path.write_bytes(content.encode("latin-1"))
@@ -134,7 +135,7 @@ def test_line_ends_encoding_and_letters_stay(tmp_path):
     rewritten = rewrite_program(program, (0.1, 0.0, 0.2, 0.0, 0.0, 0.0), (0.0,) * 6)
     assert rewritten.content.decode("latin-1") == (
         "%\r\nn1 g21 g90 (Stück ½)\r\n\r\nn2 g0x110y20z205;hin\r\n n3 g1 z199 f300\r\nn4x100. ( ab ) y2.50\r\n"
-        "m2\r\n%\r\nX9"
+        "m2\r\n%\r\nX9\x1a"
     )
     turned = rewrite_program(program, (0.1, 0.0, 0.2, 0.0, 0.0, math.pi / 2), (0.0,) * 6)
     assert b"n2 g0x80y10z205;hin\r\n n3 g1 z199 f300\r\nn4x97.5 ( ab ) y0.\r\n" in turned.content

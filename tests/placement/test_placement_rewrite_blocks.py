@@ -15,7 +15,7 @@ from tests.nc.test_nc_against_rs274 import assert_same_path as assert_linuxcnc_a
 from tests.placement.rewriting import assert_same_path, cutting_moves
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.reader import parse_program
-from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.tables import Offsets, ToolEntry, WorkOffset
 from toolpath_stiff.placement.rewrite import rewrite_program
 
 HERE = (0.0,) * 6
@@ -124,6 +124,16 @@ def test_a_tilted_set_up_tilts_the_tool_and_its_tool_length_follows_the_control(
     lines = rewrite(text, at(0, 0, 100, a=5), tools=TOOL_TABLE)
     assert lines[2] == "G0 X0 Y0 Z100 A5"
     assert lines[4] == "G1 X10"
+
+
+def test_offsets_of_a_file_are_taken_into_account():
+    offsets = Offsets()
+    offsets.table[1] = WorkOffset([10.0, 20.0, 30.0, 0.0, 0.0, 0.0], rotation=30.0, given=True)
+    there = at(1, 2, 3, 45)
+    text = START + "G55 G0 X0 Y0 Z0\nG1 X5\nG3 Y10 J5\nM2\n"
+    program = parse_program(text, origin=there, offsets=offsets)
+    rewritten = rewrite_program(program, there, HERE, offsets=offsets)
+    assert_same_path(program, there, parse_program(rewritten.text, offsets=offsets), HERE, 1e-4)
 
 
 @pytest.mark.parametrize("turn", [30.0, 90.0, 211.0])

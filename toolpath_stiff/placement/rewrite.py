@@ -117,13 +117,13 @@ def check_decimals(decimals: int | None) -> None:
 
 def _rewritten_lines(rewriter: Rewriter, text: str, name: str, block_delete: bool) -> Iterator[str]:
     """Lines with their ends; what follows the program's end stays as it is."""
-    lines, ends = split_lines(text, name), LINE_END.findall(text)
+    lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), LINE_END.findall(text)
     ends += [""] * (len(lines) - len(ends))
     between = ends[0] or "\n"
     running, started = True, False
-    for number, (line, end) in enumerate(zip(lines, ends, strict=False), 1):
+    for number, (line, raw, end) in enumerate(zip(lines, raw_lines, ends, strict=False), 1):
         if not running:
-            yield line + end
+            yield raw + end
             continue
         block = read_block(line, number, name)
         written = [line]
@@ -136,7 +136,7 @@ def _rewritten_lines(rewriter: Rewriter, text: str, name: str, block_delete: boo
             written, running = rewriter.block(block, line)
             if block.optional and written != [line] and SLASHED not in rewriter.notes:
                 rewriter.notes.append(SLASHED)
-        yield (end or between).join(written) + end
+        yield raw + end if written == [line] else (end or between).join(written) + end
 
 
 def _refuse_left_out(words: bool, number: int, name: str) -> None:
