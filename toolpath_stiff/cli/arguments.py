@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
@@ -92,7 +93,6 @@ def range_argument(text: str) -> tuple[float, float]:
 def load_argument(text: str) -> str:
     """Check `--load` early; the analysis parses it again."""
     from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.errors import InputError
 
     try:
         parse_load(text)

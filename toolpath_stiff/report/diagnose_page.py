@@ -25,13 +25,14 @@ from toolpath_stiff.report.diagnose_words import (
     is_plausible,
     name_text,
     parameter_texts,
+    path_text,
     percent,
     plausible_text,
     probability_text,
     remark_text,
     significant,
 )
-from toolpath_stiff.report.wording import plain
+from toolpath_stiff.report.wording import number, plain
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
@@ -209,24 +210,31 @@ def _cannot_test(document: Mapping[str, Any]) -> str:
     for entry in entries(document, "cannot_test"):
         columns = ", ".join(f"<code>{_text(name)}</code>" for name in entry.get("missing") or [])
         rows.append(("", [_text(entry.get("effect", "?")), columns or "nothing in these data depends on it"]))
+    # 80 % power is what `detectable` asks for.
     never = [e for e in entries(document, "detectable") if isinstance(e, Mapping) and e.get("detectable") is False]
     rows += [
-        ("", [_text(hidden_name(e)), "hidden by the strut law or by scatter at any size that can be"]) for e in never
+        (
+            "",
+            [
+                _text(hidden_name(e)),
+                "even at its largest possible size these data would show it less than four times in five",
+            ],
+        )
+        for e in never
     ]
     return _table(("effect", "the column that is missing"), rows) if rows else ""
 
 
 def _path(document: Mapping[str, Any]) -> str:
-    """What the plausible explanations predict on the path: whatever figures there are."""
-    path = document.get("path")
-    if not isinstance(path, Mapping):
+    """What the plausible explanations predict on the path."""
+    text = path_text(document)
+    if not text:
         return ""
-    rows = [("", [_text(key.replace("_", " ")), _cell(value)]) for key, value in path.items() if not _nested(value)]
-    return _table(("", ""), rows, (1,)) if rows else ""
-
-
-def _nested(value: object) -> bool:
-    return isinstance(value, Mapping | list | tuple)
+    explanations = (document.get("path") or {}).get("explanations") or {}
+    keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
+    rows = [("", [_text(name), *(number(figure_of(one, key)) for key in keys)]) for name, one in explanations.items()]
+    table = _table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3)) if rows else ""
+    return f"<p>{_text(text[0].upper() + text[1:])}.</p>{table}"
 
 
 def _noise(document: Mapping[str, Any]) -> str:

@@ -297,7 +297,7 @@ def detectable_png(document: Mapping[str, Any]) -> bytes:
                 axes.text(value + 0.012 * reach, y, size_text(entry), va="center", size=9.5)
             else:
                 largest = figure_of(entry, "rms_percent")
-                text = "not seen at any size within its bounds"
+                text = "hardly seen at any size within its bounds"
                 if largest is not None:
                     text += f", which change the stiffness by {percent(largest)}"
                 axes.text(0.012 * reach, y, text, va="center", size=9.5, color="#a3333d")
@@ -313,7 +313,7 @@ def envelope_png(document: Mapping[str, Any]) -> bytes | None:
     """PNG: the base model's weighted sum of squares among simulated ones; None where `gates` does not hold them."""
     gates = document.get("gates") or {}
     simulated = np.asarray(gates.get("simulated_squares") or [], dtype=float)
-    if not np.isfinite(simulated).any():
+    if not (simulated > 0.0).any():
         return None
     observed = figure_of(gates, "squares")
     with house_style():
@@ -324,17 +324,19 @@ def envelope_png(document: Mapping[str, Any]) -> bytes | None:
             "weighted sum of squares: simulated as if the model were right (grey), and observed (orange)",
         )
         axes = figure.add_axes((0.04, 0.1, 0.92, 0.62))
-        shown = simulated[np.isfinite(simulated)]
-        axes.hist(shown, bins=30, color="#b8c4d6", zorder=2)
-        if observed is not None:
-            # Far outside, the observed value would squeeze the simulated ones into one bar.
-            edge = float(shown.max()) + 3.0 * float(np.ptp(shown))
-            inside = observed <= edge
-            axes.axvline(min(observed, edge), color=SECOND_ORANGE, lw=2.2, ls="-" if inside else ":", zorder=3)
-            text = f"{observed:.4g}" if inside else f"{observed:.4g}, far to the right \N{RIGHTWARDS ARROW}"
+        shown = simulated[simulated > 0.0]
+        ends = [*shown, observed] if observed is not None and observed > 0.0 else [*shown]
+        # Wild readings and a noise that is itself uncertain give a long tail: equal steps of the logarithm.
+        axes.hist(shown, bins=np.geomspace(0.98 * min(ends), 1.02 * max(ends), 41).tolist(), color="#b8c4d6", zorder=2)
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(lambda value, _: significant(value, 1))
+        axes.xaxis.set_minor_formatter(lambda value, _: "")
+        if observed is not None and observed > 0.0:
+            axes.axvline(observed, color=SECOND_ORANGE, lw=2.2, zorder=3)
+            right = observed > np.sqrt(min(ends) * max(ends))
             axes.annotate(
-                text, (min(observed, edge), 0.97), xycoords=("data", "axes fraction"), xytext=(-6, 0),
-                textcoords="offset points", ha="right", va="top", color=SECOND_ORANGE,
+                f"{observed:.4g}", (observed, 0.97), xycoords=("data", "axes fraction"), xytext=(-6 if right else 6, 0),
+                textcoords="offset points", ha="right" if right else "left", va="top", color=SECOND_ORANGE,
             )  # fmt: skip
         chances = [
             (name, figure_of(gates, f"{key}_probability"))

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from toolpath_stiff.report.wording import plain
+from toolpath_stiff.report.wording import number, plain
 
 # Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
 MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
@@ -193,6 +193,22 @@ def headline(document: Mapping[str, Any]) -> str:
     if verdict == "ambiguous" and len({str(one.get("verdict")) for one in found.values()}) > 1:
         return "It depends on how much the readings scatter, which these data do not tell"
     return plain(HEADLINES.get(verdict, verdict))
+
+
+def path_text(document: Mapping[str, Any]) -> str:
+    """How far apart the plausible explanations are on a tool path, in one sentence; "" where it was not tried."""
+    path = document.get("path") or {}
+    program = plain(str(path.get("program") or "the program"))
+    if path.get("reason"):
+        return plain(f"not tried on {program}: {path['reason']}")
+    means = {name: figure_of(one, "mean_N_per_mm") for name, one in (path.get("explanations") or {}).items()}
+    known = sorted((mean, name) for name, mean in means.items() if mean is not None)
+    if len(known) < 2:
+        return ""
+    (low, softest), (high, stiffest) = known[0], known[-1]
+    apart = figure_of(path, "mean_spread_percent")
+    text = f"mean stiffness from {number(low)} ({softest}) to {number(high)} N/mm ({stiffest}) on {program}"
+    return plain(text + (f": {percent(apart)} apart" if apart is not None else ""))
 
 
 def plausible_text(names: Sequence[str]) -> str:

@@ -203,13 +203,15 @@ def interval(
 ) -> tuple[float, float]:
     """95 % interval of a size: from its profile where that was scanned, else normal, within the bounds."""
     low_bound, high_bound = component.bounds
-    scanned = family.best.interval if family is not None and family.best is not None else None
-    if scanned is not None and index == 0:
-        return min(float(scanned[0]), size), max(float(scanned[1]), size)
+    best = family.best if family is not None else None
+    if best is not None and best.interval is not None and index == 0:
+        # The scan ran on the table; the final fit with the model itself may sit a little beside it.
+        low, high = best.interval + (size - float(best.sizes[0][0]))
+        return max(min(float(low), size), low_bound), min(max(float(high), size), high_bound)
     if index in fit.free:
         reach = NORMAL_95 * fit.deviation(index)
         return max(size - reach, low_bound), min(size + reach, high_bound)
-    pull, deviation = fit.absent[index] if index in fit.absent else (0.0, 0.0)
+    pull, deviation = fit.absent.get(index, (0.0, 0.0))
     upper = max(pull, 0.0) + NORMAL_95 * deviation
     return max(0.0, low_bound), min(upper, high_bound)
 
@@ -298,8 +300,8 @@ def assumptions(diagnosis: Diagnosis) -> list[str]:
     noise = diagnosis.noise
     found = [
         f"noise: {noise.origin}",
-        f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand {mm_from_m(noise.joint_error):g}"
-        " mm (sd of each coordinate) from where the machine file has them: assumed",
+        f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
+        f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
         f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: assumed",
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
         "(sd) of the machine file: effective values, which absorb part of every other effect",

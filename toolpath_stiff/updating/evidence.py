@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.updating.candidates import Candidate, Table
 from toolpath_stiff.updating.predict import Predictor
 from toolpath_stiff.updating.scatter import Scatter
-from toolpath_stiff.updating.size_prior import Sight, SizePrior, log_comparable
+from toolpath_stiff.updating.size_prior import Sight, SizePrior, likely_interval, log_comparable
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -194,7 +194,8 @@ class Problem:
             if not last or set(again.wild) == set(scatter.wild):
                 break
             scatter = again
-        log_integral, interval = prior.integrate(scan.sizes, scan.profile)
+        log_integral = prior.integrate(scan.sizes, scan.profile)
+        interval = likely_interval(scan.sizes, scan.profile)
         best = (np.array([scan.sizes[peak]]),)
         jacobian = self._jacobian((table,), best, law)
         information = jacobian.T @ scatter.inverse @ jacobian

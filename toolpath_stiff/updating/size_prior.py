@@ -124,16 +124,9 @@ class SizePrior:
             out[where] = np.interp(at, logs, self.log_density[sign], left=-1e9, right=-1e9) - at
         return out
 
-    def integrate(self, sizes: FloatArray, log_likelihood: FloatArray) -> tuple[float, FloatArray]:
-        """Log of the integral over rising sizes (g,) of both signs, and the 95 % interval of the size."""
-        logs = log_likelihood + self.log_at(sizes)
-        top = float(logs.max())
-        weights = np.exp(logs - top)
-        pieces = 0.5 * (weights[1:] + weights[:-1]) * np.diff(sizes)
-        pieces[(sizes[1:] > 0.0) & (sizes[:-1] < 0.0)] = 0.0
-        total = max(float(pieces.sum()), 1e-300)
-        cumulative = np.concatenate([[0.0], np.cumsum(pieces)]) / total
-        return top + float(np.log(total)), np.interp([0.025, 0.975], cumulative, sizes)
+    def integrate(self, sizes: FloatArray, log_likelihood: FloatArray) -> float:
+        """Log of the integral of likelihood times prior over rising sizes (g,) of both signs."""
+        return _log_integral(sizes, log_likelihood + self.log_at(sizes))[0]
 
     def log_mean_likelihood(self, peak: float, sd: float) -> float:
         """Ln of the prior mean of exp(-(size - peak)^2 / (2 sd^2)), which is 1 at its peak, wherever that lies."""
@@ -151,6 +144,22 @@ class SizePrior:
         """Log density at a size; where the posterior is wide, at its width."""
         around = np.sign(size) * max(abs(size), sd)
         return float(max(self.log_at(np.array([around]))[0], -60.0))
+
+
+def likely_interval(sizes: FloatArray, log_likelihood: FloatArray) -> FloatArray:
+    """(2,) 95 % interval of a size from its likelihood alone at rising sizes (g,) of both signs."""
+    _, cumulative = _log_integral(sizes, log_likelihood)
+    return np.interp([0.025, 0.975], cumulative, sizes)
+
+
+def _log_integral(sizes: FloatArray, logs: FloatArray) -> tuple[float, FloatArray]:
+    """Log of the integral of exp(logs), the gap about 0 left out; its share up to each size (g,)."""
+    top = float(logs.max())
+    weights = np.exp(logs - top)
+    pieces = 0.5 * (weights[1:] + weights[:-1]) * np.diff(sizes)
+    pieces[(sizes[1:] > 0.0) & (sizes[:-1] < 0.0)] = 0.0
+    total = max(float(pieces.sum()), 1e-300)
+    return top + float(np.log(total)), np.concatenate([[0.0], np.cumsum(pieces)]) / total
 
 
 def _sizes(table: Table, j: int, sign: float, sight: Sight) -> FloatArray:
