@@ -12,6 +12,7 @@ from toolpath_stiff.updating.noise import Noise
 FloatArray = NDArray[np.float64]
 
 MOST_WILD = 0.05  # share of readings that may be taken for wild
+NEVER = 1e12  # price of a wild reading where there are none
 
 
 @dataclass(frozen=True)
@@ -46,13 +47,11 @@ class Scatter:
         factor = cho_factor(covariance, lower=True)
         inverse = cho_solve(factor, np.eye(len(covariance)))
         widening = (noise.outlier_width**2 - 1.0) * noise.repeat**2
-        price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else np.inf
+        price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
         return cls(0.5 * (inverse + inverse.T), float(2.0 * np.log(np.diag(factor[0])).sum()), widening, float(price))
 
     def with_wild(self, residual: FloatArray) -> Scatter:
         """With those readings taken for wild whose widening pays its price at these residuals (n,)."""
-        if not np.isfinite(self.price):
-            return self
         inverse, determinant, wild = self.inverse.copy(), self.log_determinant, list(self.wild)
         pull = inverse @ residual
         for _ in range(int(MOST_WILD * len(residual)) + 1):
