@@ -1,7 +1,7 @@
 """The final fit, with the model itself: strut law and sizes of effects by generalised least squares on ln k.
 
 The searches run on tables of added compliance; what is reported and written to machine files is refined here.
-Everything is dimensionless or scaled: with constants in N/m the gradient would fall below any default tolerance at once.
+Everything is dimensionless or scaled: with constants in N/m the gradient would fall below any tolerance at once.
 """
 
 from __future__ import annotations
@@ -133,13 +133,13 @@ def fit_effects(
     for _ in range(STEPS):
         jacobian = search.jacobian(law, flat, residual)
         information, gradient = _normal_equations(jacobian, residual, law, scatter, law_free)
-        step = _solve(information, gradient)
+        step = search.newton_step(flat, information, gradient)
         scale = np.sqrt(np.diag(information))
-        law, flat, new, moved = search.step(law, flat, residual, step, scatter)
+        law, flat, new = search.step(law, flat, residual, step, scatter)
         if new is None:
             break
         residual = new
-        if np.abs(moved * scale).max() < TOLERANCE:
+        if np.abs(step * scale).max() < TOLERANCE:
             break
     jacobian = search.jacobian(law, flat, residual)
     information, _ = _normal_equations(jacobian, residual, law, scatter, law_free)
@@ -209,11 +209,35 @@ class _Search:
         effects = [c.active(s) for c, s in zip(self.candidates, self.split(flat), strict=True)]
         return np.asarray(self.problem.observed - self.problem.predictor.log_stiffness(law, effects))
 
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Smallest and largest of all sizes."""
+        bounds = [component.bounds for c in self.candidates for component in c.components]
+        low, high = np.array(bounds, dtype=float).reshape(-1, 2).T
+        return low, high
+
     def bounded(self, flat: FloatArray) -> FloatArray:
-        components = [component for c in self.candidates for component in c.components]
-        low = np.array([c.bounds[0] for c in components])
-        high = np.array([c.bounds[1] for c in components])
-        return np.clip(flat, low, high) if components else flat
+        return np.asarray(np.clip(flat, *self.limits()))
+
+    def newton_step(self, flat: FloatArray, information: FloatArray, gradient: FloatArray) -> FloatArray:
+        """Step (2 + free,) of law and free sizes to the least quadratic model within the bounds.
+
+        By bounded-variable least squares (Stark and Parker 1995, Computational Statistics 10, 129) where the plain
+        step would leave them: cutting that off leads uphill where sizes trade off against each other.
+        """
+        step = _solve(information, gradient)
+        low, high = (limit[list(self.free)] - flat[list(self.free)] for limit in self.limits())
+        if ((step[2:] >= low) & (step[2:] <= high)).all():
+            return step
+        from scipy.optimize import lsq_linear
+
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+        kept = values > 1e-12 * values[-1]
+        root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+        target = vectors[:, kept].T @ (gradient / scale) / np.sqrt(values[kept])
+        free_law = np.full(2, np.inf)
+        bounds = (np.concatenate([-free_law, low * scale[2:]]), np.concatenate([free_law, high * scale[2:]]))
+        return np.asarray(lsq_linear(root, target, bounds, method="bvls").x / scale)
 
     def jacobian(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> FloatArray:
         columns = []
@@ -234,7 +258,7 @@ class _Search:
 
     def step(
         self, law: FloatArray, flat: FloatArray, residual: FloatArray, step: FloatArray, scatter: Scatter
-    ) -> tuple[FloatArray, FloatArray, FloatArray | None, FloatArray]:
+    ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
         """The step, halved until the fit gets no worse; None for the residual where nothing helps."""
 
         def badness(at: FloatArray, logs: FloatArray) -> float:
@@ -248,7 +272,6 @@ class _Search:
             moved = self.bounded(moved)
             new = self.residual(new_law, moved)
             if np.isfinite(new).all() and badness(new, new_law) <= before + 1e-9:
-                taken = np.concatenate([new_law - law, (moved - flat)[list(self.free)]])
-                return new_law, moved, new, taken
+                return new_law, moved, new
             step = 0.5 * step
-        return law, flat, None, step
+        return law, flat, None
