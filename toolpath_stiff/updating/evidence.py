@@ -83,6 +83,11 @@ class Score:
         """Names of the effects."""
         return tuple(table.candidate.name for table in self.tables)
 
+    @property
+    def log_posterior(self) -> float:
+        """Log likelihood with the law's prior: what the fit has made largest."""
+        return self.log_likelihood - 0.5 * float(self.law @ self.law) / LAW_PRIOR**2
+
 
 @dataclass
 class Problem:
