@@ -17,8 +17,13 @@ from toolpath_stiff import rig
 from toolpath_stiff.machine import Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.diagnose import Diagnosis, diagnose, testable_effects
+from toolpath_stiff.updating.evidence import Problem
 from toolpath_stiff.updating.measurements import Measurements, read_measurements
-from toolpath_stiff.updating.noise import Noise
+from toolpath_stiff.updating.noise import Noise, covariance, noise_models
+from toolpath_stiff.updating.predict import Predictor
+from toolpath_stiff.updating.scatter import Scatter
+from toolpath_stiff.updating.verdict import Judgement, judge
 
 FloatArray = NDArray[np.float64]
 
@@ -136,3 +141,20 @@ def simple_noise(
     return Noise(
         "stated", np.full(n, repeat), clamping, strut_spread, joint_error, outliers, 4.0, freedom, "made for a test"
     )
+
+
+@cache
+def judged(seed: int, layout: str = "tilted", hidden: str = "none", size: float | None = None) -> Judgement:
+    """The judgement of a rig campaign under the noise that the data give away or state."""
+    data, _ = campaign(seed, layout, hidden, size)
+    predictor = Predictor(nist(), data)
+    (noise,) = noise_models(data)
+    spread = covariance(noise, predictor)
+    problem = Problem(predictor, Scatter.of(noise, spread), spread)
+    return judge(problem, noise, spread, testable_effects(predictor)[0], seed=0)
+
+
+@cache
+def diagnosed(seed: int, layout: str = "paper", hidden: str = "none", size: float | None = None) -> Diagnosis:
+    """The whole diagnosis of a rig campaign."""
+    return diagnose(nist(), campaign(seed, layout, hidden, size)[0])
