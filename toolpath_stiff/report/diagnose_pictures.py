@@ -268,6 +268,8 @@ def _chain(places: list[int], matrix: np.ndarray[Any, np.dtype[np.float64]]) -> 
 
 def detectable_png(document: Mapping[str, Any]) -> bytes:
     """PNG: the smallest size of each effect that these data would show, as the change of stiffness that it makes."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
     given = [entry for entry in entries(document, "detectable") if isinstance(entry, Mapping)]
     seen = sorted(
         (e for e in given if e.get("detectable") is not False and figure_of(e, "rms_percent") is not None),
@@ -287,20 +289,29 @@ def detectable_png(document: Mapping[str, Any]) -> bytes:
         if not rows:
             _nothing(axes, "not computed")
             return png_bytes(figure)
-        reach = max((figure_of(e, "rms_percent") or 0.0 for e in seen), default=1.0)
-        axes.set_xlim(0.0, 1.32 * reach)
+        sizes = [value for e in seen if (value := figure_of(e, "rms_percent") or 0.0) > 0.0] or [1.0]
+        # From a tenth of a per cent to far beyond the readings: equal steps of the logarithm.
+        start, reach = 0.7 * min(sizes), 4.0 * max(sizes)
+        axes.set_xscale("log")
+        axes.set_xlim(start, reach)
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.xaxis.set_minor_locator(NullLocator())
         axes.set_ylim(len(rows) - 0.4, -0.6)
         for y, entry in enumerate(rows):
             if entry in seen:
-                value = figure_of(entry, "rms_percent") or 0.0
-                axes.barh(y, value, height=0.6, color=BLUE, zorder=2)
-                axes.text(value + 0.012 * reach, y, size_text(entry), va="center", size=9.5)
+                value = max(figure_of(entry, "rms_percent") or 0.0, start)
+                axes.plot([start, value], [y, y], color=BLUE, lw=1.5, alpha=0.5, zorder=2)
+                axes.plot(value, y, "o", color=BLUE, ms=7, zorder=3)
+                axes.annotate(size_text(entry), (value, y), (9, 0), textcoords="offset points", va="center", size=9.5)
             else:
                 largest = figure_of(entry, "rms_percent")
                 text = "hardly seen at any size within its bounds"
                 if largest is not None:
                     text += f", which change the stiffness by {percent(largest)}"
-                axes.text(0.012 * reach, y, text, va="center", size=9.5, color="#a3333d")
+                axes.annotate(
+                    text, (start, y), (6, 0), textcoords="offset points", va="center", size=9.5, color="#a3333d"
+                )
         axes.set_yticks(range(len(rows)), [shortened(hidden_name(e), 42) for e in rows], color=INK)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
@@ -311,6 +322,8 @@ def detectable_png(document: Mapping[str, Any]) -> bytes:
 
 def envelope_png(document: Mapping[str, Any]) -> bytes | None:
     """PNG: the base model's weighted sum of squares among simulated ones; None where `gates` does not hold them."""
+    from matplotlib.ticker import MaxNLocator, NullLocator
+
     gates = document.get("gates") or {}
     simulated = np.asarray(gates.get("simulated_squares") or [], dtype=float)
     if not (simulated > 0.0).any():
@@ -329,8 +342,11 @@ def envelope_png(document: Mapping[str, Any]) -> bytes | None:
         # Wild readings and a noise that is itself uncertain give a long tail: equal steps of the logarithm.
         axes.hist(shown, bins=np.geomspace(0.98 * min(ends), 1.02 * max(ends), 41).tolist(), color="#b8c4d6", zorder=2)
         axes.set_xscale("log")
-        axes.xaxis.set_major_formatter(lambda value, _: significant(value, 1))
-        axes.xaxis.set_minor_formatter(lambda value, _: "")
+        low, high = axes.get_xlim()
+        ticks = MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high)
+        axes.set_xticks([tick for tick in ticks if low < tick < high], minor=False)
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.xaxis.set_minor_locator(NullLocator())
         if observed is not None and observed > 0.0:
             axes.axvline(observed, color=SECOND_ORANGE, lw=2.2, zorder=3)
             right = observed > np.sqrt(min(ends) * max(ends))

@@ -28,6 +28,7 @@ from toolpath_stiff.report.wording import plain, shortened
 
 WIDTH = 100
 LABEL = 12  # columns of the left-hand words
+FEW_REASONS = 3  # of the poses proposed, on the terminal
 MOST_CANDIDATES = 5  # in the table; all are in diagnose.json
 MOST_PAIRS = 2
 MOST_SIZES = 6
@@ -173,4 +174,6 @@ def _next_readings(document: Mapping[str, Any]) -> list[str]:
     if not readings:
         return []
     reasons = list(dict.fromkeys(str(e["why"]) for e in readings if e.get("why")))
-    return [f"{len(readings)} readings are proposed in diagnose.json" + (f": {'; '.join(reasons)}" if reasons else "")]
+    more = len(reasons) - FEW_REASONS
+    said = "; ".join([*reasons[:FEW_REASONS], *([f"{more} more in the file"] if more > 0 else [])])
+    return [f"{len(readings)} readings are proposed in diagnose.json" + (f": {said}" if said else "")]

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.report.wording import number, plain
+from toolpath_stiff.updating.candidates import choice_text
 
 # Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
 MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
@@ -79,7 +80,7 @@ def name_text(entry: Mapping[str, Any]) -> str:
     for name in effect_names(entry):
         inner = (entry.get("parameters") or {}).get(name)  # of a pair: sizes and choices together
         own: Mapping[str, Any] = inner if isinstance(inner, Mapping) else entry.get("choice") or {}
-        acts_on = [f"{key} {value}" for key, value in own.items() if _says_something(value)]
+        acts_on = [choice_text(key, value) for key, value in own.items() if _says_something(value)]
         parts.append(plain(f"{name} ({', '.join(acts_on)})") if acts_on else name)
     return " + ".join(parts)
 
@@ -94,7 +95,7 @@ def parameter_texts(entry: Mapping[str, Any], intervals: bool = True) -> list[st
     texts = []
     for key, value in parameters.items():
         if isinstance(value, Mapping) and "value" not in value:  # a pair: effect -> its parameters
-            texts += parameter_texts({"parameters": value}, intervals)
+            texts += [f"{key} {text}" for text in parameter_texts({"parameters": value}, intervals)]
         elif isinstance(value, Mapping):
             texts.append(_parameter_text(str(key), value, intervals))
     return texts

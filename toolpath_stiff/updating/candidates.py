@@ -119,7 +119,7 @@ class Candidate:
     @property
     def label(self) -> str:
         """For people: the effect's name and its choice."""
-        chosen = ", ".join(f"{key} {value}" for key, value in self.choice if value not in ("", 0))
+        chosen = ", ".join(choice_text(key, value) for key, value in self.choice if value not in ("", 0))
         return f"{self.name} ({chosen})" if chosen else self.name
 
     def subsets(self) -> Iterator[tuple[int, ...]]:
@@ -128,6 +128,13 @@ class Candidate:
         sizes = range(1, count + 1) if count <= MOST_COMPONENTS else (1, count)
         for size in sizes:
             yield from combinations(range(count), size)
+
+
+def choice_text(key: str, value: Any) -> str:
+    """A choice for people: "strut 3", "direction Z"; the catalogue numbers directions 1, 2, 3."""
+    if key == "direction" and value in (1, 2, 3):
+        return f"direction {'XYZ'[value - 1]}"
+    return f"{key} {value}"
 
 
 def candidates_of(effect: Effect, data: Measurements) -> list[Candidate]:

@@ -87,6 +87,11 @@ class Diagnosis:
         return self.main.problem.predictor
 
     @property
+    def explanations(self) -> tuple[str, ...]:
+        """Hypotheses left standing under any noise model, the most likely first: effects, `none`, "a + b"."""
+        return tuple(dict.fromkeys(name for judgement in self.judgements.values() for name in judgement.explanations))
+
+    @property
     def before(self) -> FloatArray:
         """(n,) ln measured - ln modelled of the base model with its strut law refitted."""
         return self.base.residual

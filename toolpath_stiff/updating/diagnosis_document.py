@@ -155,7 +155,7 @@ def _candidate(diagnosis: Diagnosis, family: Family, best: float) -> dict[str, A
     bounded = fit.at_upper_bound()
     remark = f"{', '.join(bounded)} at its bound" if bounded else ""
     if not remark and gate is None and not base_passes:
-        remark = "not tested further: others explain the data far better"
+        remark = "others explain the data far better"
     return common | {
         "parameters": parameters(fit, family),
         "choice": dict(fit.candidates[0].choice),
@@ -174,7 +174,11 @@ def words(twice_log_ratio: float) -> str:
     """How a hypothesis stands against the best, by twice the log ratio of their evidences (RadVel's wording)."""
     if twice_log_ratio <= 1e-9:
         return "best"
-    for limit, text in ((2.0, "nearly indistinguishable"), (4.0, "somewhat disfavored"), (10.0, "strongly disfavored")):
+    for limit, text in (
+        (2.0, "nearly indistinguishable"),
+        (4.0, "somewhat disfavoured"),
+        (10.0, "strongly disfavoured"),
+    ):
         if twice_log_ratio < limit:
             return text
     return "ruled out"

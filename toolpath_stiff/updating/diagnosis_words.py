@@ -37,12 +37,19 @@ def verdict_text(diagnosis: Diagnosis) -> str:
                 for j in diagnosis.judgements.values()
             ]
             return "The verdict hangs on the noise, which these data do not tell. " + "; ".join(parts) + "."
-        return f"These explain the data equally well: {_listed(list(diagnosis.plausible))}."
+        return f"These explain the data about equally well: {_listed(_with_chances(diagnosis))}."
     form = diagnosis.main.form
     return (
         f"Something is missing, and nothing in the catalogue accounts for it: a mean error of {base:.3g} % against "
-        f"{80.0 * diagnosis.noise.typical:.2g} % from noise." + (f" What is left varies {form}." if form else "")
+        f"{80.0 * diagnosis.noise.typical:.2g} % from noise."
+        + (f" What is left forms a pattern {form}." if form else "")
     )
+
+
+def _with_chances(diagnosis: Diagnosis) -> list[str]:
+    """The explanations, each with its probability."""
+    chance = diagnosis.main.probability
+    return [f"{name} ({100.0 * chance.get(name, 0.0):.2g} %)" for name in diagnosis.explanations]
 
 
 def why(diagnosis: Diagnosis) -> list[str]:
@@ -60,7 +67,7 @@ def why(diagnosis: Diagnosis) -> list[str]:
     found.append(
         f"the model alone fails: p = {gate.probability:.2g} (squares {gate.squares_probability:.2g}, structure "
         f"{gate.structure_probability:.2g}, gain of the best effect {gate.gain_probability:.2g}); what sticks out most "
-        f"varies {gate.worst}"
+        f"is a pattern {gate.worst}"
     )
     if diagnosis.verdict == "ambiguous":
         found += _confounded(diagnosis)

@@ -45,12 +45,12 @@ def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
     share = predictor.strut_columns()
     lengths = predictor.strut_lengths()
     sign = np.sign(predictor.strut_forces())
-    forms["struts, each in the course of the campaign"] = (share @ share.T) * in_order
-    forms["struts, with their length"] = sum(
+    forms["of single struts in the course of the campaign"] = (share @ share.T) * in_order
+    forms["of single struts with their length"] = sum(
         np.outer(share[:, i], share[:, i]) * np.exp(-0.5 * _squared(lengths[:, [i]] / RANGE_LENGTH)) for i in range(6)
     )
-    forms["struts, in tension and compression"] = (share * sign) @ (share * sign).T
-    forms["struts, each on its own over the workspace"] = (share @ share.T) * near
+    forms["of struts in tension against compression"] = (share * sign) @ (share * sign).T
+    forms["of single struts over the workspace"] = (share @ share.T) * near
     for name, words in (("force_N", "with the load"), ("tool_extension_mm", "with the tool length")):
         column = np.log(data.force) if name == "force_N" else data.tool_extension
         forms |= _by_column(column, words, same_direction, near)

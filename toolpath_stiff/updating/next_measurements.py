@@ -68,7 +68,7 @@ def choice_on_path(diagnosis: Diagnosis, program: Program, origin: Pose | None =
     from toolpath_stiff.analysis import analyse
     from toolpath_stiff.analysis.statistics import stiffness_figures
 
-    names = [name for name in diagnosis.plausible if name == NONE or name in diagnosis.fits]
+    names = [name for name in diagnosis.explanations if name == NONE or name in diagnosis.fits]
     found: dict[str, Any] = {"program": program.name, "explanations": {}}
     for name in names:
         fit = diagnosis.base if name == NONE else diagnosis.fits[name]

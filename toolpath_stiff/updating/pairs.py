@@ -34,12 +34,17 @@ class Pair:
     score: Score
     log_evidence: float
 
+    @property
+    def name(self) -> str:
+        """Both effects: "a + b"."""
+        return " + ".join(self.names)
 
-def score_pairs(problem: Problem, families: Sequence[Family]) -> list[Pair]:
-    """The pairs worth looking at, the most likely first; each pair of effects once."""
+
+def score_pairs(problem: Problem, families: Sequence[Family], starts: Sequence[Family]) -> list[Pair]:
+    """The pairs worth looking at that hold one of the first of `starts`, the most likely first; each pair once."""
     best: dict[tuple[str, str], Pair] = {}
     tables = [(family.name, table) for family in families for table in family.tables]
-    for first in [family for family in families if family.best is not None][:STARTS]:
+    for first in [family for family in starts if family.best is not None][:STARTS]:
         assert first.best is not None
         projected = problem.projected(first.best.jacobian)
         pulls, _ = set_wild_aside((first.best.residual @ projected)[None], projected)

@@ -35,7 +35,7 @@ def rivals_of(judgement: Judgement) -> list[Rival]:
     """
     found = []
     for name, weight in sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0])):
-        fit = _fit_of(judgement, name) if weight >= LEAST_WEIGHT or name in judgement.plausible else None
+        fit = _fit_of(judgement, name) if weight >= LEAST_WEIGHT or name in judgement.explanations else None
         if fit is not None:
             found.append(rival_of_fit(name, fit, max(weight, LEAST_WEIGHT)))
     for name in (NONE, *(family.name for family in judgement.families)):

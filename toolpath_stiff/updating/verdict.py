@@ -40,6 +40,9 @@ STANDS = 0.05  # probability from which something outside the catalogue, or anot
 TESTED = 4  # candidates, besides all those that matter, that go through the absolute gate
 FAR = 8.0  # log evidence behind the best adequate candidate at which the others cannot matter
 SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alone
+# Odds below which a second effect is not spoken of where one suffices: "positive" evidence begins at 3 (Kass and
+# Raftery 1995, Bayes factors).
+POSITIVE = 3.0
 
 
 @dataclass(frozen=True)
@@ -48,8 +51,10 @@ class Judgement:
 
     Attributes
     ----------
-    verdict, plausible
-        See above; names that hold the truth with 95 % probability.
+    verdict
+        See above.
+    explanations
+        Hypotheses, the most likely first, that hold the truth with 95 % probability: effects, `none`, "a + b".
     problem, noise
         Data and scatter.
     base, base_gate
@@ -68,7 +73,7 @@ class Judgement:
     """
 
     verdict: str
-    plausible: tuple[str, ...]
+    explanations: tuple[str, ...]
     problem: Problem
     noise: Noise
     base: Score
@@ -79,6 +84,11 @@ class Judgement:
     pairs: tuple[Pair, ...]
     probability: dict[str, float]
     form: str
+
+    @property
+    def plausible(self) -> tuple[str, ...]:
+        """Names of the effects in `explanations`, each once."""
+        return tuple(dict.fromkeys(name for one in self.explanations for name in one.split(" + ")))
 
     def family(self, name: str) -> Family:
         """The family of an effect."""
@@ -98,33 +108,35 @@ def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Seque
     work = _Work(problem, noise, base, families, forms, simulator)
     if base_gate.probability > FALSE_ALARM:
         posterior = work.posterior(none=True, names=[f.name for f in families])
-        plausible = _smallest_set(posterior)
-        plausible = plausible if NONE in plausible else (*plausible, NONE)
-        return work.judgement("adequate", plausible, noise, base_gate, posterior, "")
+        likely = _smallest_set(posterior)
+        likely = likely if NONE in likely else (*likely, NONE)
+        return work.judgement("adequate", likely, noise, base_gate, posterior, "")
     # The base model stays in the running if only the gain of the best candidate, not its own residuals, spoke against.
     none_stands = min(base_gate.squares_probability, base_gate.structure_probability) > ADEQUATE
     names = work.adequate_singles(none_stands)
     if names:
-        posterior = work.posterior(none=none_stands, names=names)
-        plausible = _smallest_set(posterior)
-        verdict = "identified" if len(plausible) == 1 else "ambiguous"
+        posterior = work.posterior(none_stands, names, work.adequate_pairs(names[0]))
+        if sum(weight for name, weight in posterior.items() if " + " in name) < POSITIVE * posterior[names[0]]:
+            posterior = work.posterior(none_stands, names)
+        likely = _smallest_set(posterior)
+        verdict = "identified" if max(posterior.values()) >= NAMED else "ambiguous"
         if posterior[NONE] > 0.5:  # what spoke against the model is likelier chance than any effect
             verdict = "adequate"
-        return work.judgement(verdict, plausible, noise, base_gate, posterior, "")
+        return work.judgement(verdict, likely, noise, base_gate, posterior, "")
     return work.beyond_singles(noise, base_gate)
 
 
 def _smallest_set(posterior: dict[str, float]) -> tuple[str, ...]:
-    """The one hypothesis that holds `NAMED`, else the fewest that hold `HELD`; pairs as their members."""
+    """The one hypothesis that holds `NAMED`, else the fewest that hold `HELD`."""
     ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
     if ranked and ranked[0][1] >= NAMED:
-        return tuple(ranked[0][0].split(" + "))
+        return (ranked[0][0],)
     found: list[str] = []
     held = 0.0
     for name, weight in ranked:
         if held >= HELD or weight <= 0.0:
             break
-        found += [part for part in name.split(" + ") if part not in found]
+        found.append(name)
         held += weight
     return tuple(found)
 
@@ -166,10 +178,12 @@ class _Work:
         squares = -2.0 * score.log_likelihood - self.problem.scatter.log_determinant
         return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
 
-    def posterior(self, none: bool, names: Sequence[str]) -> dict[str, float]:
-        """Probabilities of the base model (if it stands) and of single effects; 0 for all others."""
+    def posterior(self, none: bool, names: Sequence[str], pairs: Sequence[Pair] = ()) -> dict[str, float]:
+        """Probabilities of the base model (if it stands), of single effects and of pairs; 0 for all others."""
         evidence = {f.name: self.evidence(f.log_evidence, f.best or self.base) for f in self.families}
+        evidence |= {pair.name: self.evidence(pair.log_evidence, pair.score) for pair in pairs}
         prior = {name: PRIOR_SINGLES / max(len(self.families), 1) for name in names}
+        prior |= {pair.name: self.pair_prior for pair in pairs}
         return probabilities(
             {NONE: self.evidence(self.base.log_evidence, self.base)} | evidence,
             prior | ({NONE: PRIOR_NONE} if none else {}),
@@ -191,23 +205,34 @@ class _Work:
                 passed.append(family.name)
         return passed
 
+    @property
+    def pair_prior(self) -> float:
+        """Prior probability of one pair."""
+        return PRIOR_PAIRS / max(len(self.families) * (len(self.families) - 1) // 2, 1)
+
+    def adequate_pairs(self, start: str = "") -> list[Pair]:
+        """Pairs that pass the absolute gate and beat each member alone; of the best singles, or of one that stands."""
+        starts = [f for f in self.families if f.name == start] or self.families
+        self.pairs = score_pairs(self.problem, self.families, starts)
+        singles = {f.name: f.log_evidence for f in self.families}
+        return [
+            pair
+            for pair in self.pairs[:TESTED]
+            if pair.log_evidence > max(singles[member] for member in pair.names) + SURVIVES
+            and self.gate(pair.name, pair.score).probability > ADEQUATE
+        ]
+
     def beyond_singles(self, noise: Noise, base_gate: Gate) -> Judgement:
         """No single effect will do: two, or something else."""
         offered = [f for f in self.families if f.best is not None]
-        self.pairs = score_pairs(self.problem, self.families)
+        pairs = self.adequate_pairs()
         outside, form = -np.inf, ""
         for score in (self.base, *(f.best for f in offered[:2] if f.best is not None)):
             evidence, words = discrepancy_evidence(self.problem, score, self.forms)
             if evidence > outside:
                 outside, form = evidence, words
-        singles = {f.name: f.log_evidence for f in self.families}
-        evidences, prior = {OUTSIDE: outside}, {OUTSIDE: PRIOR_OUTSIDE}
-        number = max(len(self.families) * (len(self.families) - 1) // 2, 1)
-        for pair in self.pairs[:TESTED]:
-            name = " + ".join(pair.names)
-            alone = max(singles[member] for member in pair.names)
-            if self.gate(name, pair.score).probability > ADEQUATE and pair.log_evidence > alone + SURVIVES:
-                evidences[name], prior[name] = pair.log_evidence, PRIOR_PAIRS / number
+        evidences = {OUTSIDE: outside} | {pair.name: pair.log_evidence for pair in pairs}
+        prior = {OUTSIDE: PRIOR_OUTSIDE} | {pair.name: self.pair_prior for pair in pairs}
         posterior = probabilities(evidences, prior)
         if posterior[OUTSIDE] >= STANDS or len(posterior) == 1:
             return self.judgement("unexplained", (), noise, base_gate, posterior, form)
@@ -219,13 +244,13 @@ class _Work:
     def judgement(
         self,
         verdict: str,
-        plausible: tuple[str, ...],
+        explanations: tuple[str, ...],
         noise: Noise,
         base_gate: Gate,
         posterior: dict[str, float],
         form: str,
     ) -> Judgement:
         return Judgement(
-            verdict, plausible, self.problem, noise, self.base, base_gate, tuple(self.families), self.gates,
+            verdict, explanations, self.problem, noise, self.base, base_gate, tuple(self.families), self.gates,
             self.fits, tuple(self.pairs), posterior, form,
         )  # fmt: skip
