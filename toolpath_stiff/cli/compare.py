@@ -1,4 +1,4 @@
-"""`tps compare`: where does the model fail?"""
+"""`tps compare`: see where the model fails."""
 
 from __future__ import annotations
 

@@ -37,7 +37,8 @@ def terminal_text(document: Mapping[str, Any]) -> str:
         lines += [f"  - {plain(one['text'])} (p = {one['p_adjusted']:.2g})" for one in document["hints"]]
     for one in document["findings"]:
         if one["not_told_from"]:
-            lines.append(f"  ({plain(one['pattern'])} looks the same here as: {plain(', '.join(one['not_told_from']))})")
+            others = ", ".join(one["not_told_from"])
+            lines.append(f"  ({plain(one['pattern'])} looks the same here as: {plain(others)})")
     lines += ["", "checks without a model"]
     lines += [f"  {plain(one['text'])}" for one in document["model_free"]["checks"]]
     lines += [f"  {one['check']}: {one['reason']}" for one in document["model_free"]["cannot_check"]]
@@ -72,15 +73,20 @@ def _table(document: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _with_unit(name: str, unit: str) -> str:
+    """A heading: "tilt_deg", unless the name says the unit already."""
+    suffix = unit.replace("/", "_per_").replace("%", "percent")
+    return name if name.endswith(suffix) else f"{name}_{suffix}"
+
+
 def residuals_csv(found: Comparison) -> str:
-    """One row a reading: measured, modelled, error, scatter, and every variable that the residuals were held against."""
+    """One row a reading: measured, modelled, error, scatter, and every variable that residuals were held against."""
     data = found.data
     own = [one for one in found.numbers if one.name not in ("x", "y", "height", "order")]
     head = [
         "file", "line", "point", "setup", "clamp", "plane", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg",
-        "c_deg", "dx", "dy", "dz", "measured_N_per_mm", "modelled_N_per_mm", "error_percent", "measured_over_modelled_percent",
-        "scatter_percent", *(f"{one.name}_{one.unit.replace('/', '_per_').replace('%', 'percent')}".rstrip("_")
-                             if one.unit and not one.name.endswith(one.unit.replace("/", "_per_")) else one.name for one in own),
+        "c_deg", "dx", "dy", "dz", "measured_N_per_mm", "modelled_N_per_mm", "error_percent",
+        "measured_over_modelled_percent", "scatter_percent", *(_with_unit(one.name, one.unit) for one in own),
     ]  # fmt: skip
     along, where = directions(data), planes(data)
     out = io.StringIO()

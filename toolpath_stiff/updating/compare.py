@@ -53,6 +53,8 @@ class Comparison:
         (n,) ln(measured / modelled).
     scatter
         (n,) standard deviation of `residual` from scatter alone, under the last noise.
+    covariance
+        (n, n) of the residuals under the last noise, with the excess scatter that was found.
     numbers, names
         What the residuals were held against.
     shares
@@ -67,6 +69,7 @@ class Comparison:
     log_model: FloatArray
     residual: FloatArray
     scatter: FloatArray
+    covariance: FloatArray
     numbers: tuple[Variable, ...]
     names: tuple[Label, ...]
     shares: Shares
@@ -153,17 +156,19 @@ def compare(
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         answers = list(pool.map(answer, noises))
     document = _document(predictor, answers, residual, looked_for, numbers, cannot, notes, seed)
-    scatter = np.sqrt(answers[-1].structure.scatter_square)
+    last = answers[-1]
+    whole = last.scattering.covariance + last.structure.excess**2 * (place[:, None] == place[None, :])
     return Comparison(
-        predictor, data, noises, log_model, residual, scatter, tuple(numbers), tuple(names),
-        load_path_shares(predictor.base, data), document,
+        predictor, data, noises, log_model, residual, np.sqrt(last.scattering.square), whole, tuple(numbers),
+        tuple(names), load_path_shares(predictor.base, data), document,
     )  # fmt: skip
 
 
 def _places(data: Measurements) -> NDArray[np.int64]:
     """(n,) number of the place: pose, direction, tool and set-up, whatever the load and the repeat."""
     columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
-    columns += [data.tool_extension[:, None], np.unique(data.setup, return_inverse=True)[1].reshape(-1, 1)]
+    setup = np.unique(data.setup, return_inverse=True)[1].astype(float)
+    columns += [data.tool_extension[:, None], setup.reshape(-1, 1)]
     found = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
     return np.asarray(found.reshape(-1), dtype=np.int64)
 
@@ -202,7 +207,7 @@ def _figures(residual: FloatArray, answers: list[_Answer], rows: NDArray[np.bool
     found["scatter_rms_percent"] = {}
     found["explained_by_scatter_percent"] = {}
     for one in answers:
-        square = float(one.structure.scatter_square[rows].mean())
+        square = float(one.scattering.square[rows].mean())
         found["scatter_rms_percent"][one.noise.name] = 100.0 * square**0.5
         share = min(1.0, square / max(float((residual[rows] ** 2).mean()), 1e-300))
         found["explained_by_scatter_percent"][one.noise.name] = 100.0 * share
@@ -240,13 +245,15 @@ def _document(
     by_plane = _by(where, residual, answers)
     for name, figures in by_plane.items():
         figures["z_mm"] = float(mm_from_m(data.position[where == name, 2]).mean())
+    by_plane = dict(sorted(by_plane.items(), key=lambda item: item[1]["z_mm"]))
     along = directions(data)
     cells = np.array([f"{p} / {d}" for p, d in zip(where, along, strict=True)])
     free = [dict(one) for one in answers[-1].model_free]
     for i, one in enumerate(free):
         one["holds"] = any(a.model_free[i]["holds"] for a in answers)
         one["p_adjusted"] = max(a.model_free[i]["p_adjusted"] for a in answers)
-        one["text"] = next(a.model_free[i]["text"] for a in reversed(answers) if a.model_free[i]["holds"] == one["holds"])
+        same = [a.model_free[i] for a in answers if a.model_free[i]["holds"] == one["holds"]]
+        one["text"] = same[-1]["text"]
     document: dict[str, Any] = {
         "machine": predictor.machine.name,
         "data": list(dict.fromkeys(data.file.tolist())),

@@ -55,8 +55,8 @@ def merged_findings(
     fewest = min(by_noise, key=lambda name: len(by_noise[name]))
     kept = []
     for one in by_noise[fewest]:
-        p = max(tests[name].get(one["pattern"], 1.0) for name in by_noise if name != fewest) if len(by_noise) > 1 else 0.0
-        worst = max(one["p_adjusted"], p)
+        others = [tests[name].get(one["pattern"], 1.0) for name in by_noise if name != fewest]
+        worst = max([one["p_adjusted"], *others])
         if worst < SIGNIFICANT:
             kept.append({**one, "p_adjusted": worst})
     return kept
@@ -77,7 +77,8 @@ def overall_text(document: dict[str, Any]) -> str:
         name = noise["name"]
         scatter, share = figures["scatter_rms_percent"][name], figures["explained_by_scatter_percent"][name]
         p = figures["probability"][name]
-        known = {"low": "with the low guess of the noise", "high": "with the high guess"}.get(name, "with the noise " + name)
+        guesses = {"low": "with the low guess of the noise", "high": "with the high guess"}
+        known = guesses.get(name, f"with the noise {name}")
         parts.append(f"{known} scatter would leave {scatter:.1f} % rms, {share:.0f} % of the mean square (p = {p:.2g})")
     text += " " + "; ".join(parts)[0].upper() + "; ".join(parts)[1:] + "."
     if not document["findings"]:

@@ -40,10 +40,8 @@ class Shares:
 
 def load_path_shares(model: StiffnessModel, data: Measurements) -> Shares:
     """Shares at the measured poses, each counted once."""
-    keys = np.concatenate(
-        [data.position, data.angles, data.tool_extension[:, None], np.unique(data.setup, return_inverse=True)[1][:, None]],
-        axis=1,
-    )
+    setup = np.unique(data.setup, return_inverse=True)[1]
+    keys = np.concatenate([data.position, data.angles, data.tool_extension[:, None], setup[:, None]], axis=1)
     distinct = data.select(np.unique(np.round(keys, 9), axis=0, return_index=True)[1])
     by_axis = []
     for axis in np.eye(3):
@@ -59,11 +57,11 @@ def _by_link(model: StiffnessModel, data: Measurements) -> FloatArray:
     wrenches = np.zeros((len(data), 6, 1))
     wrenches[:, :3, 0] = data.direction
     links = exact.assemble_links(model, path)
-    twists, forces = exact.respond(path, links, wrenches)
+    _, forces = exact.respond(path, links, wrenches)
     if model.load_dependent:
         path = replace(path, strut_forces=forces[..., 0] * path.force[:, None])
         links = exact.assemble_links(model, path)
-        twists, forces = exact.respond(path, links, wrenches)
+        _, forces = exact.respond(path, links, wrenches)
     f, w = forces[..., 0], wrenches[..., 0]
     loads = np.concatenate([f, w], axis=1)
     columns = [*(f**2 / path.machine.strut_law.stiffness(path.struts.lengths)).T]

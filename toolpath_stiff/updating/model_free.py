@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.noise import repeat_groups
 from toolpath_stiff.updating.residual_variables import directions, radius
-from toolpath_stiff.units import mm_from_m
 
 FloatArray = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def model_free_checks(machine: Machine, data: Measurements) -> tuple[list[Check]
             if turns
             else "the machine has no symmetry",
         ),
-        ("proportionality", list(_proportionality(data, "force_N" in data.missing)), "no pose was measured at two loads"),
+        ("proportionality", list(_proportionality(data)), "no pose was measured at two loads"),
         ("set-ups", list(_setups(data)), "no pose was measured in two set-ups"),
     ):
         checks += found
@@ -154,12 +154,12 @@ def _mean(n: int, rows: NDArray[np.int64], weight: float = 1.0) -> FloatArray:
 
 
 def _on_axis(data: Measurements, cells: dict[tuple[Any, ...], NDArray[np.int64]]) -> Iterator[Check]:
-    """ln k_x - ln k_y at upright poses on the axis."""
+    """Differences ln k_x - ln k_y at upright poses on the axis."""
     for (pose, rest, direction), rows in cells.items():
         i = int(rows[0])
         if abs(direction[0]) != 1.0 or radius(data)[i] > SAME or np.abs(data.angles[i, :2]).max() > UPRIGHT:
             continue
-        across = next((other for (p, r, d), other in cells.items() if p == pose and r == rest and abs(d[1]) == 1.0), None)
+        across = next((rows for key, rows in cells.items() if key[:2] == (pose, rest) and abs(key[2][1]) == 1.0), None)
         if across is not None:
             weights = _mean(len(data), rows) - _mean(len(data), across)
             at = f"z = {mm_from_m(float(data.position[i, 2])):.0f} mm{_rest_words(rest)}"
@@ -167,7 +167,7 @@ def _on_axis(data: Measurements, cells: dict[tuple[Any, ...], NDArray[np.int64]]
                 "threefold symmetry on the axis",
                 weights,
                 f"On the axis at {at}, X against Y: {{percent}}",
-                "the three legs, the table or the instruments are not alike (table, set-up, gauge, one strut or vertex)",
+                "the three legs, table or instruments are not alike (table, set-up, gauge, one strut or vertex)",
             )
 
 
@@ -214,13 +214,13 @@ def _is_image(data: Measurements, q: FloatArray, i: int, j: int) -> bool:
 
 
 def _named(direction: tuple[float, ...]) -> str:
-    named = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}
+    named: dict[tuple[float, ...], str] = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}
     return named.get(tuple(abs(v) for v in direction), "({:.2g}, {:.2g}, {:.2g})".format(*direction))
 
 
-def _proportionality(data: Measurements, unknown: bool) -> Iterator[Check]:
+def _proportionality(data: Measurements) -> Iterator[Check]:
     """Slope of ln k over ln F within readings that differ in the load only, for a doubling of the load."""
-    if unknown:
+    if "force_N" in data.missing:
         return
     columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
     columns += [data.tool_extension[:, None]]

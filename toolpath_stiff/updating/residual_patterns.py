@@ -104,18 +104,25 @@ def sentence(
     unit = f" {numbers[pattern.variable].unit}".rstrip()
     if pattern.kind == "curve":
         middle, ends = found.coefficient * float(x.min()), found.coefficient * float(x.max())
-        how = "stiffer in the middle of the range than at its ends" if middle > ends else "softer in the middle"
-        how += "" if middle > ends else " of the range than at its ends"
         size = percent(middle - ends)
-        return f"{who}: {how} of {pattern.place}, by {abs(size):.2g} % ({readings})", size
+        how = "stiffer" if middle > ends else "softer"
+        return (
+            f"{who} {how} against the model at middling values of {pattern.place} than at its extremes, by "
+            f"{abs(size):.2g} % ({readings})"
+        ), size
     low, high = int(np.argmin(values)), int(np.argmax(values))
     first_end, last_end = mean + found.coefficient * float(x[low]), mean + found.coefficient * float(x[high])
     size = percent(last_end - first_end)
-    grows = "stiffer" if size > 0 else "softer"
+    becomes = "stiffer" if size > 0 else "softer"
     return (
-        f"{who} ever {grows} against the model with {pattern.place}: {signed(percent(first_end))} at "
-        f"{values[low]:.4g}{unit}, {signed(percent(last_end))} at {values[high]:.4g}{unit} ({readings})"
+        f"{who} {becomes} against the model as {pattern.place} grows: {signed(percent(first_end))} at "
+        f"{_short(float(values[low]))}{unit}, {signed(percent(last_end))} at {_short(float(values[high]))}{unit} "
+        f"({readings})"
     ), size
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
 def _level_words(

@@ -101,8 +101,6 @@ class Structure:
         Relative sd from place to place beyond the noise, before and after taking the patterns out.
     probability
         Of residuals this large in scatter alone.
-    scatter_square
-        (n,) mean square of each residual in scatter alone.
     """
 
     found: tuple[Found, ...]
@@ -110,7 +108,6 @@ class Structure:
     excess: float
     excess_left: float
     probability: float
-    scatter_square: FloatArray
 
 
 class Scattering:
@@ -143,6 +140,8 @@ class Scattering:
         self.weights = 1.0 / np.sqrt(1.0 + EXCESSES[:, None] ** 2 * np.maximum(spread, 0.0))  # (g, n)
         self.covariance = covariance
         self.sd = np.sqrt(np.diag(covariance))
+        # Wild readings included; how well the noise itself is known is not.
+        self.square = np.diag(covariance) + noise.repeat**2 * noise.outliers * (noise.outlier_width**2 - 1.0)
         self.repeated = len(place) - len(set(place.tolist()))
         rng = np.random.default_rng(seed)
         self._normal, self._of_place = self._draw(noise, covariance, place, draws, rng)
@@ -200,7 +199,7 @@ class _Fit:
         scaled = np.abs(rest) / self.scattering.sd
         # 0.6745: the median of the size of a standard normal variable.
         bound = WILD * np.maximum(np.median(scaled, axis=1, keepdims=True) / 0.6745, 1.0) * self.scattering.sd
-        return np.clip(rest, -bound, bound)
+        return np.asarray(np.clip(rest, -bound, bound))
 
     def _squares(self, turned: FloatArray, grid: int) -> FloatArray:
         rows = turned * self.scattering.weights[grid]
@@ -288,7 +287,7 @@ def find_structure(
     square = scattering.turned(residual[None])[0] ** 2
     simulated = (scattering.turned(scattering.draws(0.0)) ** 2).sum(axis=1)
     probability = (1.0 + float((simulated >= square.sum()).sum())) / (1.0 + len(simulated))
-    return Structure(tuple(found), tests, excess, left, probability, (scattering.draws(0.0) ** 2).mean(axis=0))
+    return Structure(tuple(found), tests, excess, left, probability)
 
 
 def _answers(fit: _Fit, at: int, factor: float, t: FloatArray, p: FloatArray) -> list[Found]:

@@ -34,7 +34,7 @@ class Variable:
     name
         Short name, for files.
     title
-        As a sentence needs it: "growing height".
+        As a sentence needs it: "the height".
     unit
         Unit of `values`, a shop unit; may be empty.
     values
@@ -115,21 +115,21 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
     along_tool = np.einsum("ni,ni->n", data.direction, turn[:, :, 2]) ** 2
     off_axis = radius(data) > SAME_PLANE
     found = [
-        Variable("order", "the order of measuring", "", np.arange(1.0, len(data) + 1.0)),
-        Variable("height", "growing height", "mm", mm_from_m(data.position[:, 2])),
+        Variable("order", "the reading's place in the measuring order", "", np.arange(1.0, len(data) + 1.0)),
+        Variable("height", "the height", "mm", mm_from_m(data.position[:, 2])),
         Variable("x", "X", "mm", mm_from_m(data.position[:, 0])),
         Variable("y", "Y", "mm", mm_from_m(data.position[:, 1])),
         Variable("radius", "the distance from the axis", "mm", mm_from_m(radius(data))),
         Variable("cos_3_azimuth", "the cosine of 3 x azimuth", "", np.where(off_axis, np.cos(3 * azimuth), np.nan)),
         Variable("sin_3_azimuth", "the sine of 3 x azimuth", "", np.where(off_axis, np.sin(3 * azimuth), np.nan)),
-        Variable("tilt", "growing tilt", "deg", deg_from_rad(tilt)),
+        Variable("tilt", "the tilt", "deg", deg_from_rad(tilt)),
         *(
             Variable(f"{name}_angle", f"the {name} angle", "deg", deg_from_rad(data.angles[:, i]))
             for i, name in enumerate(("roll", "pitch", "yaw"))
         ),
         Variable("along_tool", "the load's alignment with the tool axis", "", along_tool),
         Variable("vertical_share", "the load's vertical share", "", data.direction[:, 2] ** 2),
-        Variable("mean_strut_length", "mean strut length", "mm", lengths.mean(axis=1)),
+        Variable("mean_strut_length", "the mean strut length", "mm", lengths.mean(axis=1)),
         Variable("max_strut_length", "the longest strut's length", "mm", lengths.max(axis=1)),
         Variable("min_strut_length", "the shortest strut's length", "mm", lengths.min(axis=1)),
         *(
@@ -139,11 +139,12 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
         Variable("model_stiffness", "the modelled stiffness", "N/mm", n_per_mm_from_n_per_m(np.exp(log_model))),
         Variable("deflection", "the modelled deflection", "um", um_from_m(data.force / np.exp(log_model))),
     ]
+    extension = mm_from_m(data.tool_extension)
     columns = [
-        ("force_N", Variable("force_N", "growing force", "N", data.force)),
-        ("time_min", Variable("time_min", "time", "min", data.time / 60.0)),
-        ("temperature_C", Variable("temperature_C", "temperature", "C", data.temperature)),
-        ("tool_extension_mm", Variable("tool_extension_mm", "tool length", "mm", mm_from_m(data.tool_extension))),
+        ("force_N", Variable("force_N", "the force", "N", data.force)),
+        ("time_min", Variable("time_min", "the time since zeroing", "min", data.time / 60.0)),
+        ("temperature_C", Variable("temperature_C", "the temperature", "C", data.temperature)),
+        ("tool_extension_mm", Variable("tool_extension_mm", "the tool's extra length", "mm", extension)),
     ]
     found += [variable for column, variable in columns if column not in data.missing]
     if "temperature_C" in data.missing and np.isfinite(data.temperature).any():

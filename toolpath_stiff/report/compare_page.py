@@ -1,0 +1,286 @@
+"""A comparison as a page: how far off, where, then each picture under the question that it answers. No network.
+
+Everything from a file is escaped, and a content security policy lets the page load nothing and run nothing.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import re
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.report.compare_machine import machine_png
+from toolpath_stiff.report.compare_pictures import measured_modelled_png, planes_png, strips_png
+from toolpath_stiff.report.compare_variables import load_path_png, variables_png
+from toolpath_stiff.report.wording import plain
+
+if TYPE_CHECKING:
+    from toolpath_stiff.updating.compare import Comparison
+
+# Picture -> the question that it answers, and how it is read.
+QUESTIONS = {
+    "measured_modelled.png": (
+        "How wrong is the model, biased or scattered?",
+        "A cloud beside the line is a bias; as wide as its bars, scatter; one direction off alone points to a gauge, "
+        "a table or a spindle.",
+    ),
+    "planes.png": (
+        "Z against X and Y? Upper against lower plane?",
+        "Standard errors hold the scatter of readings, clampings and struts, and what scatters more than these from "
+        "place to place. They are taken one by one; the findings above are corrected for looking at many places.",
+    ),
+    "machine.png": (
+        "Where does the model fail? Alike all around, or on one side?",
+        "Three times the same around the axis: geometry or the law of all struts. One side only: one strut, one joint, "
+        "the table, or a cable.",
+    ),
+    "strips.png": (
+        "Drift, a bad clamping, one bad reading?",
+        "A slope is drift, a step is a clamping, a lone bar is a reading to take again.",
+    ),
+    "variables.png": (
+        "Which variable is missing?",
+        "The most telling first. A trend in one direction of load alone says more than one in all: compare with what "
+        "every effect of the catalogue would do with tps diagnose.",
+    ),
+    "load_path.png": (
+        "Which link takes what share of the compliance?",
+        "A missing compliance must fit between the model's bar and the measured one; a link that takes little "
+        "cannot be the cause unless it is badly wrong.",
+    ),
+}
+MOST_ROWS = 40  # of patterns; all are in compare.json
+MOST_FAR_OFF = 20
+
+
+def compare_pictures(found: Comparison) -> dict[str, bytes]:
+    """All pictures, by file name."""
+    return {
+        "measured_modelled.png": measured_modelled_png(found),
+        "planes.png": planes_png(found),
+        "machine.png": machine_png(found),
+        "strips.png": strips_png(found),
+        "variables.png": variables_png(found),
+        "load_path.png": load_path_png(found),
+    }
+
+
+def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
+    """The page's text, the pictures within."""
+    document = found.document
+    files = ", ".join(document["data"])
+    about = [f"{document['readings']} readings", files, f"machine {document['machine']}"]
+    sections = [
+        _section("Findings" if document["findings"] else "No pattern stands out from scatter", _findings(document)),
+        _picture("measured_modelled.png", pictures),
+        _section("Errors by direction, plane and set-up", _errors(document)),
+        _picture("planes.png", pictures),
+        _picture("machine.png", pictures),
+        _picture("strips.png", pictures),
+        _section("Readings far off", _far_off(document)),
+        _picture("variables.png", pictures),
+        _section("Checks without a model", _model_free(document)),
+        _picture("load_path.png", pictures),
+        _section("All patterns looked for", _tests(document)),
+        _section("How much readings scatter", _noise(document)),
+        _section("Not tested", _bullets(document["not_tested"])),
+        _section("Assumptions", _bullets([*document["assumptions"], *document["notes"]])),
+    ]
+    parts = {
+        "title": _text(files),
+        "headline": _text(_headline(document)),
+        "text": _text(document["text"]),
+        "about": _text("   ·   ".join(about)),
+        "figures": _figures(document),
+        "warnings": "\n".join(f'<p class="warning">{_text(warning)}</p>' for warning in document["warnings"]),
+        "sections": "\n".join(section for section in sections if section),
+        "footer": f"tps compare, seed {document['seed']}",
+    }
+    template = resources.files("toolpath_stiff.report").joinpath("assets", "compare.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+
+
+def _headline(document: Mapping[str, Any]) -> str:
+    """The strongest finding, or that there is none."""
+    if document["findings"]:
+        return str(document["findings"][0]["text"])
+    return f"{document['baseline']['mean_abs_error_percent']:.2g} % off in the mean, without a pattern"
+
+
+def _text(value: object) -> str:
+    return html.escape(plain(str(value)))
+
+
+def _section(title: str, body: str) -> str:
+    return f"<section><h2>{_text(title)}</h2>{body}</section>" if body else ""
+
+
+def _bullets(sentences: Sequence[object]) -> str:
+    return "<ul>" + "".join(f"<li>{_text(sentence)}</li>" for sentence in sentences) + "</ul>" if sentences else ""
+
+
+def _picture(name: str, pictures: Mapping[str, bytes]) -> str:
+    question, reading = QUESTIONS[name]
+    source = base64.b64encode(pictures[name]).decode("ascii")
+    image = f'<img alt="{_text(question)}" src="data:image/png;base64,{source}">'
+    # The picture shows its question itself, for whoever opens it alone.
+    return f'<section><h2 class="unseen">{_text(question)}</h2>{image}<p class="muted">{_text(reading)}</p></section>'
+
+
+def _table(head: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]], numeric: Sequence[int] = ()) -> str:
+    """A table of (class, texts); the columns `numeric` are aligned to the right. Empty without rows."""
+
+    def cells(tag: str, row: Sequence[str]) -> str:
+        return "".join(
+            f"<{tag}{' class=num' if i in numeric else ''}>{_text(cell)}</{tag}>" for i, cell in enumerate(row)
+        )
+
+    body = "".join(f'<tr class="{kind}">{cells("td", row)}</tr>' for kind, row in rows)
+    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>" if rows else ""
+
+
+def _figures(document: Mapping[str, Any]) -> str:
+    """The few figures that say it all."""
+    base, noise = document["baseline"], document["noise"]
+    refit = base["strut_law_refitted"]
+    scatter = " to ".join(f"{base['scatter_rms_percent'][one['name']]:.1f}" for one in noise)
+    share = " to ".join(f"{base['explained_by_scatter_percent'][one['name']]:.0f}" for one in noise)
+    found = [
+        (f"{base['mean_abs_error_percent']:.2f} %", "mean |model - measured| / measured"),
+        (f"{base['bias_percent']:+.1f} %", "bias; positive: the model is too stiff"),
+        (f"{base['rms_percent']:.1f} %", "rms error"),
+        (f"{scatter} %", "rms that scatter alone would leave"),
+        (f"{share} %", "of the mean square is scatter"),
+    ]
+    if refit:
+        found.append((f"{refit['mean_abs_error_percent']:.2f} %", "mean error with the strut law refitted"))
+    return "".join(f"<li><b>{_text(value)}</b><span>{_text(name)}</span></li>" for value, name in found)
+
+
+def _findings(document: Mapping[str, Any]) -> str:
+    """Findings with their probabilities, or the strongest hints."""
+    entries = document["findings"] or document["hints"]
+    rows = []
+    for one in entries:
+        after = one.get("after_strut_law_refit")
+        rows.append(
+            (
+                "finding" if document["findings"] else "out",
+                (
+                    one["text"],
+                    f"{one['statistic']:+.1f}",
+                    f"{one['p_adjusted']:.2g}",
+                    "-" if not after else f"{after['p_adjusted']:.2g}",
+                    ", ".join(one["not_told_from"]) or "-",
+                ),
+            )
+        )
+    head = ("finding" if document["findings"] else "the strongest hints", "t", "p, corrected",
+            "p if the strut law is refitted", "looks the same in these data")  # fmt: skip
+    return _table(head, rows, range(1, 4))
+
+
+def _errors(document: Mapping[str, Any]) -> str:
+    """Errors by direction, plane and set-up, beside those of scatter alone."""
+    levels = [("all readings", document["baseline"])]
+    for title, key in (("direction", "by_direction"), ("", "by_plane"), ("set-up", "by_setup")):
+        if len(document[key]) > 1:
+            levels += [(f"{title} {name or '(none)'}".strip(), figures) for name, figures in document[key].items()]
+    names = [one["name"] for one in document["noise"]]
+    rows = [
+        (
+            "",
+            (
+                name,
+                str(one["readings"]),
+                f"{one['mean_abs_error_percent']:.2f} %",
+                f"{one['bias_percent']:+.1f} %",
+                f"{one['rms_percent']:.1f} %",
+                *(f"{one['scatter_rms_percent'][noise]:.1f} %" for noise in names),
+            ),
+        )
+        for name, one in levels
+    ]
+    head = ["", "readings", "mean error", "bias", "rms", *(f"rms of scatter alone ({name})" for name in names)]
+    return _table(head, rows, range(1, len(head)))
+
+
+def _far_off(document: Mapping[str, Any]) -> str:
+    rows = [
+        (
+            "",
+            (
+                f"{one['file']}:{one['line']}",
+                one["direction"],
+                one["point"],
+                f"{one['off_percent']:+.0f} %",
+                f"{one['standard_deviations']:+.1f}",
+            ),
+        )
+        for one in document["far_off"][:MOST_FAR_OFF]
+    ]
+    head = ("line", "direction", "point", "beside the findings", "standard deviations")
+    return _table(head, rows, (3, 4))
+
+
+def _model_free(document: Mapping[str, Any]) -> str:
+    """Checks that need no stiffness model, and why others cannot be made."""
+    found = document["model_free"]
+    rows = [
+        (
+            "" if one["holds"] else "finding",
+            (one["check"], one["text"], f"{one['statistic']:+.1f}", f"{one['p_adjusted']:.2g}"),
+        )
+        for one in found["checks"]
+    ]
+    rows += [("out", (one["check"], f"not checked: {one['reason']}", "", "")) for one in found["cannot_check"]]
+    return _table(("principle", "result", "t", "p, corrected"), rows, (2, 3))
+
+
+def _tests(document: Mapping[str, Any]) -> str:
+    """The strongest patterns, each on its own."""
+    tests = document["tests"]
+    rows = [
+        (
+            "",
+            (
+                one["pattern"],
+                one["kind"],
+                str(one["readings"]),
+                f"{one['statistic']:+.1f}",
+                f"{one['p_adjusted']:.2g}",
+            ),
+        )
+        for one in tests[:MOST_ROWS]
+    ]
+    table = _table(("pattern", "kind", "readings", "t", "p, corrected"), rows, (2, 3, 4))
+    if not table:
+        return ""
+    remark = f"{len(tests)} patterns were looked for, each on its own here"
+    remark += f"; the strongest {MOST_ROWS} are shown, all are in compare.json." if len(tests) > MOST_ROWS else "."
+    return f"<details><summary>{_text(remark)}</summary>{table}</details>"
+
+
+def _noise(document: Mapping[str, Any]) -> str:
+    base = document["baseline"]
+    rows = [
+        (
+            "",
+            (
+                one["name"],
+                f"{one['repeat_percent']:.2g} %",
+                f"{one['clamping_percent']:.2g} %",
+                f"{one['strut_spread_percent']:.2g} %",
+                f"{base['excess_scatter_percent'][one['name']]:.2g} %",
+                f"{base['probability'][one['name']]:.2g}",
+                one["origin"],
+            ),
+        )
+        for one in document["noise"]
+    ]
+    head = ("noise", "reading", "clamping", "struts", "beyond it, place to place", "p of residuals this large",
+            "origin")  # fmt: skip
+    return _table(head, rows, range(1, 6))

@@ -1,0 +1,201 @@
+"""Residuals against everything that the model does not use, and the load path as a waterfall."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.report.compare_pictures import RESIDUAL_AXIS, heading, in_percent
+from toolpath_stiff.report.figure import INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
+from toolpath_stiff.report.wording import plain, shortened
+from toolpath_stiff.updating.residual_structure import SIGNIFICANT
+from toolpath_stiff.updating.residual_variables import directions
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from toolpath_stiff.updating.compare import Comparison
+    from toolpath_stiff.updating.residual_variables import Label, Variable
+
+FloatArray = NDArray[np.float64]
+
+ACROSS = 5  # panels in a row
+MOST_NAMES = 8  # levels of a label that are written out
+NM_PER_N = 1e9
+LINKS = ("#2457a6", "#7ea6d8")  # struts, alternating
+EFFECT, MISSING = "#de6b12", "#9aa5b1"
+
+
+def variables_png(found: Comparison) -> bytes:
+    """PNG: residual against each variable, the most telling first."""
+    limits = _limits(found)
+    panels: list[tuple[float, str, Variable | Label]] = []
+    held_against: list[Variable | Label] = [*found.numbers, *found.names]
+    for one in held_against:
+        tests = [t for t in found.document["tests"] if _about(t["variable"], one.name)]
+        p = min((t["p_adjusted"] for t in tests), default=1.0)
+        strongest = max((abs(t["statistic"]) for t in tests), default=0.0)
+        panels.append((-strongest, f"p = {p:.2g}" + ("" if p >= SIGNIFICANT else " *"), one))
+    panels.sort(key=lambda panel: panel[0])
+    rows = -(-len(panels) // ACROSS)
+    with house_style():
+        width, height = 15.0, 1.15 + 2.35 * max(rows, 1)
+        figure = new_figure(width, height)
+        for k, (_, p, one) in enumerate(panels):
+            i, j = divmod(k, ACROSS)
+            x, y = 0.6 + 2.88 * j, height - 1.15 - 2.35 * (i + 1) + 0.62
+            axes = figure.add_axes((x / width, y / height, 2.62 / width, 1.45 / height))
+            _panel(axes, found, one)
+            axes.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
+            axes.set_ylim(*limits)
+            axes.tick_params(labelsize=7.5, pad=2)
+            if j:
+                axes.set_yticklabels([])
+            unit = f", {unit}" if (unit := getattr(one, "unit", "")) else ""
+            axes.set_title(shortened(plain(one.name.replace("_", " ")) + unit, 30), fontsize=9, pad=3)
+            axes.set_title(
+                p, fontsize=8.5, pad=3, loc="right", weight="bold" if p.endswith("*") else "normal",
+                color=UNREACHABLE_RED if p.endswith("*") else MUTED,
+            )  # fmt: skip
+        _key(figure, found)
+        heading(
+            figure,
+            "Which variable is missing?",
+            f"{RESIDUAL_AXIS}, against what the model does not use; lines: one direction's own trend; p: of the "
+            "strongest pattern in it, corrected for all patterns looked for",
+        )
+        return png_bytes(figure)
+
+
+def _about(variable: str, name: str) -> bool:
+    """Whether a pattern's variable is this one, or a level of this label."""
+    return variable == name or variable.startswith(f"{name} ")
+
+
+def _limits(found: Comparison) -> tuple[float, float]:
+    values = in_percent(found.residual)
+    margin = 0.08 * max(float(np.ptp(values)), 0.1)
+    return float(values.min()) - margin, float(values.max()) + margin
+
+
+def _key(figure: object, found: Comparison) -> None:
+    from matplotlib.figure import Figure
+
+    assert isinstance(figure, Figure)
+    width, height = figure.get_size_inches()
+    present = [axis for axis in DIRECTION_COLOURS if (directions(found.data) == axis).any()]
+    for i, axis in enumerate(reversed(present)):
+        figure.text(
+            1.0 - (0.4 + 0.5 * i) / width, 1.0 - 0.4 / height, "\u25cf " + axis, color=DIRECTION_COLOURS[axis], size=11,
+            weight="bold", ha="right",
+        )  # fmt: skip
+
+
+def _panel(axes: Axes, found: Comparison, one: Variable | Label) -> None:
+    """Points by direction; a trend line a direction, or the means of levels."""
+    residual, along = in_percent(found.residual), directions(found.data)
+    if one.values.dtype.kind == "f":
+        x = np.asarray(one.values, dtype=float)
+        names: list[str] = []
+    else:
+        levels = np.unique(one.values)
+        x = np.searchsorted(levels, one.values).astype(float)
+        names = [str(level) for level in levels]
+    present = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
+    for k, axis in enumerate(present):
+        rows = (along == axis) & np.isfinite(x)
+        if not rows.any():
+            continue
+        shift = 0.16 * (k - (len(present) - 1) / 2.0) if 0 < len(names) <= MOST_NAMES else 0.0
+        colour = DIRECTION_COLOURS[axis]
+        axes.plot(x[rows] + shift, residual[rows], "o", color=colour, ms=2.6 if len(x) > 100 else 4, mew=0, alpha=0.55)
+        if names:
+            for level in range(len(names)) if len(names) <= MOST_NAMES else []:
+                chosen = rows & (x == level)
+                if chosen.any():
+                    mean = float(residual[chosen].mean())
+                    at = level + shift
+                    axes.plot([at - 0.09, at + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
+        elif float(np.ptp(x[rows])) > 0.0 and rows.sum() > 2:
+            slope, level = np.polyfit(x[rows] - x[rows].mean(), residual[rows], 1)
+            ends = np.array([x[rows].min(), x[rows].max()])
+            axes.plot(ends, level + slope * (ends - x[rows].mean()), color=colour, lw=1.3, zorder=4)
+    if names and len(names) <= MOST_NAMES:
+        room = max(int(46 / len(names)) - 2, 4)
+        axes.set_xticks(range(len(names)), [shortened(plain(_brief(name)) or "(none)", room) for name in names])
+        axes.set_xlim(-0.5, len(names) - 0.5)
+    elif names:
+        axes.set_xticks([0, len(names) - 1], ["first", f"last of {len(names)}"])
+    else:
+        axes.locator_params(axis="x", nbins=4)
+
+
+def _brief(name: str) -> str:
+    """A level's name without what the panel's title says."""
+    for word in ("plane at z = ", " plane", " the axis", " third", "from", " mm"):
+        name = name.replace(word, "")
+    return name
+
+
+def load_path_png(found: Comparison) -> bytes:
+    """PNG: compliance of the tip along X, Y, Z, link by link, and what the measurements add or take."""
+    shares = found.shares
+    compliance = shares.compliance * NM_PER_N
+    along = directions(found.data)
+    ratio = np.array([_measured_over_modelled(found, along == axis) for axis in "XYZ"])
+    with house_style():
+        width, height = 13.0, 5.6
+        figure = new_figure(width, height)
+        top = 1.18 * float(np.nanmax(compliance.sum(axis=1) * np.fmax(ratio, 1.0)))
+        for i, axis in enumerate("XYZ"):
+            axes = figure.add_axes(((0.75 + 4.1 * i) / width, 1.35 / height, 3.8 / width, 3.05 / height))
+            _waterfall(axes, compliance[i], shares.links, float(ratio[i]))
+            axes.set_ylim(0.0, top)
+            axes.set_title(f"{axis}: {compliance[i].sum():.1f} nm/N modelled", color=DIRECTION_COLOURS[axis])
+            if i:
+                axes.set_yticklabels([])
+            else:
+                axes.set_ylabel("compliance of the tip, nm/N")
+        poses = f"{shares.poses} measured poses"
+        heading(
+            figure,
+            "Which link takes what share of the compliance?",
+            f"mean over {poses}, link by link; last bars: what the model sums to and what was measured there along "
+            "that direction; 1 nm/N alone is 1000 N/um",
+        )
+        return png_bytes(figure)
+
+
+def _measured_over_modelled(found: Comparison, rows: NDArray[np.bool_]) -> float:
+    """Mean measured compliance over the modelled one; nan without readings along it."""
+    if not rows.any():
+        return float("nan")
+    return float(np.mean(1.0 / found.data.stiffness[rows]) / np.mean(np.exp(-found.log_model[rows])))
+
+
+def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: float) -> None:
+    total = float(parts.sum())
+    below = np.concatenate([[0.0], np.cumsum(parts)])
+    colours = [LINKS[i % 2] if name.startswith("strut ") else EFFECT for i, name in enumerate(links)]
+    names = [name.removeprefix("strut ") if name.startswith("strut ") else name for name in links]
+    for i, (size, colour) in enumerate(zip(parts, colours, strict=True)):
+        axes.bar(i, size, 0.8, bottom=below[i], color=colour)
+        axes.plot([i + 0.4, i + 1.4], [below[i + 1]] * 2, color=MUTED, lw=0.7)
+        axes.text(i, below[i + 1] + 0.012 * total, f"{100 * size / total:.0f} %", ha="center", va="bottom", fontsize=8)
+    at = len(parts)
+    axes.bar(at, total, 0.8, color=INK)
+    names.append("model")
+    if np.isfinite(ratio):
+        axes.bar(at + 1, total * ratio, 0.8, color="white", edgecolor=INK, hatch="////", linewidth=1.0)
+        text = f"{100 * (ratio - 1):+.1f} %"
+        axes.text(at + 1, total * (ratio + 0.012), text, ha="center", va="bottom", fontsize=8.5, weight="bold")
+        names.append("measured")
+    axes.set_xticks(range(len(names)), [shortened(plain(name), 22) for name in names], fontsize=8.5)
+    for label, name in zip(axes.get_xticklabels(), names, strict=True):
+        if len(name) > 2:
+            label.set(rotation=35, ha="right", rotation_mode="anchor")
+    axes.grid(visible=False, axis="x")
+    axes.set_xlabel("strut", fontsize=8.5, loc="left")
