@@ -46,6 +46,7 @@ COMMANDS = (
     Command(
         "diagnose", "which physical effect the model lacks, if any: verdict, candidates, confounding", "Measurements"
     ),
+    Command("update", "fit effects to measurements, watch the error fall, write the machine", "Measurements"),
     Command("plan", "what to measure next to tell explanations apart, or a first campaign", "Measurements"),
     Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements"),
 )

@@ -119,6 +119,51 @@ def _search(predictor: Predictor, start: FloatArray) -> tuple[FloatArray, float]
     return at, error
 
 
+RESAMPLES = 200
+
+
+def leave_points_out(predictor: Predictor, law: FloatArray) -> FloatArray:
+    """(n,) ln measured - ln modelled, each reading by the law with the smallest mean error over the other points.
+
+    nan with fewer than three points.
+    """
+    data = predictor.data
+    labels = np.unique(data.point)
+    residual = np.full(len(data), np.nan)
+    for label in labels if len(labels) > 2 else ():
+        out = data.point == label
+        found = _weighted_search(predictor, (~out).astype(float), law)
+        residual[out] = np.log(data.stiffness[out]) - predictor.log_stiffness(found)[out]
+    return residual
+
+
+def resampled_covariance(predictor: Predictor, law: FloatArray, seed: int = 0, draws: int = RESAMPLES) -> FloatArray:
+    """(2, 2) covariance of the law: the bootstrap over points (Efron and Tibshirani 1993, chapter 6)."""
+    labels, which = np.unique(predictor.data.point, return_inverse=True)
+    rng = np.random.default_rng(seed)
+    laws = []
+    for _ in range(draws):
+        count = np.bincount(rng.integers(len(labels), size=len(labels)), minlength=len(labels))
+        laws.append(_weighted_search(predictor, count[which.reshape(-1)].astype(float), law))
+    return np.asarray(np.cov(np.array(laws).T))
+
+
+def _weighted_search(predictor: Predictor, weight: FloatArray, start: FloatArray) -> FloatArray:
+    """Law with the smallest weighted mean error; the struts' share alone is computed anew."""
+    from scipy.optimize import minimize
+
+    rest = np.exp(-predictor.log_stiffness(start)) - predictor.strut_part(start)
+    measured = predictor.data.stiffness
+
+    def objective(law: FloatArray) -> float:
+        ratio = 1.0 / (measured * (predictor.strut_part(law) + rest))
+        error = float(weight @ np.abs(ratio - 1.0))
+        return error if np.isfinite(error) and (ratio > 0.0).all() else np.inf
+
+    options: Any = {"xatol": 1e-5, "fatol": 1e-7, "initial_simplex": start + FIRST_STEPS}
+    return np.asarray(minimize(objective, start, method="Nelder-Mead", options=options).x)
+
+
 @dataclass(frozen=True)
 class BarCurve:
     """The paper's Figure 3: mean error over the stiffness of the platform's bars.

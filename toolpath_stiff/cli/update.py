@@ -1,0 +1,251 @@
+"""`tps update`: fit effects to measurements, watch the error fall, write the machine that carries them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.cli.arguments import add_json_option, limit_threads
+from toolpath_stiff.cli.diagnose import noise_argument, spread_argument
+from toolpath_stiff.errors import InputError
+
+if TYPE_CHECKING:
+    from toolpath_stiff.machine.model import Machine
+    from toolpath_stiff.updating.measurements import Measurements
+    from toolpath_stiff.updating.strut_law_search import StrutLawSearch
+    from toolpath_stiff.updating.update import Update
+
+EPILOG = """\
+examples:
+  tps update measurements.csv --add joint_compliance -o fitted.toml
+  tps update measurements.csv --add weak_strut:strut=3 --strut-law
+  tps update measurements.csv --auto --strut-law
+  tps update nist-table1 --strut-law --objective mean-error     the paper's own estimation
+
+An effect that the data do not bear is refused, with the reason, unless --force is given; the exit code is 0 all the
+same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another place),
+ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
+"""
+
+OWN_FILES = (
+    "update.json", "residuals.csv", "machine.toml", "ladder.png", "before_after.png", "figure3.csv", "figure3.png",
+    "report.html",
+)  # fmt: skip
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument("data", nargs="+", metavar="DATA", help="measurement files, or nist-table1")
+    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
+    parser.add_argument(
+        "--add", action="append", default=[], metavar="EFFECT[:KEY=VALUE,..]",
+        help="effect to fit; what it acts on is searched unless it is said (weak_strut:strut=3)",
+    )  # fmt: skip
+    parser.add_argument("--strut-law", action="store_true", help="fit the strut law's two stiffnesses along")
+    parser.add_argument(
+        "--auto", action="store_true", help="add effects as long as the error at left-out points falls and data bear it"
+    )
+    parser.add_argument("--force", action="store_true", help="write what the data do not bear as well")
+    parser.add_argument(
+        "--objective", choices=("likelihood", "mean-error"), default="likelihood",
+        help="mean-error: the strut law alone, as the paper fitted it (default: likelihood)",
+    )  # fmt: skip
+    parser.add_argument("--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects")
+    group = parser.add_argument_group("noise")
+    group.add_argument(
+        "--noise", type=noise_argument, metavar="PERCENT[,PERCENT]",
+        help="sd of one reading, re-clamping included; or of the reading alone and of a clamping "
+        "(default: from repeats, else from sd_N_per_mm, else a high guess)",
+    )  # fmt: skip
+    group.add_argument(
+        "--strut-spread", type=spread_argument, default=0.01, metavar="PERCENT",
+        help="of the struts' stiffness (default: 1)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of starts and bootstraps (default: 0)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
+    parser.add_argument("-o", "--output", metavar="MACHINE.toml", help="the new machine file (default: in --out)")
+    parser.add_argument("--out", default="reports/update", metavar="DIR", help="folder (default: reports/update)")
+    parser.add_argument("--no-plots", action="store_true", help="only update.json, residuals.csv and the machine file")
+    add_json_option(parser, "print update.json to standard output and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fit, judge, write. Refusal is success as well."""
+    _check(args)
+    limit_threads(args.jobs)
+    from toolpath_stiff.files import write_atomically
+    from toolpath_stiff.machine import load_machine, machine_toml
+    from toolpath_stiff.report.write import write_folder
+    from toolpath_stiff.updating.measurements import read_measurements
+    from toolpath_stiff.updating.update_document import document, residuals_csv
+
+    machine = load_machine(args.machine)
+    data = read_measurements(args.data, machine)
+    update, search = _update(args, machine, data)
+    provenance = _provenance(args, update)
+    updated = update.fitted(provenance) if update.accepted else None
+    machine_file = args.output or str(Path(args.out) / "machine.toml")
+    found = document(
+        update, updated, files=args.data, machine_file=machine_file if updated is not None else None,
+        provenance=provenance, seed=args.seed,
+    )  # fmt: skip
+    if search is not None:
+        found["search"] = _search(search)
+    contents: dict[str, str | bytes] = {
+        "update.json": json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        "residuals.csv": residuals_csv(update),
+    }
+    if updated is not None and args.output is None:
+        contents["machine.toml"] = machine_toml(updated, _preamble(found))
+    if search is not None:
+        contents |= _figure3(args, machine, data)
+    if not args.no_plots:
+        _say("drawing")
+        contents |= _pictures(found, update)
+    _say("")
+    written = write_folder(args.out, contents, OWN_FILES)
+    if updated is not None and args.output is not None:
+        written.append(write_atomically(Path(args.output), machine_toml(updated, _preamble(found))))
+    if args.json:
+        print(contents["update.json"], end="")
+    else:
+        from toolpath_stiff.report.update_text import terminal_text
+
+        print(terminal_text(found))
+        print("\n".join(["written:", *(f"  {file}" for file in written)]))
+    return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    for option, least in (("seed", 0), ("jobs", 1)):
+        if getattr(args, option) < least:
+            raise InputError(f"--{option} {getattr(args, option)}", expected=f"{least} or more")
+    if args.objective == "mean-error" and (args.add or args.auto or not args.strut_law):
+        raise InputError(
+            "--objective mean-error is the paper's own estimation, of the strut law alone",
+            expected="--strut-law, without --add and --auto",
+            hint="effects are fitted by likelihood",
+        )
+
+
+def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> tuple[Update, StrutLawSearch | None]:
+    if args.objective == "mean-error":
+        from toolpath_stiff.updating.mean_error_update import update_by_mean_error
+
+        return update_by_mean_error(
+            machine, data, noise=args.noise, strut_spread=args.strut_spread, seed=args.seed, progress=_say,
+            effect_files=args.effects,
+        )  # fmt: skip
+    from toolpath_stiff.updating.additions import parse_addition
+    from toolpath_stiff.updating.update import update
+
+    additions = [parse_addition(text, data, args.effects) for text in args.add]
+    found = update(
+        machine, data, additions, strut_law=args.strut_law, auto=args.auto, force=args.force, noise=args.noise,
+        strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed, progress=_say,
+    )  # fmt: skip
+    return found, None
+
+
+def _say(text: str) -> None:
+    """One line of progress, where someone watches."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\x1b[K{text}")
+        sys.stderr.flush()
+
+
+def _provenance(args: argparse.Namespace, update: Update) -> dict[str, Any]:
+    """Where the fitted values come from. No date: the same data and command give the same bytes."""
+    from toolpath_stiff.updating.provenance import data_hash
+
+    return {
+        "data": list(args.data),
+        "data_sha256": data_hash(args.data),
+        "readings": len(update.data),
+        "command": _command(args),
+        "noise": update.noise.origin,
+        "mean_error_before_percent": round(100.0 * float(update.steps[0].fit.errors.mean()), 3),
+        "mean_error_after_percent": round(100.0 * float(update.last.fit.errors.mean()), 3),
+        "left_out_error_after_percent": round(100.0 * update.last.held.mean_error, 3),
+    }
+
+
+def _command(args: argparse.Namespace) -> str:
+    """The command that repeats the fit; where its results go does not matter."""
+    words = ["tps", "update", *args.data]
+    words += ["--machine", args.machine] if args.machine != "nist" else []
+    words += [word for one in args.add for word in ("--add", one)]
+    words += [f"--{name}" for name in ("strut-law", "auto", "force") if getattr(args, name.replace("-", "_"))]
+    words += ["--objective", args.objective] if args.objective != "likelihood" else []
+    words += [word for one in args.effects for word in ("--effects", one)]
+    if args.noise is not None:
+        both = args.noise if isinstance(args.noise, tuple) else (args.noise,)
+        words += ["--noise", ",".join(f"{100.0 * part:.10g}" for part in both)]
+    words += ["--strut-spread", f"{100.0 * args.strut_spread:.10g}"] if args.strut_spread != 0.01 else []
+    words += ["--seed", str(args.seed)] if args.seed else []
+    return " ".join(words)
+
+
+def _preamble(found: dict[str, Any]) -> str:
+    from textwrap import fill
+
+    provenance = found["provenance"]
+    return "\n".join(
+        [
+            fill(f"Machine {found['machine']}, updated. {found['text']}", 110),
+            f"Command: {provenance['command']}",
+            f"SHA-256 of the data: {provenance['data_sha256']}",
+            "",
+        ]
+    )
+
+
+def _search(search: StrutLawSearch) -> dict[str, Any]:
+    """Starts and ends of the paper's search, in N/um."""
+    import numpy as np
+
+    machine_law = np.array([search.strut_law.stiffness_1, search.strut_law.stiffness_2]) / np.exp(search.law) / 1e6
+    return {
+        "starts_N_per_um": np.round(machine_law * np.exp(search.starts), 3).tolist(),
+        "ends_N_per_um": np.round(machine_law * np.exp(search.ends), 3).tolist(),
+        "end_errors_percent": np.round(100.0 * search.end_errors, 4).tolist(),
+        "agreeing": search.agreeing,
+    }
+
+
+def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> dict[str, str | bytes]:
+    """The paper's Figure 3 as data and, unless pictures are off, drawn."""
+    from toolpath_stiff.updating.strut_law_search import bar_curve, bar_curve_csv
+
+    if any(entry.name == "platform_flexibility" for entry in machine.effects):
+        return {}
+    _say("the platform's bars, soft to rigid")
+    curve = bar_curve(machine, data, seed=args.seed, starts=1)
+    found: dict[str, str | bytes] = {"figure3.csv": bar_curve_csv(curve)}
+    if not args.no_plots:
+        from toolpath_stiff.report.update_pictures import figure3_png
+
+        found["figure3.png"] = figure3_png(curve.bars[:-1], 100.0 * curve.error[:-1])
+    return found
+
+
+def _pictures(found: dict[str, Any], update: Update) -> dict[str, str | bytes]:
+    from toolpath_stiff.report.update_pictures import before_after_png, error_ladder_png
+
+    last = found["steps"][-1]
+    called = " ".join(step["name"] for step in found["steps"][1:]) or "as given"
+    entry = {"effect": called, "held_out_error_percent": last["held_out_error_percent"]}
+    drawn = before_after_png(
+        {"verdict": found["verdict"], "baseline": found["baseline"], "candidates": [entry], "best": called},
+        update.data, update.steps[0].fit.residual, update.last.fit.residual if update.changed else None,
+        names=("as given", called),
+    )  # fmt: skip
+    return {
+        "ladder.png": error_ladder_png(found["steps"], found["noise_floor_percent"]),
+        "before_after.png": drawn,
+    }
