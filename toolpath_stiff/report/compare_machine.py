@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.report.compare_pictures import RESIDUAL_AXIS, heading, in_percent
-from toolpath_stiff.report.figure import GRID, INK, MUTED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.compare_pictures import heading, in_percent
+from toolpath_stiff.report.figure import GRID, INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.residual_variables import directions, planes
@@ -25,7 +25,7 @@ Place = tuple[float, float, float, float]  # x, y, width, height
 BAR, GAP = 5.0, 1.0  # points, width of a bar and space between two
 TALLEST = 30.0  # points, of the largest residual
 MERGED = 0.03  # of the picture's width: poses closer than this in the view share a glyph
-SEEN = 0.5  # m of the machine shown about the poses at most
+LEFT, PANEL, WIDEST, NARROWEST = 0.8, 3.65, 15.0, 8.6  # inches: margin, a square panel, the picture
 
 
 def machine_png(found: Comparison) -> bytes:
@@ -36,29 +36,30 @@ def machine_png(found: Comparison) -> bytes:
     along = directions(data)
     axes_shown = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     largest = _largest(found)
-    columns = max(len(order), 2)
     with house_style():
-        side, width = 3.35, 0.75 + 3.55 * columns
-        width = max(width, 8.6)
-        height = 1.25 + side + 0.75 + 3.9
+        pitch = min(PANEL, WIDEST / (len(order) + 1))
+        width = max(LEFT + pitch * (len(order) + 1), NARROWEST)
+        pitch = (width - LEFT) / (len(order) + 1)
+        height = 1.55 + pitch + 4.1
         figure = new_figure(width, height)
-        pitch = (width - 0.75) / columns
-        reach = _reach(data.position[:, :2])
         for i, plane in enumerate(order):
-            place = (0.75 + i * pitch * columns / len(order), 3.9 + 0.75, min(pitch, 3.55) - 0.35, side - 0.15)
+            place = (LEFT + i * pitch, 4.75, pitch - 0.45, pitch - 0.45)
             axes = figure.add_axes(_relative(place, width, height))
-            _from_above(axes, found, where == plane, reach)
+            _from_above(axes, found)
             z = found.document["by_plane"][plane]["z_mm"]
-            name = "from above" if len(order) == 1 else plane
-            axes.set_title(f"{name}, z {z:.0f} mm" if "=" not in name else name, fontsize=10)
+            axes.set_title("from above" if len(order) == 1 else _plane_title(plane, z), fontsize=10)
             axes.set_xlabel("X mm", fontsize=9)
             if i == 0:
                 axes.set_ylabel("Y mm", fontsize=9)
             _glyphs(axes, found, mm_from_m(data.position[:, :2]), where == plane, axes_shown, largest)
-        half = (width - 0.75) / 2.0
+        place = (LEFT + len(order) * pitch, 4.75, pitch - 0.45, pitch - 0.45)
+        _whole_machine(figure.add_axes(_relative(place, width, height)), found)
+        half = (width - LEFT) / 2.0
         for i, across in enumerate((0, 1)):
-            axes = figure.add_axes(_relative((0.75 + i * half, 0.55, half - 0.4, 3.3), width, height))
-            _from_side(axes, found, across)
+            axes = figure.add_axes(_relative((LEFT + i * half, 0.55, half - 0.45, 3.3), width, height))
+            axes.set_xlim(*mm_from_m(_margins(data.position[:, across], 0.18)))
+            axes.set_ylim(*mm_from_m(_margins(data.position[:, 2], 0.26)))
+            axes.tick_params(labelsize=8)
             axes.set_title(f"from the {'front' if across == 0 else 'right'}", fontsize=10)
             axes.set_xlabel(f"{'XY'[across]} mm", fontsize=9)
             if i == 0:
@@ -68,8 +69,8 @@ def machine_png(found: Comparison) -> bytes:
         heading(
             figure,
             "Where does the model fail? Alike all around, or on one side?",
-            f"{RESIDUAL_AXIS}: bar up, stiffer than modelled; bar down, softer; the tallest is {largest:.0f} %. "
-            "Poses that fall together in a view: their mean",
+            f"bar up: measured stiffer than modelled; down: softer; the tallest is {largest:.0f} %; "
+            "poses that fall together in a view: their mean",
         )
         _key(figure, axes_shown, width, height)
         return png_bytes(figure)
@@ -78,6 +79,18 @@ def machine_png(found: Comparison) -> bytes:
 def _relative(place: Place, width: float, height: float) -> Place:
     x, y, w, h = place
     return x / width, y / height, w / width, h / height
+
+
+def _plane_title(plane: str, z_mm: float) -> str:
+    """A plane and its height, unless its name says it."""
+    return plane if "=" in plane else f"{plane}, {'mean ' if 'third' in plane else ''}z {z_mm:.0f} mm"
+
+
+def _margins(values: FloatArray, share: float) -> FloatArray:
+    """Range of values with a share of it on both sides, m."""
+    low, high = float(values.min()), float(values.max())
+    pad = share * max(high - low, 0.15)
+    return np.array([low - pad, high + pad])
 
 
 def _key(figure: Any, axes_shown: list[str], width: float, height: float) -> None:
@@ -91,49 +104,52 @@ def _largest(found: Comparison) -> float:
     return max(float(np.quantile(np.abs(in_percent(found.residual)), 0.98)), 0.5)
 
 
-def _reach(flat: FloatArray) -> tuple[FloatArray, float]:
-    """Centre and half width of a square view of points (n, 2), m."""
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    return (low + high) / 2.0, 0.62 * max(float((high - low).max()), 0.1)
+def _from_above(axes: Axes, found: Comparison) -> None:
+    """The machine's axis in the middle, the directions of the frame's joints, numbered, and circles of distance."""
+    from matplotlib.patches import Circle
 
-
-def _from_above(axes: Axes, found: Comparison, rows: NDArray[np.bool_], reach: tuple[FloatArray, float]) -> None:
-    """The machine's axis, the poles of the joints' azimuths, circles of distance."""
-    centre, half = reach
-    axes.set_xlim(*mm_from_m(np.array([centre[0] - half, centre[0] + half])))
-    axes.set_ylim(*mm_from_m(np.array([centre[1] - half, centre[1] + half])))
+    half = 1.36 * max(float(np.abs(found.data.position[:, :2]).max()), 0.1)
+    axes.set_xlim(*mm_from_m(np.array([-half, half])))
+    axes.set_ylim(*mm_from_m(np.array([-half, half])))
     axes.set_aspect("equal")
     axes.grid(visible=False)
-    frame = found.predictor.base.machine.frame_joints
-    for i, (x, y) in enumerate(frame[:, :2]):
-        direction = np.array([x, y]) / max(float(np.hypot(x, y)), 1e-9)
-        axes.plot(*np.outer([0.0, 1e5], direction).T, color=GRID, lw=1.0, zorder=0)
-        edge = 0.9 * mm_from_m(half) / max(float(np.abs(direction).max()), 1e-9)
-        at = edge * direction
-        if abs(at[0] - mm_from_m(centre[0])) < mm_from_m(half) and abs(at[1] - mm_from_m(centre[1])) < mm_from_m(half):
-            axes.annotate(str(i + 1), tuple(at), ha="center", va="center", fontsize=7.5, color=MUTED, zorder=0.5)
+    for share in (0.37, 0.74):
+        axes.add_patch(Circle((0.0, 0.0), mm_from_m(share * half), fc="none", ec=GRID, lw=1.0, zorder=0))
+    frame = found.predictor.base.machine.frame_joints[:, :2]
+    azimuths = np.round(np.degrees(np.arctan2(frame[:, 1], frame[:, 0])), 1)
+    for azimuth in np.unique(azimuths):
+        direction = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))])
+        axes.plot(*mm_from_m(np.outer(direction, [0.0, 0.86 * half])), color=GRID, lw=1.0, zorder=0)
+        name = "+".join(str(i + 1) for i in np.flatnonzero(azimuths == azimuth))
+        x, y = mm_from_m(0.94 * half * direction)
+        axes.annotate(name, (x, y), ha="center", va="center", fontsize=7.5, color=MUTED, zorder=0.5)
     axes.plot(0.0, 0.0, "+", color=MUTED, ms=9, zorder=0.5)
     axes.tick_params(labelsize=8)
 
 
-def _from_side(axes: Axes, found: Comparison, across: int) -> None:
-    """Struts of the mean measured pose, faint, behind the poses."""
-    data = found.data
-    flat = data.position[:, [across, 2]]
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    pad = 0.18 * np.maximum(high - low, 0.15)
-    axes.set_xlim(*mm_from_m(np.array([low[0] - pad[0], high[0] + pad[0]])))
-    axes.set_ylim(*mm_from_m(np.array([low[1] - 1.4 * pad[1], high[1] + 1.4 * pad[1]])))
-    axes.grid(visible=False)
-    machine = found.predictor.base.machine
-    tip = np.array([[0.0, 0.0, float(high[1])]])
-    joints = (tip + solve_struts(machine, tip).arms[0])[:, [across, 2]]
-    for i in range(6):
-        ends = np.stack([joints[i], machine.frame_joints[i, [across, 2]]])
-        axes.plot(*mm_from_m(ends).T, color=GRID, lw=1.6, zorder=0)
-    order = np.argsort(joints[:, 0], kind="stable")
-    axes.plot(*mm_from_m(joints[order]).T, color="#cbd2d9", lw=1.6, zorder=0)
+def _whole_machine(axes: Axes, found: Comparison) -> None:
+    """Struts and platform with the tool at the middle of the measured poses, which are boxed, from the front."""
+    from matplotlib.patches import Rectangle
+
+    machine, position = found.predictor.base.machine, found.data.position
+    low, high = position.min(axis=0), position.max(axis=0)
+    tip = ((low + high) / 2.0)[None]
+    joints = tip[0] + solve_struts(machine, tip).arms[0]
+    for joint, vertex in zip(joints, machine.frame_joints, strict=True):
+        axes.plot(*mm_from_m(np.stack([joint, vertex])[:, [0, 2]]).T, color="#b8c1cc", lw=1.6, zorder=1)
+        axes.plot(*mm_from_m(vertex[[0, 2]]), "o", color=MUTED, ms=4, zorder=2)
+        axes.plot(*mm_from_m(np.stack([joint, tip[0]])[:, [0, 2]]).T, color=MUTED, lw=1.6, zorder=2)
+    size = mm_from_m(np.maximum(high - low, 0.06))
+    corner = mm_from_m((low + high) / 2.0) - size / 2.0
+    axes.add_patch(
+        Rectangle((corner[0], corner[2]), size[0], size[2], fc="#f7d9dd", ec=UNREACHABLE_RED, lw=1.2, zorder=0.5)
+    )
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
     axes.tick_params(labelsize=8)
+    axes.set_title("the machine, from the front", fontsize=10)
+    axes.locator_params(axis="x", nbins=4)
+    axes.set_xlabel("X mm; red: measured", fontsize=9)
 
 
 def _glyphs(

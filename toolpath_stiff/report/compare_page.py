@@ -162,25 +162,23 @@ def _figures(document: Mapping[str, Any]) -> str:
 
 def _findings(document: Mapping[str, Any]) -> str:
     """Findings with their probabilities, or the strongest hints."""
-    entries = document["findings"] or document["hints"]
+    if not document["findings"]:
+        hints = [("out", (*_said(one), _alike(one))) for one in document["hints"]]
+        return _table(("the strongest hints", "t", "p, corrected", "looks the same in these data"), hints, (1, 2))
     rows = []
-    for one in entries:
+    for one in document["findings"]:
         after = one.get("after_strut_law_refit")
-        rows.append(
-            (
-                "finding" if document["findings"] else "out",
-                (
-                    one["text"],
-                    f"{one['statistic']:+.1f}",
-                    f"{one['p_adjusted']:.2g}",
-                    "-" if not after else f"{after['p_adjusted']:.2g}",
-                    ", ".join(one["not_told_from"]) or "-",
-                ),
-            )
-        )
-    head = ("finding" if document["findings"] else "the strongest hints", "t", "p, corrected",
-            "p if the strut law is refitted", "looks the same in these data")  # fmt: skip
+        rows.append(("finding", (*_said(one), f"{after['p_adjusted']:.2g}" if after else "-", _alike(one))))
+    head = ("finding", "t", "p, corrected", "p if the strut law is refitted", "looks the same in these data")
     return _table(head, rows, range(1, 4))
+
+
+def _said(one: Mapping[str, Any]) -> tuple[str, str, str]:
+    return one["text"], f"{one['statistic']:+.1f}", f"{one['p_adjusted']:.2g}"
+
+
+def _alike(one: Mapping[str, Any]) -> str:
+    return ", ".join(one["not_told_from"]) or "-"
 
 
 def _errors(document: Mapping[str, Any]) -> str:

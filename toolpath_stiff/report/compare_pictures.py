@@ -113,7 +113,7 @@ def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict
         if (along == axis).any():
             figures = found.document["by_direction"][axis]
             mean, bias = figures["mean_abs_error_percent"], figures["bias_percent"]
-            text = f"{axis}: mean error {mean:.1f} %, bias {bias:+.1f} %"
+            text = f"{axis}: mean error {mean:.1f} %, model {abs(bias):.1f} % too {'stiff' if bias > 0 else 'soft'}"
             keys.append(Line2D([], [], marker="o", ls="", color=colour, label=text))
     if len(shapes) > 1:
         for setup, marker in list(shapes.items())[: len(MARKERS)]:
@@ -132,7 +132,7 @@ def strips_png(found: Comparison) -> bytes:
     edges = np.concatenate([residual, in_percent(-SIDES * found.scatter), in_percent(SIDES * found.scatter)])
     margin = 0.12 * float(np.ptp(edges))
     with house_style():
-        height = 1.45 + 1.9 * len(present)
+        height = 1.3 + 1.9 * len(present)
         figure = new_figure(12.0, height)
         for i, axis in enumerate(present):
             axes = figure.add_axes((0.075, (0.55 + 1.9 * (len(present) - 1 - i)) / height, 0.905, 1.65 / height))

@@ -65,7 +65,7 @@ def _table(document: Mapping[str, Any]) -> list[str]:
             rows += [(f"{title} {plain(name) or '(none)'}".strip(), figures) for name, figures in levels.items()]
     noise = document["noise"][-1]["name"]
     width = max(len(name) for name, _ in rows)
-    head = f"{'':<{width}}  readings  mean error   bias    rms  scatter alone"
+    head = f"{'':<{width}}  readings  mean error   bias    rms  scatter alone   (bias +: model too stiff)"
     return [head] + [
         f"{name:<{width}}  {one['readings']:>8}  {one['mean_abs_error_percent']:>8.2f} % {one['bias_percent']:>+6.1f} "
         f"{one['rms_percent']:>6.1f}  {one['scatter_rms_percent'][noise]:>9.1f} rms"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,39 +24,43 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 ACROSS = 5  # panels in a row
+PITCH = 2.15  # inches from one row of panels to the next
 MOST_NAMES = 8  # levels of a label that are written out
+WIDE = 7.5  # median deviations, some 5 standard deviations: readings further off stand at the edge
 NM_PER_N = 1e9
+LONG_NAME = 10  # letters of a link from which its name, turned, needs more room below
 LINKS = ("#2457a6", "#7ea6d8")  # struts, alternating
 EFFECT, MISSING = "#de6b12", "#9aa5b1"
 
 
 def variables_png(found: Comparison) -> bytes:
-    """PNG: residual against each variable, the most telling first."""
+    """PNG: residual against each variable, the most telling first; readings far off stand at the edge."""
     limits = _limits(found)
     panels: list[tuple[float, str, Variable | Label]] = []
     held_against: list[Variable | Label] = [*found.numbers, *found.names]
     for one in held_against:
-        tests = [t for t in found.document["tests"] if _about(t["variable"], one.name)]
+        tests = [t for t in found.document["tests"] if _about(t, one.name)]
         p = min((t["p_adjusted"] for t in tests), default=1.0)
         strongest = max((abs(t["statistic"]) for t in tests), default=0.0)
         panels.append((-strongest, f"p = {p:.2g}" + ("" if p >= SIGNIFICANT else " *"), one))
     panels.sort(key=lambda panel: panel[0])
     rows = -(-len(panels) // ACROSS)
     with house_style():
-        width, height = 15.0, 1.15 + 2.35 * max(rows, 1)
+        width, height = 15.0, 1.0 + PITCH * max(rows, 1)
         figure = new_figure(width, height)
         for k, (_, p, one) in enumerate(panels):
             i, j = divmod(k, ACROSS)
-            x, y = 0.6 + 2.88 * j, height - 1.15 - 2.35 * (i + 1) + 0.62
+            x, y = 0.6 + 2.88 * j, height - 1.0 - PITCH * (i + 1) + 0.42
             axes = figure.add_axes((x / width, y / height, 2.62 / width, 1.45 / height))
-            _panel(axes, found, one)
+            _panel(axes, found, one, limits)
             axes.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
             axes.set_ylim(*limits)
             axes.tick_params(labelsize=7.5, pad=2)
             if j:
                 axes.set_yticklabels([])
-            unit = f", {unit}" if (unit := getattr(one, "unit", "")) else ""
-            axes.set_title(shortened(plain(one.name.replace("_", " ")) + unit, 30), fontsize=9, pad=3)
+            unit = str(getattr(one, "unit", ""))
+            name = plain(one.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
+            axes.set_title(shortened(name, 30), fontsize=9, pad=3)
             axes.set_title(
                 p, fontsize=8.5, pad=3, loc="right", weight="bold" if p.endswith("*") else "normal",
                 color=UNREACHABLE_RED if p.endswith("*") else MUTED,
@@ -64,21 +69,26 @@ def variables_png(found: Comparison) -> bytes:
         heading(
             figure,
             "Which variable is missing?",
-            f"{RESIDUAL_AXIS}, against what the model does not use; lines: one direction's own trend; p: of the "
-            "strongest pattern in it, corrected for all patterns looked for",
+            f"{RESIDUAL_AXIS}, against what the model does not use; lines: a direction's own trend; p: of the "
+            "strongest pattern, corrected for all that were looked for; triangles: beyond the frame",
         )
         return png_bytes(figure)
 
 
-def _about(variable: str, name: str) -> bool:
-    """Whether a pattern's variable is this one, or a level of this label."""
-    return variable == name or variable.startswith(f"{name} ")
+def _about(test: Mapping[str, Any], name: str) -> bool:
+    """Whether a pattern is about this variable, or a level of this label, or the same as one that is."""
+    about = [test["variable"], *(same.partition(": ")[2] for same in test["same"])]
+    return any(variable == name or variable.startswith(f"{name} ") for variable in about)
 
 
 def _limits(found: Comparison) -> tuple[float, float]:
+    """Range shown: all, but a few wild readings do not squeeze the others."""
     values = in_percent(found.residual)
-    margin = 0.08 * max(float(np.ptp(values)), 0.1)
-    return float(values.min()) - margin, float(values.max()) + margin
+    middle = float(np.median(values))
+    reach = WIDE * float(np.median(np.abs(values - middle)))
+    kept = values[np.abs(values - middle) <= reach] if reach > 0.0 else values
+    margin = 0.08 * max(float(np.ptp(kept)), 0.1)
+    return float(kept.min()) - margin, float(kept.max()) + margin
 
 
 def _key(figure: object, found: Comparison) -> None:
@@ -94,16 +104,15 @@ def _key(figure: object, found: Comparison) -> None:
         )  # fmt: skip
 
 
-def _panel(axes: Axes, found: Comparison, one: Variable | Label) -> None:
+def _panel(axes: Axes, found: Comparison, one: Variable | Label, limits: tuple[float, float]) -> None:
     """Points by direction; a trend line a direction, or the means of levels."""
     residual, along = in_percent(found.residual), directions(found.data)
     if one.values.dtype.kind == "f":
         x = np.asarray(one.values, dtype=float)
         names: list[str] = []
     else:
-        levels = np.unique(one.values)
-        x = np.searchsorted(levels, one.values).astype(float)
-        names = [str(level) for level in levels]
+        names = sorted(set(one.values.tolist()), key=_rank)
+        x = np.array([names.index(level) for level in one.values.tolist()], dtype=float)
     present = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     for k, axis in enumerate(present):
         rows = (along == axis) & np.isfinite(x)
@@ -111,7 +120,12 @@ def _panel(axes: Axes, found: Comparison, one: Variable | Label) -> None:
             continue
         shift = 0.16 * (k - (len(present) - 1) / 2.0) if 0 < len(names) <= MOST_NAMES else 0.0
         colour = DIRECTION_COLOURS[axis]
-        axes.plot(x[rows] + shift, residual[rows], "o", color=colour, ms=2.6 if len(x) > 100 else 4, mew=0, alpha=0.55)
+        size = 2.6 if len(x) > 100 else 4.0
+        off = np.sign(residual) * ((residual < limits[0]) | (residual > limits[1]))
+        for side, marker in ((0, "o"), (1, "^"), (-1, "v")):
+            chosen = rows & (off == side)
+            seen = np.clip(residual[chosen], limits[0] + 0.3, limits[1] - 0.3) if side else residual[chosen]
+            axes.plot(x[chosen] + shift, seen, marker, color=colour, ms=size + abs(side), mew=0, alpha=0.55)
         if names:
             for level in range(len(names)) if len(names) <= MOST_NAMES else []:
                 chosen = rows & (x == level)
@@ -129,8 +143,17 @@ def _panel(axes: Axes, found: Comparison, one: Variable | Label) -> None:
         axes.set_xlim(-0.5, len(names) - 0.5)
     elif names:
         axes.set_xticks([0, len(names) - 1], ["first", f"last of {len(names)}"])
+        axes.get_xticklabels()[1].set(ha="right")
     else:
         axes.locator_params(axis="x", nbins=4)
+
+
+def _rank(name: str) -> tuple[float, str]:
+    """Order of levels: by number if they are numbers, else by letter."""
+    try:
+        return float(_brief(name)), name
+    except ValueError:
+        return float("inf"), name
 
 
 def _brief(name: str) -> str:
@@ -147,11 +170,13 @@ def load_path_png(found: Comparison) -> bytes:
     along = directions(found.data)
     ratio = np.array([_measured_over_modelled(found, along == axis) for axis in "XYZ"])
     with house_style():
-        width, height = 13.0, 5.6
+        longest = max(len(name) for name in shares.links)
+        below = 0.95 if longest <= LONG_NAME else 1.9
+        width, height = 13.0, 4.25 + below
         figure = new_figure(width, height)
         top = 1.18 * float(np.nanmax(compliance.sum(axis=1) * np.fmax(ratio, 1.0)))
         for i, axis in enumerate("XYZ"):
-            axes = figure.add_axes(((0.75 + 4.1 * i) / width, 1.35 / height, 3.8 / width, 3.05 / height))
+            axes = figure.add_axes(((0.75 + 4.1 * i) / width, below / height, 3.8 / width, 3.05 / height))
             _waterfall(axes, compliance[i], shares.links, float(ratio[i]))
             axes.set_ylim(0.0, top)
             axes.set_title(f"{axis}: {compliance[i].sum():.1f} nm/N modelled", color=DIRECTION_COLOURS[axis])
@@ -190,7 +215,7 @@ def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: flo
     names.append("model")
     if np.isfinite(ratio):
         axes.bar(at + 1, total * ratio, 0.8, color="white", edgecolor=INK, hatch="////", linewidth=1.0)
-        text = f"{100 * (ratio - 1):+.1f} %"
+        text = f"{round(100 * (ratio - 1), 1) + 0.0:+.1f} %"
         axes.text(at + 1, total * (ratio + 0.012), text, ha="center", va="bottom", fontsize=8.5, weight="bold")
         names.append("measured")
     axes.set_xticks(range(len(names)), [shortened(plain(name), 22) for name in names], fontsize=8.5)
@@ -198,4 +223,7 @@ def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: flo
         if len(name) > 2:
             label.set(rotation=35, ha="right", rotation_mode="anchor")
     axes.grid(visible=False, axis="x")
-    axes.set_xlabel("strut", fontsize=8.5, loc="left")
+    axes.annotate(
+        "strut", (2.5, 0.0), xycoords=("data", "axes fraction"), xytext=(0, -19), textcoords="offset points",
+        ha="center", va="top", fontsize=8.5, color=MUTED,
+    )  # fmt: skip

@@ -304,6 +304,7 @@ def _tests(answers: list[_Answer], looked_for: list[Pattern]) -> list[dict[str, 
                 "direction": one.direction,
                 "kind": one.kind,
                 "readings": int(one.rows.sum()),
+                "same": list(one.same),
                 "statistic": test.statistic,
                 "p_adjusted": max(t.p_adjusted for t in others),
             }

@@ -38,7 +38,7 @@ def as_finding(
         "kind": pattern.kind,
         "readings": int(pattern.rows.sum()),
         "size_percent": size,
-        "not_told_from": [looked_for[j].name for j in found.alike[:MOST_ALIKE]],
+        "not_told_from": [*pattern.same, *(looked_for[j].name for j in found.alike)][:MOST_ALIKE],
     }
     if refitted is not None:
         test = next((t for t in refitted.tests if t.pattern == found.pattern), None)
@@ -78,8 +78,10 @@ def overall_text(document: dict[str, Any]) -> str:
         scatter, share = figures["scatter_rms_percent"][name], figures["explained_by_scatter_percent"][name]
         p = figures["probability"][name]
         guesses = {"low": "with the low guess of the noise", "high": "with the high guess"}
-        known = guesses.get(name, f"with the noise {name}")
-        parts.append(f"{known} scatter would leave {scatter:.1f} % rms, {share:.0f} % of the mean square (p = {p:.2g})")
+        known = guesses.get(name, f"with the noise as {name}")
+        parts.append(
+            f"{known}, scatter alone would leave {scatter:.1f} % rms, {share:.0f} % of the mean square (p = {p:.2g})"
+        )
     text += " " + "; ".join(parts)[0].upper() + "; ".join(parts)[1:] + "."
     if not document["findings"]:
         text += " No pattern stands out from scatter."

@@ -236,7 +236,8 @@ def _proportionality(data: Measurements) -> Iterator[Check]:
                 "proportionality",
                 np.log(2.0) * x / float((x**2).sum()),
                 f"Load doubled, {name}: {{percent}}",
-                "the stiffness hangs on the load: contacts and clearance stiffen with it, friction softens",
+                "readings hang on the load: contacts, clearance and a drifting indicator make it stiffer with load, "
+                "friction softer",
             )
 
 

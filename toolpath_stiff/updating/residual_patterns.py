@@ -7,6 +7,7 @@ the way they go with a variable.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,15 +25,15 @@ ALL = "all"
 
 
 def patterns(data: Measurements, numbers: list[Variable], names: list[Label]) -> list[Pattern]:
-    """Everything that is looked for in n residuals; patterns equal to one before are left out."""
-    kept: dict[bytes, Pattern] = {}
+    """Everything that is looked for in n residuals; patterns equal to one before are only named with it."""
+    kept: dict[bytes, list[Pattern]] = {}
     for one in _candidates(data, numbers, names):
         centred = one.values - one.values.mean() if one.kind != "level" else one.values
         size = float(np.linalg.norm(centred))
         if size > 1e-9:
             key = np.round(centred / size * np.sign(centred[np.argmax(np.abs(centred))]), 7) + 0.0
-            kept.setdefault(key.tobytes(), one)
-    return list(kept.values())
+            kept.setdefault(key.tobytes(), []).append(one)
+    return [replace(first, same=tuple(one.name for one in others)) for first, *others in kept.values()]
 
 
 def _candidates(data: Measurements, numbers: list[Variable], names: list[Label]) -> Iterator[Pattern]:

@@ -50,6 +50,8 @@ class Pattern:
         (n,) bool, readings that it is about.
     place
         Words: "near the axis at the upper plane"; of a slope, the variable's title.
+    same
+        Names of further patterns that are this one in these data, such as a set-up that is a plane.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Pattern:
     values: FloatArray
     rows: NDArray[np.bool_]
     place: str
+    same: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
