@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.evaluate import PoseStiffness, Progress, evaluate
 from toolpath_stiff.analysis.loads import RULES, Load, parse_load
+from toolpath_stiff.analysis.parameter_band import ParameterBand, parameter_band
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Machine, Pose
 from toolpath_stiff.nc.moves import Moves, Program
@@ -79,6 +81,11 @@ class Analysis:
     def out_of_reach(self) -> BoolArray:
         """(n,) cutting samples that the machine cannot reach."""
         return np.asarray(self.samples.cutting & ~self.at.reachable)
+
+    @cached_property
+    def parameter_band(self) -> ParameterBand | None:
+        """What the uncertainty of the machine's fitted parameters does to the stiffness; None if none is known."""
+        return parameter_band(self)
 
     def to_frame(self) -> pd.DataFrame:
         """The samples as a pandas DataFrame, columns as in `samples.csv` (mm, degrees, N/mm)."""
@@ -267,6 +274,11 @@ def assumptions(analysis: Analysis) -> list[str]:
         f"the strut law is extrapolated outside {mm_from_m(min(law.length_1, law.length_2)):.1f} to "
         f"{mm_from_m(max(law.length_1, law.length_2)):.1f} mm of strut length"
     )
+    if analysis.parameter_band is not None:
+        found.append(
+            "the band of the stiffness holds the uncertainty of the fitted parameters alone, propagated linearly: "
+            f"{', '.join(analysis.parameter_band.names)}"
+        )
     if not analysis.model.effects:
         found.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
     return found

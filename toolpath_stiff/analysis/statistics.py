@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.analysis.parameter_band import band_figures
 from toolpath_stiff.analysis.path_analysis import Analysis, assumptions
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
@@ -93,6 +94,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
     cutting = samples.cutting & analysis.at.reachable
     x, y, z, a, b, c = analysis.origin
     nearest = int(np.argmin(np.where(cutting, analysis.at.margin, np.inf)))
+    band = band_figures(analysis)
     return {
         "program": analysis.program.name,
         "machine": analysis.machine.name,
@@ -106,6 +108,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
         "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
         "time_s": float(samples.t[-1]) if len(samples) else 0.0,
         **stiffness_figures(analysis, counted),
+        **({} if band is None else {"parameter_uncertainty": band}),
         "weakest": describe_sample(analysis, places[0]) if places else None,
         "weakest_places": [describe_sample(analysis, row) for row in places],
         "per_tool": per_tool(analysis),

@@ -238,14 +238,22 @@ def _pictures(found: dict[str, Any], update: Update) -> dict[str, str | bytes]:
     from toolpath_stiff.report.update_pictures import before_after_png, error_ladder_png
 
     last = found["steps"][-1]
-    called = " ".join(step["name"] for step in found["steps"][1:]) or "as given"
+    called = " ".join(last["effects"] and ["+", " + ".join(last["effects"])]) or last["name"]
     entry = {"effect": called, "held_out_error_percent": last["held_out_error_percent"]}
     drawn = before_after_png(
-        {"verdict": found["verdict"], "baseline": found["baseline"], "candidates": [entry], "best": called},
+        {"verdict": found["verdict"], "candidates": [entry], "best": called},
         update.data, update.steps[0].fit.residual, update.last.fit.residual if update.changed else None,
         names=("as given", called),
     )  # fmt: skip
     return {
-        "ladder.png": error_ladder_png(found["steps"], found["noise_floor_percent"]),
+        "ladder.png": error_ladder_png(
+            [_rung(step) for step in found["steps"]], found["noise_floor_percent"], "What each step does to the error"
+        ),
         "before_after.png": drawn,
     }
+
+
+def _rung(step: dict[str, Any]) -> dict[str, Any]:
+    """A step with what its effect acts on below the effect's name."""
+    name, _, choice = step["name"].partition(" (")
+    return {**step, "name": name, "remark": choice.rstrip(")")}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.analysis.parameter_band import NORMAL_95
 from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
 from toolpath_stiff.report.figure import (
     INK,
@@ -34,6 +35,7 @@ BoolArray = NDArray[np.bool_]
 WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
 CURVE_BLUE = "#2b59c3"
+BAND_LABEL = "95 % of the fitted parameters"
 MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
 
 
@@ -55,7 +57,8 @@ def profile_picture(analysis: Analysis, *, other: Analysis | None = None, requir
             (LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, 1.0 - (TOP + BOTTOM) / HEIGHT)
         )
         s, k = profile_curve(analysis)
-        _set_limits(axes, analysis, other, required)
+        band = profile_band(analysis)
+        _set_limits(axes, analysis, other, required, band)
         _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
         _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
         columns = int(axes.get_window_extent().width)
@@ -64,6 +67,8 @@ def profile_picture(analysis: Analysis, *, other: Analysis | None = None, requir
             keep = extremes_by_column(s2, k2, columns)
             name = shortened(plain(other.machine.name), 30)
             axes.plot(s2[keep], k2[keep], color=SECOND_ORANGE, linewidth=1.3, label=name, zorder=3)
+        if band is not None:
+            _draw_band(axes, s, band, columns)
         keep = extremes_by_column(s, k, columns)
         name = shortened(plain(analysis.machine.name), 30)
         axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
@@ -82,6 +87,25 @@ def profile_curve(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
     """Path length in mm and stiffness in N/mm of every sample; nan on rapids and out of reach."""
     stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness)
     return mm_from_m(analysis.samples.s), np.where(analysis.samples.cutting, stiffness, np.nan)
+
+
+def profile_band(analysis: Analysis) -> tuple[FloatArray, FloatArray] | None:
+    """Lower and upper end of the 95 % band of every sample in N/mm, nan as in `profile_curve`; None without a band."""
+    band = analysis.parameter_band
+    if band is None:
+        return None
+    _, k = profile_curve(analysis)
+    reach = NORMAL_95 * n_per_mm_from_n_per_m(band.deviation)
+    return k - reach, k + reach
+
+
+def _draw_band(axes: Axes, s: FloatArray, band: tuple[FloatArray, FloatArray], columns: int) -> None:
+    low, high = band
+    # Rows that keep the extremes of both edges: a band drawn on either's rows alone would cut the other's.
+    keep = np.union1d(extremes_by_column(s, low, columns), extremes_by_column(s, high, columns))
+    axes.fill_between(
+        s[keep], low[keep], high[keep], color=CURVE_BLUE, alpha=0.18, linewidth=0, zorder=3, label=BAND_LABEL
+    )
 
 
 def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
@@ -104,10 +128,16 @@ def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
     return np.asarray(rows[~missing[rows] | fresh[rows]])
 
 
-def _set_limits(axes: Axes, analysis: Analysis, other: Analysis | None, required: float | None) -> None:
+def _set_limits(
+    axes: Axes,
+    analysis: Analysis,
+    other: Analysis | None,
+    required: float | None,
+    band: tuple[FloatArray, FloatArray] | None,
+) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    curves = [profile_curve(a)[1] for a in (analysis, other) if a is not None]
+    curves = [*(profile_curve(a)[1] for a in (analysis, other) if a is not None), *(band or ())]
     low, high = float(min(np.nanmin(k) for k in curves)), float(max(np.nanmax(k) for k in curves))
     if required is not None:
         level = n_per_mm_from_n_per_m(required)

@@ -37,6 +37,7 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
         *_entry("samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
         *_entry("path", _path(summary)),
         *_entry("stiffness", _stiffness(summary)),
+        *_band(summary),
         *_weakest(summary),
         *_entry("limits", _limits(summary)),
         *_entry(
@@ -101,6 +102,20 @@ def _path(summary: Mapping[str, Any]) -> str:
 def _stiffness(summary: Mapping[str, Any]) -> str:
     mean, low, high, span = (number(summary[name]) for name in FIGURES[:4])
     return f"mean {mean} N/mm, min {low}, max {high}, range {span} N/mm"
+
+
+def _band(summary: Mapping[str, Any]) -> list[str]:
+    """What the uncertainty of fitted parameters leaves open, where the machine file tells of it."""
+    band = summary.get("parameter_uncertainty")
+    if not band:
+        return []
+    low, high = (number(end) for end in band["mean_95_N_per_mm"])
+    lowest, highest = (number(end) for end in band["min_95_N_per_mm"])
+    return _entry(
+        "95 % band",
+        f"mean {low} to {high}, min {lowest} to {highest} N/mm, from the fitted parameters alone; widest on line "
+        f"{band['largest_sd_line']} (sd {band['largest_sd_percent']:.1f} %)",
+    )
 
 
 def _weakest(summary: Mapping[str, Any]) -> list[str]:

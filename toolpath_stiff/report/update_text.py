@@ -73,11 +73,9 @@ def _parameters(document: Mapping[str, Any]) -> list[str]:
         found.append(f"strut law  {ends}")
     for effect, entry in last["parameters"].items():
         for key, value in entry.items():
-            if isinstance(value, Mapping):
+            if isinstance(value, Mapping):  # what it acts on stands in the ladder
                 low, high = (_value(end) for end in value["interval"])
                 found.append(f"{effect}  {key} = {_value(value['value'])}   95 %: {low} to {high}")
-            else:
-                found.append(f"{effect}  {key} = {plain(str(value))}")
     return found
 
 

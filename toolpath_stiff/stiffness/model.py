@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.forward import forward_kinematics
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.machine.uncertainty import STRUT_LAW, with_parameter
 from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath, read_parameters
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
@@ -43,12 +44,15 @@ class StiffnessModel:
         Effects that act on readings; only comparisons with measurements use them.
     control
         The machine that the control computes with, where effects make the true one differ unknown to it; else None.
+    given
+        The machine as it was loaded, before geometry effects; None for a model that `build_model` did not make.
     """
 
     machine: Machine
     effects: tuple[ActiveEffect, ...] = ()
     instruments: tuple[ActiveEffect, ...] = ()
     control: Machine | None = None
+    given: Machine | None = None
 
     @property
     def load_dependent(self) -> bool:
@@ -105,13 +109,52 @@ def build_model(
                 f"machine {machine.name}: effect {name} is given twice",
                 hint="keep one of them (finite platform bars count as platform_flexibility)",
             )
-    control = machine
+    return _assembled(machine, acting, reading)
+
+
+def _assembled(given: Machine, acting: Sequence[ActiveEffect], reading: Sequence[ActiveEffect]) -> StiffnessModel:
+    """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
+    machine = control = given
     for active in acting:
         machine = active.effect.geometry(machine, active.values)
         if not active.effect.unknown_to_control:
             control = active.effect.geometry(control, active.values)
     deceived = any(active.effect.unknown_to_control for active in acting)
-    return StiffnessModel(machine, tuple(acting), tuple(reading), control if deceived else None)
+    return StiffnessModel(machine, tuple(acting), tuple(reading), control if deceived else None, given)
+
+
+def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> StiffnessModel:
+    """The model with one of the machine's fitted parameters changed.
+
+    Parameters
+    ----------
+    model
+        As `build_model` made it.
+    name, change
+        A name as in `Uncertainty.names`; what is added to it, in the unit of the machine file's key.
+
+    Raises
+    ------
+    InputError
+        The model has no such parameter, or it leaves its bounds.
+    """
+    if model.given is None:
+        raise InputError(f"a model without its machine has no parameter {name!r}")
+    if name in STRUT_LAW:
+        return _assembled(with_parameter(model.given, name, change), model.effects, model.instruments)
+    owner, _, key = name.partition(".")
+    effects = {"effects": list(model.effects), "instruments": list(model.instruments)}
+    for kind in effects.values():
+        for i, active in enumerate(kind):
+            parameter = next((p for p in active.effect.parameters if p.key == key), None)
+            if active.effect.name == owner and parameter is not None and not parameter.discrete:
+                value = active.values[parameter.name] + change * parameter.si
+                low, high = (bound * parameter.si for bound in parameter.bounds)
+                if not low <= value <= high:
+                    raise InputError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
+                kind[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
+                return _assembled(model.given, effects["effects"], effects["instruments"])
+    raise InputError(f"machine {model.given.name} has no parameter {name!r}")
 
 
 def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:

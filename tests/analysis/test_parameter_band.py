@@ -1,0 +1,147 @@
+"""The band of parameter uncertainty: against differences of whole analyses, closed forms, and its laws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from toolpath_stiff.analysis.path_analysis import analyse
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.machine.model import EffectEntry
+from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty
+from toolpath_stiff.nc import read_program
+from toolpath_stiff.stiffness.model import build_model, with_parameter_moved
+from toolpath_stiff.units import n_per_mm_from_n_per_m
+
+PROGRAM = "G21 G90 G94\nG0 X0 Y0 Z20\nG1 Z0 F600\nG1 X150 F1200\nG1 Y-120\nM30\n"
+NIST = load_machine("nist")
+JOINTS = "joint_compliance.compliance_nm_per_N"
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    file = tmp_path_factory.mktemp("band") / "part.nc"
+    file.write_text(PROGRAM)
+    return read_program(file)
+
+
+def with_uncertainty(names, sd, correlation=None, machine=NIST):
+    matrix = np.eye(len(names)) if correlation is None else np.array(correlation)
+    return machine.with_changes(uncertainty=Uncertainty(tuple(names), np.array(sd, dtype=float), matrix))
+
+
+def soft_joints(machine=NIST, size=5.0):
+    return machine.with_changes(effects=(EffectEntry("joint_compliance", {"compliance_nm_per_N": size}),))
+
+
+def test_a_machine_without_uncertainty_has_no_band(program):
+    found = analyse(NIST, program, step=0.05)
+    assert found.parameter_band is None
+    assert "parameter_uncertainty" not in found.summary()
+
+
+def test_a_law_wrong_by_one_factor_makes_the_stiffness_wrong_by_it(program):
+    """Rigid but for its struts, a machine is as stiff as they are: 2 % in both constants together is 2 % everywhere."""
+    law = NIST.strut_law
+    sd = [0.02 * law.stiffness_1 / 1e6, 0.02 * law.stiffness_2 / 1e6]
+    found = analyse(with_uncertainty(STRUT_LAW, sd, [[1.0, 1.0], [1.0, 1.0]]), program, step=0.05)
+    counted = found.counted
+    relative = found.parameter_band.deviation[counted] / found.at.stiffness[counted]
+    # 2e-4 of it: each constant is moved alone by 0.02 % of itself, over which the stiffness bends by as much.
+    assert relative == pytest.approx(0.02, rel=2e-4)
+    figures = found.summary()["parameter_uncertainty"]
+    assert figures["mean_sd_N_per_mm"] == pytest.approx(0.02 * found.summary()["mean_N_per_mm"], rel=2e-4)
+    assert figures["largest_sd_percent"] == pytest.approx(2.0, rel=2e-4)
+
+
+def test_the_deviation_is_the_move_that_the_parameter_makes(program):
+    machine = with_uncertainty([JOINTS], [0.1], machine=soft_joints())
+    found = analyse(machine, program, step=0.05)
+    up, down = (analyse(soft_joints(size=5.0 + change), program, step=0.05).at.stiffness for change in (0.1, -0.1))
+    counted = found.counted
+    # Half the move between plus and minus one deviation; 0.1 of 20 nm/N bends by (0.5 %)^2.
+    assert found.parameter_band.deviation[counted] == pytest.approx((down - up)[counted] / 2.0, rel=1e-2)
+
+
+def test_it_agrees_with_drawn_parameters(program):
+    """1000 machines drawn from the covariance scatter as the band says."""
+    law, correlation = NIST.strut_law, np.array([[1.0, -0.6], [-0.6, 1.0]])
+    sd = np.array([0.5, 0.4])
+    found = analyse(with_uncertainty(STRUT_LAW, sd, correlation), program, step=0.5)
+    rng = np.random.default_rng(3)
+    drawn = rng.multivariate_normal([0.0, 0.0], np.outer(sd, sd) * correlation, 1000)
+    runs = [
+        analyse(
+            NIST.with_changes(
+                strut_law=replace(law, stiffness_1=law.stiffness_1 + a * 1e6, stiffness_2=law.stiffness_2 + b * 1e6)
+            ),
+            program,
+            step=0.5,
+        ).at.stiffness
+        for a, b in drawn
+    ]
+    # 10 %: a standard deviation of 1000 draws is known to 2.2 %.
+    spread = np.std(runs, axis=0)[found.counted]
+    assert found.parameter_band.deviation[found.counted] == pytest.approx(spread, rel=0.10)
+
+
+def test_errors_of_parameters_do_not_average_out(program):
+    law = NIST.strut_law
+    sd = [0.03 * law.stiffness_1 / 1e6, 0.03 * law.stiffness_2 / 1e6]
+    found = analyse(with_uncertainty(STRUT_LAW, sd, [[1.0, 0.5], [0.5, 1.0]]), program, step=0.01)
+    weight = np.where(found.counted, found.samples.weight, 0.0)
+    deviation = found.parameter_band.deviation[found.counted]
+    assert deviation.min() <= found.parameter_band.deviation_of_mean(weight) <= deviation.max()
+
+
+def test_instruments_act_on_readings_only(program):
+    machine = NIST.with_changes(
+        instruments=(EffectEntry("gauge_scale", {"direction": 1, "setup": "", "scale_percent": 3.0}),)
+    )
+    found = analyse(with_uncertainty(["gauge_scale.scale_percent"], [1.0], machine=machine), program, step=0.05)
+    assert found.parameter_band is None
+
+
+def test_a_parameter_at_its_bound_is_moved_inwards(program):
+    machine = with_uncertainty([JOINTS], [0.5], machine=soft_joints(size=0.0))
+    with pytest.raises(InputError, match=JOINTS):
+        with_parameter_moved(build_model(machine), JOINTS, -0.1)
+    found = analyse(machine, program, step=0.05)
+    assert (found.parameter_band.deviation[found.counted] > 0.0).all()
+
+
+def test_geometry_effects_are_applied_once(program):
+    """The model's machine has the longer tool already; the moved one must not get it twice."""
+    machine = NIST.with_changes(effects=(EffectEntry("tool_length_error", {"error_mm": 20.0}),))
+    model = build_model(machine)
+    same = with_parameter_moved(model, "tool_length_error.error_mm", 0.0)
+    assert np.array_equal(same.machine.platform_joints, model.machine.platform_joints)
+    found = analyse(with_uncertainty(["tool_length_error.error_mm"], [2.0], machine=machine), program, step=0.05)
+    near = analyse(
+        NIST.with_changes(effects=(EffectEntry("tool_length_error", {"error_mm": 22.0}),)), program, step=0.05
+    )
+    moved = np.abs(near.at.stiffness - found.at.stiffness)[found.counted]
+    # 2 mm of tool on arms of 300 mm: the slope changes by a per cent or two over it; small slopes by more.
+    assert found.parameter_band.deviation[found.counted] == pytest.approx(moved, rel=0.05, abs=0.02 * moved.max())
+
+
+def test_no_such_parameter():
+    with pytest.raises(InputError, match="no parameter"):
+        with_parameter_moved(build_model(NIST), "joint_compliance.compliance_nm_per_N", 1.0)
+
+
+def test_the_profile_holds_the_band(program):
+    from toolpath_stiff.report.profile_picture import profile_band, profile_curve, profile_picture
+
+    found = analyse(with_uncertainty(STRUT_LAW, [1.0, 1.0]), program, step=0.05)
+    low, high = profile_band(found)
+    _, k = profile_curve(found)
+    drawn = ~np.isnan(k)
+    assert np.array_equal(np.isnan(low), ~drawn)
+    assert (high - low)[drawn] / 2 / 1.959964 == pytest.approx(
+        n_per_mm_from_n_per_m(found.parameter_band.deviation[drawn]), rel=1e-9
+    )
+    assert profile_picture(found).startswith(b"\x89PNG")
