@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from toolpath_stiff.updating.confounding import CONFOUNDED
 from toolpath_stiff.updating.diagnose import Diagnosis
-from toolpath_stiff.updating.verdict import NONE
+from toolpath_stiff.updating.verdict import FALSE_ALARM, NONE, Judgement
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:
@@ -55,20 +55,11 @@ def _with_chances(diagnosis: Diagnosis) -> list[str]:
 def why(diagnosis: Diagnosis) -> list[str]:
     """The reasons, most important first."""
     main, found = diagnosis.main, []
-    gate = main.base_gate
     if diagnosis.verdict == "adequate":
-        found.append(
-            f"the model alone passes: weighted squares {gate.squares:.4g}, as large or larger in "
-            f"{100 * gate.squares_probability:.2g} % of simulated campaigns; no structure is left "
-            f"(p = {gate.structure_probability:.2g}); the best of all effects gains no more than chance "
-            f"(p = {gate.gain_probability:.2g})"
-        )
+        found += [_base_text(judgement, len(diagnosis.judgements) > 1) for judgement in diagnosis.judgements.values()]
         return found
-    found.append(
-        f"the model alone fails: p = {gate.probability:.2g} (squares {gate.squares_probability:.2g}, structure "
-        f"{gate.structure_probability:.2g}, gain of the best effect {gate.gain_probability:.2g}); what sticks out most "
-        f"is a pattern {gate.worst}"
-    )
+    for judgement in diagnosis.judgements.values():
+        found.append(_base_text(judgement, len(diagnosis.judgements) > 1))
     if diagnosis.verdict == "ambiguous":
         found += _confounded(diagnosis)
     if diagnosis.verdict == "unexplained":
@@ -76,6 +67,24 @@ def why(diagnosis: Diagnosis) -> list[str]:
         if tested:
             found.append(f"even the best explanations leave what noise does not: {', '.join(tested)}")
     return found
+
+
+def _base_text(judgement: Judgement, several: bool) -> str:
+    """How the model alone fares under one noise model."""
+    gate = judgement.base_gate
+    under = f"under the {judgement.noise.name} noise " if several else ""
+    if gate.probability > FALSE_ALARM:
+        return (
+            f"{under}the model alone passes: p = {gate.probability:.2g}; weighted squares {gate.squares:.4g}, as large "
+            f"or larger in {100 * gate.squares_probability:.2g} % of simulated campaigns; no structure is left (p = "
+            f"{gate.structure_probability:.2g}); the best of all effects gains no more than chance (p = "
+            f"{gate.gain_probability:.2g})"
+        )
+    return (
+        f"{under}the model alone fails: p = {gate.probability:.2g} (squares {gate.squares_probability:.2g}, structure "
+        f"{gate.structure_probability:.2g}, gain of the best effect {gate.gain_probability:.2g}); what sticks out most "
+        f"is a pattern {gate.worst}"
+    )
 
 
 def _confounded(diagnosis: Diagnosis) -> list[str]:
