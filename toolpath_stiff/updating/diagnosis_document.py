@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.updating.averaged_interval import averaged_interval
 from toolpath_stiff.updating.candidates import Component
 from toolpath_stiff.updating.confounding import CONFOUNDED
 from toolpath_stiff.updating.diagnose import Diagnosis
@@ -21,6 +22,8 @@ from toolpath_stiff.updating.size_prior import EXPECTED
 from toolpath_stiff.updating.verdict import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, Judgement
 
 FloatArray = NDArray[np.float64]
+
+TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
 
 
 def document(diagnosis: Diagnosis, command: str = "") -> dict[str, Any]:
@@ -205,18 +208,29 @@ def parameters(fit: Fit, family: Family | None = None) -> dict[str, Any]:
 def interval(
     fit: Fit, index: int, component: Component, size: float, family: Family | None = None
 ) -> tuple[float, float]:
-    """95 % interval of a size: from its profile where that was scanned, else normal, within the bounds."""
+    """95 % interval of a size, within the bounds.
+
+    From its profile where that was scanned, averaged over subsets of components where there are several, else normal.
+    """
     low_bound, high_bound = component.bounds
     best = family.best if family is not None else None
     if best is not None and best.interval is not None and index == 0:
-        # The scan ran on the table; the final fit with the model itself may sit a little beside it.
-        low, high = best.interval + (size - float(best.sizes[0][0]))
-        return max(min(float(low), size), low_bound), min(max(float(high), size), high_bound)
+        # The scan ran on the table; the final fit with the model itself may sit a little beside it. What reached to a
+        # bound does so still.
+        shift, near = size - float(best.sizes[0][0]), TOUCHES * float(np.ptp(best.interval))
+        low, high = (float(end) for end in best.interval)
+        low = low_bound if low - low_bound < near else max(min(low + shift, size), low_bound)
+        high = high_bound if high_bound - high < near else min(max(high + shift, size), high_bound)
+        return low, high
+    averaged = None if family is None else averaged_interval(family, index)
     if index in fit.free:
         reach = NORMAL_95 * fit.deviation(index)
-        return max(size - reach, low_bound), min(size + reach, high_bound)
+        low, high = (-reach, reach) if averaged is None or best is None else averaged - float(best.sizes[0][index])
+        return max(size + min(float(low), 0.0), low_bound), min(size + max(float(high), 0.0), high_bound)
     pull, deviation = fit.absent.get(index, (0.0, 0.0))
     upper = max(pull, 0.0) + NORMAL_95 * deviation
+    if averaged is not None:
+        upper = max(upper, float(averaged[1]))
     return max(0.0, low_bound), min(upper, high_bound)
 
 

@@ -31,12 +31,15 @@ class Family:
         The best fit whose sizes lie within their bounds; None if every fit ends at nothing.
     log_evidence
         Averaged over choices and subsets of components: a choice of six costs ln 6.
+    subsets
+        Fits of the choice of `best` with each subset of components that is possible, and their log prior weights.
     """
 
     effect: Effect
     tables: tuple[Table, ...]
     best: Score | None
     log_evidence: float
+    subsets: tuple[tuple[Score, float], ...] = ()
 
     @property
     def name(self) -> str:
@@ -49,19 +52,23 @@ def score_family(problem: Problem, effect: Effect, base: Score) -> Family | None
     data = problem.predictor.data
     tables, evidences = [], []
     best: Score | None = None
+    subsets: tuple[tuple[Score, float], ...] = ()
     for candidate in candidates_of(effect, data):
         table = tabulate(candidate, problem.predictor, np.zeros(2))
         if table is None:
             continue
         tables.append(table)
-        for score, log_weight in _scores(problem, table, base):
+        scores = _scores(problem, table, base)
+        for score, log_weight in scores:
             evidences.append(score.log_evidence + log_weight)
             if score.possible and (best is None or score.log_evidence > best.log_evidence):
                 best = score
+        if best is not None and best.tables[0] is table:
+            subsets = tuple((score, log_weight) for score, log_weight in scores if score.possible)
     if not tables:
         return None
     total = float(np.logaddexp.reduce(evidences)) - np.log(len(tables)) if evidences else NOTHING
-    return Family(effect, tuple(tables), best, total)
+    return Family(effect, tuple(tables), best, total, subsets)
 
 
 def _scores(problem: Problem, table: Table, base: Score) -> list[tuple[Score, float]]:

@@ -30,6 +30,7 @@ USUAL = np.log(10.0)  # distance in ln size from the typical range at which the 
 COMPARABLE = (-0.7, 0.9)
 VISIBLE = 3.0  # whitened length of a signature from which on it can be seen
 FADES = 0.7  # sd by which visibility fades below
+LIKELY = 3.84  # 95 % quantile of chi-square with one degree of freedom
 
 
 @dataclass(frozen=True)
@@ -147,9 +148,18 @@ class SizePrior:
 
 
 def likely_interval(sizes: FloatArray, log_likelihood: FloatArray) -> FloatArray:
-    """(2,) 95 % interval of a size from its likelihood alone at rising sizes (g,) of both signs."""
+    """(2,) 95 % interval of a size from its likelihood alone at rising sizes (g,) of both signs.
+
+    Quantiles, which would always leave out a truth at the bound: where the likelihood there is not small, by the 95 %
+    of a likelihood ratio, the interval reaches to the bound and is one-sided.
+    """
     _, cumulative = _log_integral(sizes, log_likelihood)
-    return np.interp([0.025, 0.975], cumulative, sizes)
+    at_bounds = [float(log_likelihood[end] - log_likelihood.max()) > -0.5 * LIKELY for end in (0, -1)]
+    if at_bounds[0] == at_bounds[1]:
+        found = np.interp([0.025, 0.975], cumulative, sizes)
+        return np.array([sizes[0], sizes[-1]]) if at_bounds[0] else found
+    low, high = np.interp([0.05, 0.95], cumulative, sizes)
+    return np.array([sizes[0], high]) if at_bounds[0] else np.array([low, sizes[-1]])
 
 
 def _log_integral(sizes: FloatArray, logs: FloatArray) -> tuple[float, FloatArray]:
