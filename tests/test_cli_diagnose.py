@@ -1,0 +1,172 @@
+"""`tps diagnose`: what it writes and prints, that it does so again to the byte, and what it refuses without a trace."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+
+import numpy as np
+import pytest
+
+from toolpath_stiff import rig
+from toolpath_stiff.cli.diagnose import OWN_FILES
+from toolpath_stiff.cli.main import main
+
+EFFECT = '''
+from toolpath_stiff.stiffness.effects import Effect, Parameter
+
+
+class Bench(Effect):
+    """A compliance that the readings at the right-hand side see."""
+
+    name = "bench"
+    title = "bench"
+    link = "instrument"
+    equation = "c = c_0 x"
+    source = "made up"
+    parameters = (Parameter("compliance", "nm/N", 1e-9, (0.0, 100.0), (1.0, 10.0), "made up"),)
+
+    def reading(self, stiffness, path, p):
+        return stiffness / (1.0 + p["compliance"] * stiffness * (path.position[:, 0] > 0.1))
+'''
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """A campaign with a weak strut, and one with a spindle that 42 untilted readings cannot tell from a table."""
+    folder = tmp_path_factory.mktemp("campaigns")
+    for name, hidden in (("strut", "weak_strut"), ("spindle", "spindle_compliance")):
+        rows, _ = rig.make_case(7, layout="paper", hidden=hidden, size=0.1)
+        (folder / f"{name}.csv").write_text(rig.csv_text(rows), encoding="utf-8")
+    return folder
+
+
+def test_it_writes_a_report_and_says_what_it_found(files, tmp_path, capsys):
+    out = tmp_path / "found"
+    assert main(["diagnose", str(files / "strut.csv"), "--out", str(out)]) == 0
+    printed = capsys.readouterr()
+    assert "weak_strut" in printed.out and "IDENTIFIED" in printed.out
+    assert "Traceback" not in printed.err
+    written = {file.name for file in out.iterdir()}
+    assert {"diagnose.json", "residuals.csv", "report.html"} <= written <= set(OWN_FILES)
+    for name in written:
+        assert name in printed.out
+    found = json.loads((out / "diagnose.json").read_text("utf-8"))
+    assert found["verdict"] == "identified" and found["plausible"] == ["weak_strut"]
+    page = (out / "report.html").read_text("utf-8")
+    assert "weak_strut" in page
+    # One file that can be sent around: nothing is loaded from elsewhere.
+    assert not re.search(r"""(?:src|href)=["']https?:""", page)
+
+
+def test_residuals_are_those_of_the_measurements(files, tmp_path):
+    out = tmp_path / "found"
+    assert main(["diagnose", str(files / "strut.csv"), "--out", str(out), "--no-plots"]) == 0
+    assert {file.name for file in out.iterdir()} == {"diagnose.json", "residuals.csv"}
+    with (out / "residuals.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    with (files / "strut.csv").open(newline="") as stream:
+        measured = [float(row["stiffness_N_per_mm"]) for row in csv.DictReader(stream)]
+    assert [float(row["stiffness_N_per_mm"]) for row in rows] == measured
+    found = json.loads((out / "diagnose.json").read_text("utf-8"))
+    for when, percent in (
+        ("before", found["baseline"]["mean_abs_error_percent"]),
+        ("after", found["candidates"][0]["mean_abs_error_percent"]),
+    ):
+        shown = np.array([float(row[f"{when}_percent"]) for row in rows])
+        assert np.abs(shown).mean() == pytest.approx(percent, rel=1e-3)
+        modelled = np.array([float(row[f"{when}_N_per_mm"]) for row in rows])
+        # Percentages are printed with three decimals, stiffnesses with one.
+        assert shown == pytest.approx(100.0 * (modelled / np.array(measured) - 1.0), abs=2e-3)
+
+
+def test_the_same_command_writes_the_same_bytes(files, tmp_path, capsys):
+    """Twice into the same folder, once with another number of threads."""
+    texts = []
+    for options in ([], [], ["--jobs", "2"]):
+        out = tmp_path / "again"
+        assert main(["diagnose", str(files / "spindle.csv"), "--no-plots", "--out", str(out), *options]) == 0
+        texts.append([(out / name).read_bytes() for name in ("diagnose.json", "residuals.csv")])
+    assert texts[0] == texts[1] == texts[2]
+    capsys.readouterr()
+
+
+def test_an_ambiguous_verdict_comes_with_what_to_measure_and_what_it_matters(files, tmp_path, capsys):
+    assert main(["diagnose", str(files / "spindle.csv"), "--json", "--no-plots", "--out", str(tmp_path / "o")]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "ambiguous" and "spindle_compliance" in found["plausible"]
+    assert found["why"] and found["next"]
+    assert found["next_measurements"] and all(row["why"] for row in found["next_measurements"])
+    explained = found["path"]["explanations"]
+    assert len(explained) >= 2
+    means = [entry["mean_N_per_mm"] for entry in explained.values()]
+    assert found["path"]["mean_spread_percent"] == pytest.approx(
+        100.0 * (max(means) - min(means)) / np.mean(means), abs=0.01
+    )
+    assert json.loads((tmp_path / "o" / "diagnose.json").read_text("utf-8")) == found
+
+
+def test_the_papers_table_by_its_name_gets_no_confident_name(tmp_path, capsys):
+    out = ["--no-plots", "--json", "--out", str(tmp_path / "o")]
+    assert main(["diagnose", "nist-table1", *out]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found["by_noise"]) == {"low", "high"} and found["verdict"] != "identified"
+    assert len(found["plausible"]) > 1
+    assert main(["diagnose", "nist-table1", "--noise", "4,2", *out]) == 0
+    stated = json.loads(capsys.readouterr().out)
+    assert set(stated["by_noise"]) == {"stated"}
+    assert stated["noise"]["repeat_percent"] == pytest.approx(4.0)
+    assert stated["noise"]["clamping_percent"] == pytest.approx(2.0)
+
+
+def test_a_users_own_effect_takes_part(files, tmp_path, capsys):
+    effect = tmp_path / "bench.py"
+    effect.write_text(EFFECT, encoding="utf-8")
+    arguments = ["diagnose", str(files / "strut.csv"), "--no-plots", "--json", "--out", str(tmp_path / "o")]
+    assert main([*arguments, "--effects", str(effect)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    named = {entry["effect"] for entry in found["candidates"]} | {entry["effect"] for entry in found["cannot_test"]}
+    assert "bench" in named and found["plausible"] == ["weak_strut"]
+
+
+FEW = "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm\n" + "".join(f"{x},0,800,Z,5000{x}\n" for x in range(5))
+EMPTY = FEW.replace("50000\n", "\n")
+SHORT_NOISE = "more than 0 and at most 50"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["{few}"], "5 readings"),
+        (["{empty}"], "stiffness_N_per_mm"),
+        (["{missing}"], "missing.csv"),
+        (["{strut}", "--noise", "0"], SHORT_NOISE),
+        (["{strut}", "--noise", "-2"], SHORT_NOISE),
+        (["{strut}", "--noise", "60"], SHORT_NOISE),
+        (["{strut}", "--noise", "2,1,1"], SHORT_NOISE),
+        (["{strut}", "--noise", "two"], "two"),
+        (["{strut}", "--noise", "nan"], "nan"),
+        (["{strut}", "--jobs", "0"], "jobs"),
+        (["{strut}", "--seed", "-1"], "seed"),
+        (["{strut}", "--strut-spread", "-1"], "0 to 50"),
+        (["{strut}", "--machine", "no-such-machine"], "no-such-machine"),
+        (["{strut}", "--effects", "{missing}"], "missing.csv"),
+        (["{strut}", "{strut}"], "twice"),
+        ([], "DATA"),
+    ],
+)
+def test_wrong_input_is_one_message_and_nothing_is_written(files, tmp_path, capsys, arguments, said):
+    (tmp_path / "few.csv").write_text(FEW, encoding="utf-8")
+    (tmp_path / "empty.csv").write_text(EMPTY, encoding="utf-8")
+    places = {
+        "few": tmp_path / "few.csv", "empty": tmp_path / "empty.csv", "strut": files / "strut.csv",
+        "missing": tmp_path / "missing.csv",
+    }  # fmt: skip
+    given = [argument.format(**places) for argument in arguments]
+    out = tmp_path / "out"
+    assert main(["diagnose", *given, "--out", str(out)]) == 2
+    printed = capsys.readouterr()
+    assert said in printed.err and "Traceback" not in printed.err
+    assert printed.err.count("error:") == 1
+    assert not printed.out and not out.exists()
