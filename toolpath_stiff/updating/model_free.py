@@ -47,12 +47,15 @@ class Check:
         With {percent} where the size goes: exp of the combination less 1.
     broken
         What it means if it does not vanish.
+    size
+        Of a combination that is not linear, of which `weights` are the derivatives; None: `weights` of ln readings.
     """
 
     check: str
     weights: FloatArray
     text: str
     broken: str
+    size: float | None = None
 
 
 def symmetries(machine: Machine) -> list[FloatArray]:
@@ -112,7 +115,8 @@ def assess(checks: list[Check], data: Measurements, covariance: FloatArray, draw
         return []
     weights = np.array([check.weights for check in checks])
     sd = np.sqrt(np.einsum("ij,jk,ik->i", weights, covariance, weights))
-    value = weights @ np.log(data.stiffness)
+    logs = np.log(data.stiffness)
+    value = np.array([check.weights @ logs if check.size is None else check.size for check in checks])
     largest = np.abs(draws @ (weights / sd[:, None]).T).max(axis=1)
     found = []
     for check, size, spread in zip(checks, value.tolist(), sd.tolist(), strict=True):
@@ -199,12 +203,13 @@ def _images(
                                 f"{_named(direction)}: {{percent}}", broken)  # fmt: skip
         x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
         if abs(q[0, 1]) > 1e-9 and {x, y} <= set(one) and {x, y} <= set(other):
-            weights = np.zeros(n)
+            weights, size = np.zeros(n), 0.0
             for sign, which in ((1.0, one), (-1.0, other)):
                 softness = {d: float(np.exp(-np.log(data.stiffness[which[d]]).mean())) for d in (x, y)}
+                size -= sign * float(np.log(sum(softness.values())))
                 for d in (x, y):
                     weights += _mean(n, which[d], sign * softness[d] / sum(softness.values()))
-            yield Check("symmetric images", weights, f"{where}, across the axis: {{percent}}", broken)
+            yield Check("symmetric images", weights, f"{where}, 1/k along X and Y added: {{percent}}", broken, size)
 
 
 def _is_image(data: Measurements, q: FloatArray, i: int, j: int) -> bool:

@@ -147,23 +147,28 @@ class Scattering:
         self.square = np.diag(covariance) + noise.repeat**2 * noise.outliers * (noise.outlier_width**2 - 1.0)
         self.repeated = len(place) - len(set(place.tolist()))
         rng = np.random.default_rng(seed)
-        self._normal, self._of_place = self._draw(noise, covariance, place, draws, rng)
+        self._normal, self._of_place = self._draw(noise, clamp, place, draws, rng)
 
     def _draw(
-        self, noise: Noise, covariance: FloatArray, place: NDArray[np.int64], draws: int, rng: np.random.Generator
+        self, noise: Noise, clamp: NDArray[np.str_], place: NDArray[np.int64], draws: int, rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray]:
         """Scatter of `draws` sets of readings, and the excess of each place for an excess of 1."""
-        n = len(covariance)
-        shared = covariance - np.diag(noise.repeat**2)
+        n = len(place)
+        clamps = np.unique(clamp, return_inverse=True)[1].reshape(-1)
+        same = clamps[:, None] == clamps[None, :]
+        shared = self.covariance - np.diag(noise.repeat**2) - noise.clamping**2 * same
         values, vectors = np.linalg.eigh(shared)
         common = (rng.standard_normal((draws, n)) * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+        clamped = rng.standard_normal((draws, int(clamps.max()) + 1))[:, clamps] * noise.clamping
+        if (again := _clamped_again(clamps, place)) and noise.name == "measured":
+            clamped = clamped * np.sqrt(again / rng.chisquare(again, (draws, 1)))
         wild = np.where(rng.random((draws, n)) < noise.outliers, noise.outlier_width, 1.0)
         own = rng.standard_normal((draws, n)) * noise.repeat * wild
         if np.isfinite(noise.freedom) and noise.freedom > 0:
             # The noise is itself an estimate: what it is for depends on the draw.
             own = own * np.sqrt(noise.freedom / rng.chisquare(noise.freedom, (draws, 1)))
         places = np.unique(place, return_inverse=True)[1].reshape(-1)
-        return common + own, rng.standard_normal((draws, int(places.max()) + 1))[:, places]
+        return common + clamped + own, rng.standard_normal((draws, int(places.max()) + 1))[:, places]
 
     def draws(self, excess: float) -> FloatArray:
         """(draws, n) simulated residuals with that excess."""
@@ -172,6 +177,12 @@ class Scattering:
     def turned(self, rows: FloatArray) -> FloatArray:
         """Rows (m, n) in the basis in which noise is white and the excess diagonal."""
         return np.asarray(rows @ self.turn.T)
+
+
+def _clamped_again(clamps: NDArray[np.int64], place: NDArray[np.int64]) -> int:
+    """Clampings beyond the first of their places: degrees of freedom behind an estimate of the clamping."""
+    first = {at: clamps[np.flatnonzero(place == at)[0]] for at in np.unique(place).tolist()}
+    return len(set(clamps.tolist()) - set(first.values()))
 
 
 class _Fit:
