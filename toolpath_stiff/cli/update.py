@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
         contents |= _figure3(args, machine, data)
     if not args.no_plots:
         _say("drawing")
-        contents |= _pictures(found, update)
+        contents |= _pictures(found, update, contents.get("figure3.png"))
     _say("")
     written = write_folder(args.out, contents, OWN_FILES)
     if updated is not None and args.output is not None:
@@ -230,11 +230,14 @@ def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> 
     if not args.no_plots:
         from toolpath_stiff.report.update_pictures import figure3_png
 
-        found["figure3.png"] = figure3_png(curve.bars[:-1], 100.0 * curve.error[:-1])
+        found["figure3.png"] = figure3_png(
+            curve.bars[:-1], 100.0 * curve.error[:-1], refitted_percent=100.0 * curve.error_refitted[:-1]
+        )
     return found
 
 
-def _pictures(found: dict[str, Any], update: Update) -> dict[str, str | bytes]:
+def _pictures(found: dict[str, Any], update: Update, figure3: str | bytes | None) -> dict[str, str | bytes]:
+    from toolpath_stiff.report.update_page import update_html
     from toolpath_stiff.report.update_pictures import before_after_png, error_ladder_png
 
     last = found["steps"][-1]
@@ -245,12 +248,14 @@ def _pictures(found: dict[str, Any], update: Update) -> dict[str, str | bytes]:
         update.data, update.steps[0].fit.residual, update.last.fit.residual if update.changed else None,
         names=("as given", called),
     )  # fmt: skip
-    return {
+    pictures = {
         "ladder.png": error_ladder_png(
             [_rung(step) for step in found["steps"]], found["noise_floor_percent"], "What each step does to the error"
         ),
         "before_after.png": drawn,
     }
+    shown = {**pictures, "figure3.png": figure3} if isinstance(figure3, bytes) else pictures
+    return {**pictures, "report.html": update_html(found, shown)}
 
 
 def _rung(step: dict[str, Any]) -> dict[str, Any]:

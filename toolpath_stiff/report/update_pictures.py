@@ -311,6 +311,7 @@ def figure3_png(
     bars_N_per_m: Sequence[float] | FloatArray,
     error_percent: Sequence[float] | FloatArray,
     printed_points: Sequence[tuple[float, float]] = (),
+    refitted_percent: Sequence[float] | FloatArray = (),
 ) -> bytes:
     """PNG of the paper's Figure 3: mean error against the stiffness of the platform's bars.
 
@@ -319,9 +320,11 @@ def figure3_png(
     bars_N_per_m
         (n,) stiffness of each bar.
     error_percent
-        (n,) mean error of the model with the strut law fitted to it.
+        (n,) mean error of the model with the machine's own strut law.
     printed_points
         (bar stiffness N/m, error %) that the paper prints or draws.
+    refitted_percent
+        (n,) with the strut law that makes the error smallest for each platform, if known.
     """
     bars, errors = np.asarray(bars_N_per_m, dtype=float), np.asarray(error_percent, dtype=float)
     with house_style():
@@ -329,7 +332,11 @@ def figure3_png(
         figure.text(0.03, 0.93, "How stiff must the platform be taken?", size=14, weight="bold")
         figure.text(0.03, 0.88, "Figure 3 of Clinton, Zhang and Wavering (1997), computed here", size=9.5, color=MUTED)
         axes = figure.add_axes((0.09, 0.13, 0.87, 0.68))
-        axes.plot(bars, errors, color=BLUE, lw=2.0, label="this model")
+        axes.plot(bars, errors, color=BLUE, lw=2.0, label="with the machine file's strut law")
+        if len(refitted_percent):
+            axes.plot(
+                bars, refitted_percent, color=MUTED, lw=1.5, ls="--", label="strut law refitted for each platform"
+            )
         if len(printed_points):
             printed = np.asarray(printed_points, dtype=float)
             axes.plot(

@@ -8,7 +8,7 @@ that stand for the platform. The objective has a kink wherever the model meets a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,21 +105,44 @@ def minimise_mean_error(predictor: Predictor, seed: int = 0, starts: int = START
 
 def _search(predictor: Predictor, start: FloatArray) -> tuple[FloatArray, float]:
     """Where one search ends, and the mean error there."""
-    from scipy.optimize import minimize
-
-    def objective(law: FloatArray) -> float:
-        return mean_error(predictor, law)
-
-    at, error = start, np.inf
+    objective = _objective(predictor)
+    at = start
     # A second search from the first one's end: a simplex can collapse on a kink.
     for _ in range(2):
-        options: Any = {"xatol": 1e-7, "fatol": 1e-10, "initial_simplex": at + FIRST_STEPS}
-        found = minimize(objective, at, method="Nelder-Mead", options=options)
-        at, error = np.asarray(found.x), float(found.fun)
-    return at, error
+        at = _downhill(objective, at, 1e-7, 1e-10)
+    return at, mean_error(predictor, at)
+
+
+def _downhill(objective: Callable[[FloatArray], float], start: FloatArray, xatol: float, fatol: float) -> FloatArray:
+    from scipy.optimize import minimize
+
+    options: Any = {"xatol": xatol, "fatol": fatol, "initial_simplex": start + FIRST_STEPS}
+    return np.asarray(minimize(objective, start, method="Nelder-Mead", options=options).x)
+
+
+def _objective(predictor: Predictor, weight: FloatArray | None = None) -> Callable[[FloatArray], float]:
+    """Mean error as a function of the law, each reading with its weight (n,).
+
+    Of a machine without further effects the struts alone are computed anew: its platform bars are in series.
+    """
+    measured = predictor.data.stiffness
+    weight = np.full(len(measured), 1.0 / len(measured)) if weight is None else weight / weight.sum()
+    plain = predictor.base.is_plain and not predictor.base.instruments
+    rest = np.exp(-predictor.log_stiffness()) - predictor.strut_part() if plain else None
+
+    def objective(law: FloatArray) -> float:
+        if rest is None:
+            ratio = np.exp(predictor.log_stiffness(law)) / measured
+        else:
+            ratio = 1.0 / (measured * (predictor.strut_part(law) + rest))
+        error = float(weight @ np.abs(ratio - 1.0))
+        return error if np.isfinite(error) and (ratio > 0.0).all() else np.inf
+
+    return objective
 
 
 RESAMPLES = 200
+ROUGH = (1e-5, 1e-7)  # law and mean error of a resampled search: its own scatter is a thousand times larger
 
 
 def leave_points_out(predictor: Predictor, law: FloatArray) -> FloatArray:
@@ -132,7 +155,7 @@ def leave_points_out(predictor: Predictor, law: FloatArray) -> FloatArray:
     residual = np.full(len(data), np.nan)
     for label in labels if len(labels) > 2 else ():
         out = data.point == label
-        found = _weighted_search(predictor, (~out).astype(float), law)
+        found = _downhill(_objective(predictor, (~out).astype(float)), law, *ROUGH)
         residual[out] = np.log(data.stiffness[out]) - predictor.log_stiffness(found)[out]
     return residual
 
@@ -144,24 +167,8 @@ def resampled_covariance(predictor: Predictor, law: FloatArray, seed: int = 0, d
     laws = []
     for _ in range(draws):
         count = np.bincount(rng.integers(len(labels), size=len(labels)), minlength=len(labels))
-        laws.append(_weighted_search(predictor, count[which.reshape(-1)].astype(float), law))
+        laws.append(_downhill(_objective(predictor, count[which.reshape(-1)].astype(float)), law, *ROUGH))
     return np.asarray(np.cov(np.array(laws).T))
-
-
-def _weighted_search(predictor: Predictor, weight: FloatArray, start: FloatArray) -> FloatArray:
-    """Law with the smallest weighted mean error; the struts' share alone is computed anew."""
-    from scipy.optimize import minimize
-
-    rest = np.exp(-predictor.log_stiffness(start)) - predictor.strut_part(start)
-    measured = predictor.data.stiffness
-
-    def objective(law: FloatArray) -> float:
-        ratio = 1.0 / (measured * (predictor.strut_part(law) + rest))
-        error = float(weight @ np.abs(ratio - 1.0))
-        return error if np.isfinite(error) and (ratio > 0.0).all() else np.inf
-
-    options: Any = {"xatol": 1e-5, "fatol": 1e-7, "initial_simplex": start + FIRST_STEPS}
-    return np.asarray(minimize(objective, start, method="Nelder-Mead", options=options).x)
 
 
 @dataclass(frozen=True)

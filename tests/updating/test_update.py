@@ -1,0 +1,275 @@
+"""Updates: hidden effects found by name, by --auto; what the data do not bear is refused; files give the fit back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tests.stiffness.cases import nist
+from tests.updating.cases import active, campaign, table_1
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine import machine_toml, parse_machine
+from toolpath_stiff.machine.model import EffectEntry
+from toolpath_stiff.updating.additions import parse_addition
+from toolpath_stiff.updating.mean_error_update import update_by_mean_error
+from toolpath_stiff.updating.predict import Predictor
+from toolpath_stiff.updating.update import update
+from toolpath_stiff.updating.update_document import document, residuals_csv
+
+MEAN_OVER_SD = np.sqrt(2.0 / np.pi)
+PROVENANCE = {"data": ["a.csv"], "data_sha256": "0" * 64, "command": "tps update a.csv"}
+PAPER = campaign(12, "paper")[0]
+MODEL = Predictor(nist(), PAPER)
+OWN_EFFECT = '''
+import numpy as np
+from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+
+class HeadCompliance(Effect):
+    """The head gives way along X."""
+    name = "head_compliance"
+    title = "head gives way along X"
+    link = "tool"
+    equation = "c_x = c"
+    source = "made for a test"
+    parameters = (Parameter("x", "nm/N", 1e-9, (0.0, 200.0), (1.0, 20.0), "made for a test"),)
+
+    def load_compliance(self, path, p):
+        form = np.zeros((len(path), 12, 12))
+        form[:, 6, 6] = p["x"]
+        return form
+'''
+
+
+def readings(*effects, law=(0.0, 0.0), scatter=0.02, seed=1):
+    """The paper's 42 readings of a machine with these effects."""
+    logs = MODEL.log_stiffness(law, effects)
+    noise = scatter * np.random.default_rng(seed).standard_normal(len(logs))
+    return replace(PAPER, stiffness=np.exp(logs + noise), sd=scatter * np.exp(logs))
+
+
+def updated(data, *names, files=(), **options):
+    machine = options.pop("machine", nist())
+    return update(machine, data, [parse_addition(name, data, files) for name in names], effect_files=files, **options)
+
+
+@pytest.fixture(scope="module")
+def two():
+    """24 tilted poses of a rig machine that hides contact nonlinearity and a gauge 4 % off along Y."""
+    data, truth = campaign(9, "tilted", "two")
+    assert [one["effect"] for one in truth["effects"]] == ["contact_nonlinearity", "gauge_scale"]
+    return update(nist(), data, auto=True, strut_law=True), truth
+
+
+@pytest.fixture(scope="module")
+def weak():
+    data = readings(active("weak_strut", {"strut": 3}, factor=0.75))
+    return updated(data, "weak_strut", strut_law=True)
+
+
+def test_auto_adds_what_is_hidden_and_then_stops(two):
+    found, _ = two
+    assert found.last.fit.names == ("contact_nonlinearity", "gauge_scale")
+    assert found.accepted
+    held = [step.held.mean_error for step in found.steps]
+    assert all(later < earlier for earlier, later in pairwise(held))
+    # The benchmark's own bar: within 1.3 times the noise floor.
+    assert held[-1] < 1.3 * MEAN_OVER_SD * found.noise.typical
+    assert found.turned_down
+    assert not any(one.supported for one in found.turned_down)
+
+
+def test_auto_finds_the_hidden_sizes(two):
+    found, truth = two
+    for name, key, unit in (("contact_nonlinearity", "compliance", 1e-9), ("gauge_scale", "scale", 1e-2)):
+        values = next(a.values for a in found.last.fit.effects if a.effect.name == name)
+        hidden = next(one["parameters"][key] for one in truth["effects"] if one["effect"] == name)
+        index = found.last.fit.names.index(name)
+        deviation = found.widening * found.last.fit.deviation(index)
+        # Three standard deviations: fails once in 400 seeds; this one is fixed.
+        assert abs(values[key] - hidden * unit) < 3.0 * deviation
+    assert found.last.fit.effects[1].values["direction"] == 2
+
+
+def test_the_file_gives_the_fit_back(two):
+    found, _ = two
+    machine = found.fitted(PROVENANCE)
+    again = parse_machine(machine_toml(machine))
+    modelled = Predictor(again, found.data).log_stiffness()
+    fitted = np.log(found.data.stiffness) - found.last.fit.residual
+    # 14 digits in the file.
+    assert modelled == pytest.approx(fitted, rel=0, abs=1e-9)
+    assert [entry.name for entry in again.effects] == ["contact_nonlinearity"]
+    assert [entry.name for entry in again.instruments] == ["gauge_scale"]
+    assert again.effects[0].provenance["data_sha256"] == PROVENANCE["data_sha256"]
+    assert again.origins["strut_law"] == "fitted"
+    assert again.uncertainty.names == machine.uncertainty.names
+    assert again.uncertainty.covariance == pytest.approx(machine.uncertainty.covariance, rel=1e-10)
+
+
+def test_the_uncertainty_is_that_of_the_fit_in_the_units_of_the_keys(two):
+    found, _ = two
+    uncertainty = found.fitted(PROVENANCE).uncertainty
+    fit, law = found.last.fit, found.fitted(PROVENANCE).strut_law
+    deviations = found.widening * np.sqrt(np.diag(fit.covariance))
+    shown = dict(zip(uncertainty.names, uncertainty.sd, strict=True))
+    assert shown["strut_law.stiffness_1_N_per_um"] == pytest.approx(law.stiffness_1 / 1e6 * deviations[0])
+    assert shown["contact_nonlinearity.compliance_nm_per_N"] == pytest.approx(1e9 * deviations[2])
+    assert shown["gauge_scale.scale_percent"] == pytest.approx(100.0 * deviations[3])
+
+
+def test_a_stiffness_has_the_relative_uncertainty_of_its_compliance():
+    found = updated(readings(active("platform_flexibility", bar_stiffness=3e8)), "platform_flexibility", strut_law=True)
+    uncertainty = found.fitted(PROVENANCE).uncertainty
+    bars = found.last.fit.effects[0].values["bar_stiffness"]
+    size, deviation = float(found.last.fit.sizes[0][0]), found.widening * found.last.fit.deviation(0)
+    assert size == pytest.approx(1.0 / bars)
+    assert uncertainty.names[-1] == "platform_flexibility.bar_stiffness_N_per_m"
+    assert uncertainty.sd[-1] / bars == pytest.approx(deviation / size)
+
+
+def test_the_weak_strut_is_found_among_six(weak):
+    assert weak.accepted
+    assert weak.last.fit.effects[0].values["strut"] == 3
+    factor = weak.last.fit.effects[0].values["factor"]
+    assert abs(factor - 0.75) < 3.0 * weak.widening * weak.last.fit.deviation(0)
+    assert weak.last.held.mean_error < 1.3 * MEAN_OVER_SD * weak.noise.typical
+
+
+def test_a_choice_is_kept(weak):
+    found = updated(weak.data, "weak_strut:strut=5", strut_law=True)
+    assert found.last.fit.effects[0].values["strut"] == 5
+    assert found.last.held.mean_error > weak.last.held.mean_error
+
+
+def test_what_is_not_there_is_refused_unless_forced():
+    data = readings()
+    for name in ("joint_compliance", "spindle_compliance"):
+        found = updated(data, name, strut_law=True)
+        assert not found.accepted
+        assert found.supports[0].reasons
+        assert updated(data, name, strut_law=True, force=True).accepted
+    told = document(found, None, files=["a.csv"], machine_file=None, provenance=PROVENANCE, seed=0)
+    assert told["verdict"] == "refused"
+    assert found.supports[0].reasons[0] in told["text"]
+    assert not update(nist(), data, auto=True, strut_law=True).last.fit.names
+
+
+def test_a_parameter_at_its_bound_is_refused():
+    # A gauge may be 20 % off; this one is 45 %.
+    data = readings()
+    wrong = replace(data, stiffness=np.where(data.direction[:, 2] > 0.9, 1.45, 1.0) * data.stiffness)
+    found = updated(wrong, "gauge_scale:direction=Z", strut_law=True)
+    assert any("bound" in reason for reason in found.supports[0].reasons)
+
+
+def test_each_effect_is_judged_beside_the_others():
+    """Of one that is there and one that is not, only the latter is not borne, in whichever order they are named."""
+    data = readings(active("weak_strut", {"strut": 3}, factor=0.75))
+    for names in (("weak_strut:strut=3", "joint_compliance"), ("joint_compliance", "weak_strut:strut=3")):
+        found = updated(data, *names, strut_law=True)
+        assert {one.effect: one.supported for one in found.supports} == {
+            "weak_strut": True,
+            "joint_compliance": False,
+        }
+        assert not found.accepted
+
+
+def test_the_law_stays_unless_it_is_asked_for(weak):
+    found = updated(weak.data, "weak_strut")
+    assert [step.name for step in found.steps] == ["as given", "+ weak_strut (strut 3)"]
+    assert np.array_equal(found.last.fit.law, [0.0, 0.0])
+    machine = found.fitted(PROVENANCE)
+    assert machine.strut_law == nist().strut_law
+    assert machine.uncertainty.names == ("weak_strut.factor",)
+
+
+def test_an_update_on_top_of_an_update(weak):
+    first = weak.fitted(PROVENANCE)
+    data = replace(weak.data, stiffness=np.where(weak.data.direction[:, 1] > 0.9, 1.08, 1.0) * weak.data.stiffness)
+    found = updated(data, "gauge_scale:direction=Y", machine=first)
+    assert found.accepted
+    machine = found.fitted(PROVENANCE)
+    assert [entry.name for entry in (*machine.effects, *machine.instruments)] == ["weak_strut", "gauge_scale"]
+    assert machine.uncertainty.names == (*first.uncertainty.names, "gauge_scale.scale_percent")
+    # What is fitted later knows nothing of what was fitted earlier.
+    assert not machine.uncertainty.correlation[-1, :-1].any()
+
+
+def test_a_users_own_effect(tmp_path):
+    file = tmp_path / "head.py"
+    file.write_text(OWN_EFFECT)
+    compliance = np.exp(-MODEL.log_stiffness()) + 6e-9 * PAPER.direction[:, 0] ** 2
+    scatter = 0.02 * np.random.default_rng(5).standard_normal(len(compliance))
+    data = replace(PAPER, stiffness=np.exp(scatter) / compliance, sd=0.02 / compliance)
+    found = updated(data, "head_compliance", files=[file], strut_law=True)
+    assert found.accepted
+    assert abs(found.last.fit.effects[0].values["x"] - 6e-9) < 3.0 * found.widening * found.last.fit.deviation(0)
+    again = parse_machine(machine_toml(found.fitted(PROVENANCE)))
+    modelled = Predictor(again, data, [file]).log_stiffness()
+    assert modelled == pytest.approx(np.log(data.stiffness) - found.last.fit.residual, abs=1e-9)
+
+
+def test_the_papers_own_estimation():
+    found, search = update_by_mean_error(nist(), table_1(), seed=1)
+    first, last = (step.fit.errors.mean() for step in found.steps)
+    assert (first, last) == (pytest.approx(0.0962, abs=5e-5), pytest.approx(0.0942, abs=5e-5))
+    # Fitted to the points themselves, the law does worse at points that it has not seen.
+    assert found.last.held.mean_error > last
+    machine = found.fitted(PROVENANCE)
+    assert machine.strut_law == search.strut_law
+    assert machine.uncertainty.names == ("strut_law.stiffness_1_N_per_um", "strut_law.stiffness_2_N_per_um")
+    # The printed constants lie well within what 14 points can tell.
+    printed = np.array([46.5, 32.5])
+    reached = np.array([machine.strut_law.stiffness_1, machine.strut_law.stiffness_2]) / 1e6
+    assert (np.abs(printed - reached) < 2.5 * machine.uncertainty.sd).all()
+
+
+def test_the_document_and_the_residuals_agree_with_the_fit(weak):
+    told = document(
+        weak, weak.fitted(PROVENANCE), files=["a.csv"], machine_file="m.toml", provenance=PROVENANCE, seed=0
+    )
+    assert told["verdict"] == "updated"
+    assert [step["name"] for step in told["steps"]] == ["as given", "strut law fitted", "+ weak_strut (strut 3)"]
+    assert set(told["steps"][0]["by_direction"]) == {"X", "Y", "Z"}
+    low, high = told["steps"][-1]["parameters"]["weak_strut"]["factor"]["interval"]
+    assert low < 0.75 < high
+    rows = [line.split(",") for line in residuals_csv(weak).splitlines()]
+    assert len(rows) == 43
+    before, after = (rows[0].index(f"{when}_error_percent") for when in ("before", "after"))
+    for column, step in ((before, told["steps"][0]), (after, told["steps"][-1])):
+        mean = np.mean([abs(float(row[column])) for row in rows[1:]])
+        # Three decimals in the file, five digits in the document.
+        assert mean == pytest.approx(step["mean_abs_error_percent"], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("weak_strutt", "weak_strut"),
+        ("weak_strut:strut=7", "strut"),
+        ("weak_strut:strut", "strut"),
+        ("joint_compliance:strut=3", "no choices"),
+        ("setup_compliance:setup=nowhere", "nowhere"),
+        ("gauge_scale:direction=W", "direction"),
+        ("thermal_drift", "time_min"),
+    ],
+)
+def test_additions_that_cannot_be(text, match):
+    with pytest.raises(InputError, match=match):
+        parse_addition(text, table_1())
+
+
+def test_updates_that_cannot_be():
+    data = readings()
+    with pytest.raises(InputError, match="nothing to update"):
+        update(nist(), data)
+    with pytest.raises(InputError, match="twice"):
+        updated(data, "weak_strut:strut=3", "weak_strut:strut=4")
+    carrying = nist().with_changes(effects=(EffectEntry("joint_compliance", {"compliance_nm_per_N": 1.0}),))
+    with pytest.raises(InputError, match="already"):
+        updated(data, "joint_compliance", machine=carrying)
+    with pytest.raises(InputError, match="at least 6"):
+        update(nist(), data.select(np.arange(5)), strut_law=True)
