@@ -250,7 +250,10 @@ def _pictures(found: dict[str, Any], update: Update, figure3: str | bytes | None
     )  # fmt: skip
     pictures = {
         "ladder.png": error_ladder_png(
-            [_rung(step) for step in found["steps"]], found["noise_floor_percent"], "What each step does to the error"
+            [_rung(step) for step in found["steps"]],
+            found["noise_floor_percent"],
+            "What each step does to the error",
+            [{**one, "name": one["effect"]} for one in found["turned_down"]],
         ),
         "before_after.png": drawn,
     }

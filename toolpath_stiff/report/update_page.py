@@ -33,8 +33,8 @@ QUESTIONS = {
     ),
     "figure3.png": (
         "How stiff must the platform be taken?",
-        "The paper: above 1e10 N/m a stiffer platform changes nothing. With the strut law refitted for each platform the "
-        "curve is all but flat: these readings cannot tell a soft platform from soft struts.",
+        "The paper: above 1e10 N/m a stiffer platform changes nothing. With the strut law refitted for each, "
+        "the curve is all but flat: these readings cannot tell a soft platform from soft struts.",
     ),
 }
 

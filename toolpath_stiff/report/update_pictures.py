@@ -240,7 +240,10 @@ def _no_ticks() -> Any:
 
 
 def error_ladder_png(
-    steps: Sequence[Mapping[str, Any]], noise_floor_percent: float | None = None, title: str = "How the error falls"
+    steps: Sequence[Mapping[str, Any]],
+    noise_floor_percent: float | None = None,
+    title: str = "How the error falls",
+    turned_down: Sequence[Mapping[str, Any]] = (),
 ) -> bytes:
     """PNG: mean error from the first model to the last, in sample and at left-out points, with the noise floor.
 
@@ -251,7 +254,13 @@ def error_ladder_png(
         standard error of the fall from the step before, and `remark`.
     noise_floor_percent
         Mean absolute error that scatter alone would leave: 0.80 times its standard deviation.
+    title
+        Heading.
+    turned_down
+        Further steps that were tried from the last one and not taken; keys as of `steps`.
     """
+    taken = len(steps)
+    steps = [*steps, *turned_down]
     with house_style():
         figure = new_figure(max(7.0, 2.4 + 1.9 * len(steps)), 5.2)
         width, height = figure.get_size_inches()
@@ -264,8 +273,16 @@ def error_ladder_png(
             )
             for key in ("held_out_error_percent", "mean_abs_error_percent")
         )
-        axes.plot(at, held, "o-", color=BLUE, lw=2.0, ms=9, label="at points left out", zorder=4)
-        axes.plot(at, inside, "s--", color=MUTED, lw=1.3, ms=6, mfc="white", label="in sample", zorder=3)
+        axes.plot(at[:taken], held[:taken], "o-", color=BLUE, lw=2.0, ms=9, label="at points left out", zorder=4)
+        axes.plot(
+            at[:taken], inside[:taken], "s--", color=MUTED, lw=1.3, ms=6, mfc="white", label="in sample", zorder=3
+        )
+        if taken < len(steps):
+            axes.axvspan(taken - 0.5, len(steps) - 0.3, color="#eef1f4", lw=0, zorder=0)
+            axes.text(taken - 0.45, 0.97, "tried from there, not taken", color=MUTED, size=9, va="top",
+                      transform=axes.get_xaxis_transform())  # fmt: skip
+            axes.plot(at[taken:], held[taken:], "o", color=BLUE, ms=9, mfc="white", zorder=4)
+            axes.plot(at[taken:], inside[taken:], "s", color=MUTED, ms=6, mfc="white", zorder=3)
         spread = np.array([figure_of(step, "held_out_se_percent") or 0.0 for step in steps])
         if spread.any():
             axes.errorbar(at, held, yerr=spread, fmt="none", ecolor=BLUE, elinewidth=1.5, capsize=4, zorder=4)

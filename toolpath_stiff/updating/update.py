@@ -64,6 +64,8 @@ class Support:
         Fall of the error at left-out points over its standard error; nan where nothing can be left out.
     fall
         That fall, relative.
+    error, held_out_error
+        Mean errors with it, in sample and at left-out points.
     likelihood_gain, threshold
         Twice the log likelihood gained, in units of the scatter that remains; what chance alone reaches.
     reasons
@@ -73,6 +75,8 @@ class Support:
     effect: str
     gain_in_se: float
     fall: float
+    error: float
+    held_out_error: float
     likelihood_gain: float
     threshold: float
     reasons: tuple[str, ...]
@@ -310,7 +314,8 @@ class _Work:
                 f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {threshold:.1f} by "
                 "chance once in twenty campaigns"
             )
-        return Support(name, in_se, fall, gained, threshold, tuple(reasons))
+        error = float(fit.errors.mean())
+        return Support(name, in_se, fall, error, after.held.mean_error, gained, threshold, tuple(reasons))
 
     def next_effect(self, before: Step) -> tuple[Step | None, tuple[Support, ...]]:
         """The most likely effect that the data bear on top of a step, and the supports of all that were tried."""

@@ -207,6 +207,8 @@ def _support(one: Support) -> dict[str, Any]:
         "effect": one.effect,
         "supported": one.supported,
         "reasons": list(one.reasons),
+        "mean_abs_error_percent": _number(100.0 * one.error),
+        "held_out_error_percent": _number(100.0 * one.held_out_error),
         "held_out_fall_percent": _number(100.0 * one.fall),
         "held_out_gain_in_se": _number(one.gain_in_se, 3),
         "likelihood_gain": _number(one.likelihood_gain),
