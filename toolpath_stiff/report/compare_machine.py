@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.report.compare_pictures import heading, in_percent
+from toolpath_stiff.report.compare_pictures import heading, in_percent, near_rows
 from toolpath_stiff.report.figure import GRID, INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
 from toolpath_stiff.units import mm_from_m
@@ -101,7 +101,9 @@ def _key(figure: Any, axes_shown: list[str], width: float, height: float) -> Non
 
 def _largest(found: Comparison) -> float:
     """Residual of the tallest bar, %: few extreme readings do not take the contrast."""
-    return max(float(np.quantile(np.abs(in_percent(found.residual)), 0.98)), 0.5)
+    size = np.abs(in_percent(found.residual))
+    near = near_rows(found)
+    return max(float(np.quantile(size[near] if near.any() else size, 0.98)), 0.5)
 
 
 def _from_above(axes: Axes, found: Comparison) -> None:

@@ -39,6 +39,18 @@ def in_percent(residual: FloatArray) -> FloatArray:
     return np.asarray(100.0 * np.expm1(residual))
 
 
+def near_rows(found: Comparison) -> NDArray[np.bool_]:
+    """(n,) readings that are not far off."""
+    near = np.ones(len(found.residual), dtype=bool)
+    near[[one["reading"] - 1 for one in found.document["far_off"]]] = False
+    return near
+
+
+def count_of(count: float, thing: str) -> str:
+    """So many of a thing."""
+    return f"{count:.0f} {thing}{'' if count == 1 else 's'}"
+
+
 def markers(setup: NDArray[np.str_]) -> dict[str, str]:
     """Set-up -> marker; with many, markers come again."""
     return {name: MARKERS[i % len(MARKERS)] for i, name in enumerate(dict.fromkeys(setup.tolist()))}
@@ -187,8 +199,7 @@ def _name_far_off(axes: Axes, found: Comparison, axis: str, residual: FloatArray
     for one in found.document["far_off"][:12]:
         if one["direction"] != axis:
             continue
-        i = int(np.flatnonzero((found.data.line == one["line"]) & (found.data.file == one["file"]) &
-                               (directions(found.data) == axis))[0])  # fmt: skip
+        i = one["reading"] - 1
         axes.plot(i + 1, residual[i], "o", ms=10, mfc="none", mec=UNREACHABLE_RED, mew=1.4, zorder=4)
         axes.annotate(
             f"line {one['line']}", (i + 1, residual[i]), xytext=(8, 0), textcoords="offset points", va="center",
@@ -204,15 +215,16 @@ def planes_png(found: Comparison) -> bytes:
     columns += ["all"] if len(columns) > 1 else []
     rows = [*reversed(found.document["by_plane"])]
     rows += ["all"] if len(rows) > 1 else []
+    near = near_rows(found)
     cells = np.full((len(rows), len(columns), 3), np.nan)
     for i, plane in enumerate(rows):
         for j, axis in enumerate(columns):
-            chosen = ((where == plane) | (plane == "all")) & ((along == axis) | (axis == "all"))
+            chosen = near & ((where == plane) | (plane == "all")) & ((along == axis) | (axis == "all"))
             if chosen.any():
                 weights = chosen / chosen.sum()
                 error = 100.0 * float(np.sqrt(weights @ found.covariance @ weights))
                 cells[i, j] = in_percent(weights @ found.residual), error, chosen.sum()
-    limit = max(float(np.nanmax(np.abs(cells[..., 0]))), 1.0)
+    limit = max(float(np.nanmax(np.abs(cells[..., 0]), initial=0.0, where=np.isfinite(cells[..., 0]))), 1.0)
     with house_style():
         width, height = max(2.6 + 1.75 * len(columns), 8.2), 1.5 + 0.85 * len(rows)
         figure = new_figure(width, height)
@@ -225,8 +237,8 @@ def planes_png(found: Comparison) -> bytes:
                     sure = abs(mean) > SIDES * error
                     axes.text(j, i - 0.1, f"{mean:+.1f} %", ha="center", va="center", fontsize=13,
                               weight="bold" if sure else "normal")  # fmt: skip
-                    axes.text(j, i + 0.27, f"\u00b1 {error:.1f},  {count:.0f} readings", ha="center", va="center",
-                              fontsize=8, color=INK)  # fmt: skip
+                    text = f"\u00b1 {error:.1f},  {count_of(count, 'reading')}"
+                    axes.text(j, i + 0.27, text, ha="center", va="center", fontsize=8, color=INK)
         axes.set_xticks(range(len(columns)), columns, fontsize=11, weight="bold")
         axes.set_yticks(range(len(rows)), [shortened(row, 26) for row in rows], fontsize=10.5)
         axes.xaxis.tick_top()
@@ -241,7 +253,7 @@ def planes_png(found: Comparison) -> bytes:
         heading(
             figure,
             "Z against X and Y? Upper against lower plane?",
-            f"{RESIDUAL_AXIS}: red softer, blue stiffer than modelled; bold: beyond {SIDES:g} standard errors, "
-            "taken one by one",
+            f"{RESIDUAL_AXIS}: red softer, blue stiffer than modelled; bold: beyond {SIDES:g} standard errors"
+            + ("" if near.all() else f"; without {count_of(int((~near).sum()), 'reading')} far off"),
         )
         return png_bytes(figure)

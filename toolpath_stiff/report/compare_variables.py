@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.report.compare_pictures import RESIDUAL_AXIS, heading, in_percent
+from toolpath_stiff.report.compare_pictures import RESIDUAL_AXIS, count_of, heading, in_percent
 from toolpath_stiff.report.figure import INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
 from toolpath_stiff.report.wording import plain, shortened
@@ -130,11 +130,11 @@ def _panel(axes: Axes, found: Comparison, one: Variable | Label, limits: tuple[f
             for level in range(len(names)) if len(names) <= MOST_NAMES else []:
                 chosen = rows & (x == level)
                 if chosen.any():
-                    mean = float(residual[chosen].mean())
+                    mean = float(np.clip(residual[chosen], *limits).mean())
                     at = level + shift
                     axes.plot([at - 0.09, at + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
         elif float(np.ptp(x[rows])) > 0.0 and rows.sum() > 2:
-            slope, level = np.polyfit(x[rows] - x[rows].mean(), residual[rows], 1)
+            slope, level = np.polyfit(x[rows] - x[rows].mean(), np.clip(residual[rows], *limits), 1)
             ends = np.array([x[rows].min(), x[rows].max()])
             axes.plot(ends, level + slope * (ends - x[rows].mean()), color=colour, lw=1.3, zorder=4)
     if names and len(names) <= MOST_NAMES:
@@ -171,7 +171,7 @@ def load_path_png(found: Comparison) -> bytes:
     ratio = np.array([_measured_over_modelled(found, along == axis) for axis in "XYZ"])
     with house_style():
         longest = max(len(name) for name in shares.links)
-        below = 0.95 if longest <= LONG_NAME else 1.9
+        below = 0.95 if longest <= LONG_NAME else 1.45
         width, height = 13.0, 4.25 + below
         figure = new_figure(width, height)
         top = 1.18 * float(np.nanmax(compliance.sum(axis=1) * np.fmax(ratio, 1.0)))
@@ -184,7 +184,7 @@ def load_path_png(found: Comparison) -> bytes:
                 axes.set_yticklabels([])
             else:
                 axes.set_ylabel("compliance of the tip, nm/N")
-        poses = f"{shares.poses} measured poses"
+        poses = count_of(shares.poses, "measured pose")
         heading(
             figure,
             "Which link takes what share of the compliance?",
@@ -205,7 +205,7 @@ def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: flo
     total = float(parts.sum())
     below = np.concatenate([[0.0], np.cumsum(parts)])
     colours = [LINKS[i % 2] if name.startswith("strut ") else EFFECT for i, name in enumerate(links)]
-    names = [name.removeprefix("strut ") if name.startswith("strut ") else name for name in links]
+    names = [name.removeprefix("strut ").replace("_", " ") for name in links]
     for i, (size, colour) in enumerate(zip(parts, colours, strict=True)):
         axes.bar(i, size, 0.8, bottom=below[i], color=colour)
         axes.plot([i + 0.4, i + 1.4], [below[i + 1]] * 2, color=MUTED, lw=0.7)
@@ -215,8 +215,10 @@ def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: flo
     names.append("model")
     if np.isfinite(ratio):
         axes.bar(at + 1, total * ratio, 0.8, color="white", edgecolor=INK, hatch="////", linewidth=1.0)
-        text = f"{round(100 * (ratio - 1), 1) + 0.0:+.1f} %"
-        axes.text(at + 1, total * (ratio + 0.012), text, ha="center", va="bottom", fontsize=8.5, weight="bold")
+        axes.text(
+            at + 1, total * (ratio + 0.012), f"{round(100 * (ratio - 1)):+d} %", ha="center", va="bottom", fontsize=8.5,
+            weight="bold", zorder=4, bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
+        )  # fmt: skip
         names.append("measured")
     axes.set_xticks(range(len(names)), [shortened(plain(name), 22) for name in names], fontsize=8.5)
     for label, name in zip(axes.get_xticklabels(), names, strict=True):

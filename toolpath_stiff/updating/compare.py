@@ -25,16 +25,16 @@ from toolpath_stiff.updating.model_free import assess, model_free_checks
 from toolpath_stiff.updating.noise import STRUT_SPREAD, Noise, covariance, noise_models
 from toolpath_stiff.updating.predict import Predictor, scaled_law
 from toolpath_stiff.updating.residual_patterns import patterns
-from toolpath_stiff.updating.residual_structure import EXCESSES, Pattern, Scattering, Structure, find_structure
+from toolpath_stiff.updating.residual_structure import EXCESSES, Pattern, Scattering, Structure, far_off, find_structure
 from toolpath_stiff.updating.residual_variables import Label, Variable, directions, labels, planes, variables
 
 FloatArray = NDArray[np.float64]
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 HINTS = 3  # patterns named where none stands out
-FAR_OFF = 4.0  # standard deviations, of a reading that is named
 GAUSS_NEWTON_STEPS = 8
 FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
+TELLS_LAW = 0.01  # smallest over largest singular value from which data tell the law's two constants apart
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,7 @@ class _Answer:
     noise: Noise
     scattering: Scattering
     structure: Structure
+    far: NDArray[np.int64]
     refitted: Structure | None
     law: FloatArray | None
     log_refitted: FloatArray | None
@@ -145,13 +146,14 @@ def compare(
         spread = covariance(model, predictor, joints)
         scattering = Scattering(model, spread, data.clamp, place, draws, seed)
         structure = find_structure(residual, looked_for, scattering)
+        far = far_off(residual, scattering, structure, looked_for)[1]
         refitted = law = log_refitted = None
-        if len(data) >= FEWEST_TO_REFIT and np.linalg.matrix_rank(law_columns, tol=1e-6) == 2:
+        if len(data) >= FEWEST_TO_REFIT and np.linalg.cond(law_columns) < 1.0 / TELLS_LAW:
             refitted = find_structure(residual, looked_for, scattering, law_columns.T, most=0)
             same = (place[:, None] == place[None, :]) * structure.excess**2
-            law, log_refitted = _refit(predictor, spread + same)
+            law, log_refitted = _refit(predictor, spread + same, np.setdiff1d(np.arange(len(data)), far))
         free = assess(checks, data, spread, scattering.draws(0.0))
-        return _Answer(model, scattering, structure, refitted, law, log_refitted, free)
+        return _Answer(model, scattering, structure, far, refitted, law, log_refitted, free)
 
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         answers = list(pool.map(answer, noises))
@@ -173,10 +175,11 @@ def _places(data: Measurements) -> NDArray[np.int64]:
     return np.asarray(found.reshape(-1), dtype=np.int64)
 
 
-def _refit(predictor: Predictor, spread: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The strut law's logarithms that fit best under a covariance, and (n,) ln(N/m) with them."""
+def _refit(predictor: Predictor, spread: FloatArray, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """The strut law's logarithms that fit some rows best under a covariance, and (n,) ln(N/m) with them."""
     measured = np.log(predictor.data.stiffness)
-    inverse = np.linalg.inv(spread)
+    inverse = np.zeros_like(spread)
+    inverse[np.ix_(rows, rows)] = np.linalg.inv(spread[np.ix_(rows, rows)])
     law = np.zeros(2)
     log_model = predictor.log_stiffness()
     for _ in range(GAUSS_NEWTON_STEPS):
@@ -267,7 +270,7 @@ def _document(
         "findings": merged_findings(by_noise, answers_tests(answers, looked_for)),
         "by_noise": by_noise,
         "tests": _tests(answers, looked_for),
-        "far_off": _far_off(residual, answers[-1], looked_for, data),
+        "far_off": _far_off_entries(residual, answers[-1], looked_for, data),
         "model_free": {"checks": free, "cannot_check": cannot},
         "noise": [_noise(one.noise) for one in answers],
         "not_tested": [*(f"no column {name}" for name in data.missing), *notes],
@@ -330,22 +333,22 @@ def _hints(
     return kept
 
 
-def _far_off(residual: FloatArray, one: _Answer, looked_for: list[Pattern], data: Measurements) -> list[dict[str, Any]]:
-    """Readings far from the model, the patterns found taken out."""
-    columns = np.array([looked_for[f.pattern].values for f in one.structure.found]).reshape(-1, len(residual)).T
-    rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0] if columns.size else residual
-    sd = np.sqrt(np.diag(one.scattering.covariance) + one.structure.excess_left**2)
+def _far_off_entries(
+    residual: FloatArray, one: _Answer, looked_for: list[Pattern], data: Measurements
+) -> list[dict[str, Any]]:
+    """Readings far from the model, `reading` counted from 1 in the order of the files."""
+    rest, far, ratio = far_off(residual, one.scattering, one.structure, looked_for)
     return [
         {
             "file": str(data.file[i]),
             "line": int(data.line[i]),
+            "reading": i + 1,
             "point": str(data.point[i]),
             "direction": str(directions(data)[i]),
             "off_percent": float(100.0 * np.expm1(rest[i])),
-            "standard_deviations": float(rest[i] / sd[i]),
+            "standard_deviations": float(ratio[i]),
         }
-        for i in np.argsort(-np.abs(rest / sd), kind="stable")
-        if abs(rest[i]) > FAR_OFF * sd[i]
+        for i in far.tolist()
     ]
 
 

@@ -26,7 +26,7 @@ class Shares:
     Attributes
     ----------
     links
-        Names: "strut 1" to "strut 6", then effects.
+        "strut 1" to "strut 6", then names of effects.
     compliance
         (3, links) m/N along X, Y, Z, mean over the measured poses.
     poses
@@ -47,7 +47,7 @@ def load_path_shares(model: StiffnessModel, data: Measurements) -> Shares:
     for axis in np.eye(3):
         rows = replace(distinct, direction=np.broadcast_to(axis, (len(distinct), 3)).copy())
         by_axis.append(_by_link(model, rows).mean(axis=0))
-    names = tuple(f"strut {i + 1}" for i in range(6)) + tuple(active.effect.title for active in model.effects)
+    names = tuple(f"strut {i + 1}" for i in range(6)) + tuple(active.effect.name for active in model.effects)
     return Shares(names, np.array(by_axis), len(distinct))
 
 

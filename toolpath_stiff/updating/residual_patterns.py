@@ -117,12 +117,15 @@ def sentence(
     becomes = "stiffer" if size > 0 else "softer"
     return (
         f"{who} {becomes} against the model as {pattern.place} grows: {signed(percent(first_end))} at "
-        f"{_short(float(values[low]))}{unit}, {signed(percent(last_end))} at {_short(float(values[high]))}{unit} "
+        f"{_short(values[low], values)}{unit}, {signed(percent(last_end))} at {_short(values[high], values)}{unit} "
         f"({readings})"
     ), size
 
 
-def _short(value: float) -> str:
+def _short(value: float, values: FloatArray) -> str:
+    """A value to three digits; 0 where it is nothing beside the others."""
+    if abs(value) < 1e-3 * float(np.abs(values).max()):
+        return "0"
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 

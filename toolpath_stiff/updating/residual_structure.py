@@ -27,6 +27,7 @@ FloatArray = NDArray[np.float64]
 # tau: relative sd of the excess; 0, then 0.3 % to 100 % in steps of 30 %.
 EXCESSES = np.concatenate([[0.0], np.geomspace(0.003, 1.0, 23)])
 SIGNIFICANT = 0.05  # family-wise
+FAR_OFF = 4.0  # standard deviations, of a reading that is named
 MOST_PATTERNS = 8  # found one after the other
 ALIKE = 0.9  # correlation from which two patterns cannot be told apart in these data
 WILD = 3.0  # standard deviations at which a reading is drawn in
@@ -302,6 +303,17 @@ def find_structure(
     simulated = (scattering.turned(scattering.draws(0.0)) ** 2).sum(axis=1)
     probability = (1.0 + float((simulated >= square.sum()).sum())) / (1.0 + len(simulated))
     return Structure(tuple(found), tests, excess, left, probability)
+
+
+def far_off(
+    residual: FloatArray, scattering: Scattering, structure: Structure, patterns: list[Pattern]
+) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
+    """(n,) residuals with the patterns found taken out, rows far from nought, the furthest first, and (n,) in sd."""
+    columns = np.array([patterns[f.pattern].values for f in structure.found]).reshape(-1, len(residual)).T
+    rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0] if columns.size else residual
+    ratio = rest / np.sqrt(np.diag(scattering.covariance) + structure.excess_left**2)
+    order = np.argsort(-np.abs(ratio), kind="stable")
+    return rest, order[np.abs(ratio[order]) > FAR_OFF], ratio
 
 
 def _answers(fit: _Fit, at: int, factor: float, t: FloatArray, p: FloatArray) -> list[Found]:
