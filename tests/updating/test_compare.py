@@ -39,7 +39,7 @@ def texts(found: Comparison) -> list[str]:
 
 def test_the_papers_own_mean_error():
     found = quick(table_1()).document
-    # Equation 13 of the paper on the printed figures of its Table 1, strut law 46.5 / 32.5 N/um.
+    # The paper's average error on the printed figures of its Table 1, with its strut law 46.5 / 32.5 N/um.
     assert found["baseline"]["mean_abs_error_percent"] == pytest.approx(9.62, abs=0.05)
     assert set(found["by_direction"]) == {"X", "Y", "Z"}
     assert [one["z_mm"] for one in found["by_plane"].values()] == pytest.approx([353.0, 1268.0], abs=1.0)
@@ -132,6 +132,13 @@ def test_drift_is_named_by_its_time():
     data = campaign(44)[0]
     drifted = replace(data, stiffness=data.stiffness * np.exp(-0.02 * data.time / 60.0))
     assert any("as the time since zeroing grows" in text and "softer" in text for text in texts(quick(drifted)))
+
+
+@pytest.mark.parametrize("seed", [71, 72])
+def test_a_weak_strut_is_named_by_its_number(seed):
+    data, truth = campaign(seed, hidden="weak_strut", size=0.05)
+    strut = truth["effects"][0]["parameters"]["strut"]
+    assert any(f"as the share of strut {strut} in the compliance grows" in text for text in texts(quick(data)))
 
 
 def test_stiffening_with_load_is_named_and_breaks_proportionality():
