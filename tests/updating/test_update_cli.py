@@ -11,6 +11,7 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import active, table_1
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine
+from toolpath_stiff.report.update_page import update_html
 from toolpath_stiff.updating.predict import Predictor
 
 WEAK = ("--add", "weak_strut:strut=3", "--strut-law")
@@ -44,6 +45,10 @@ def test_the_error_falls_and_the_machine_is_used(weak_csv, tmp_path, capsys):
     told = json.loads((out / "update.json").read_text())
     assert told["steps"][-1]["held_out_error_percent"] < told["steps"][0]["held_out_error_percent"]
     assert told["machine_file"] == str(out / "machine.toml")
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 2
+    assert "{{" not in page
+    assert "<b>x</b>" not in update_html({**told, "data": ["<b>x</b>.csv"]}, {})
     machine = load_machine(out / "machine.toml")
     assert machine.effects[0].provenance["data_sha256"] == told["provenance"]["data_sha256"]
     program = tmp_path / "part.nc"
