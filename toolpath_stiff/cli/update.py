@@ -108,9 +108,10 @@ def run(args: argparse.Namespace) -> int:
         _say("drawing")
         contents |= _pictures(found, update, contents.get("figure3.png"))
     _say("")
-    written = write_folder(args.out, contents, OWN_FILES)
-    if updated is not None and args.output is not None:
+    written = []
+    if updated is not None and args.output is not None:  # first: update.json names it
         written.append(write_atomically(Path(args.output), machine_toml(updated, _preamble(found))))
+    written += write_folder(args.out, contents, OWN_FILES)
     if args.json:
         print(contents["update.json"], end="")
     else:
