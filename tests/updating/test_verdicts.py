@@ -119,7 +119,7 @@ def test_residuals_of_the_other_sign_mean_something_else():
     assert not (found.verdict == "identified" and found.plausible == ("weak_strut",))
 
 
-@pytest.mark.parametrize("pair", ["weak_strut,spindle_compliance", "table_compliance,thermal_drift"])
+@pytest.mark.parametrize("pair", ["weak_strut,spindle_compliance", "weak_strut,gauge_scale"])
 def test_two_strong_effects_are_both_named(pair):
     judgement = judged(7, "tilted", pair, STRONG)
     assert judgement.verdict == "identified" and set(judgement.plausible) == set(pair.split(","))

@@ -209,13 +209,15 @@ class Table:
         return np.asarray((ends[0] - ends[1])[:, None] / (2.0 * step))
 
 
-def tabulate(candidate: Candidate, predictor: Predictor, law: FloatArray) -> Table | None:
-    """The candidate's table at a strut law, or None where it does nothing to these data."""
-    base = predictor.log_stiffness(law)
+def tabulate(
+    candidate: Candidate, predictor: Predictor, law: FloatArray, beside: Sequence[ActiveEffect] = ()
+) -> Table | None:
+    """The candidate's table at a strut law, beside other effects; None where it does nothing to these data."""
+    base = predictor.log_stiffness(law, beside)
     compliance = np.exp(-base)
 
     def delta(sizes: Iterable[float]) -> FloatArray | None:
-        logs = predictor.log_stiffness(law, [candidate.active(list(sizes))])
+        logs = predictor.log_stiffness(law, [*beside, candidate.active(list(sizes))])
         return None if np.isnan(logs).any() else np.asarray(np.exp(-logs) - compliance)
 
     count = len(candidate.components)

@@ -28,6 +28,7 @@ LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stif
 GRID = 24  # sizes a sign
 ZOOMS = 3
 MOST_ROUNDS = 3  # searches for wild readings
+BEYOND = 0.05  # share of a bound by which a search may overshoot it
 
 
 @dataclass(frozen=True)
@@ -262,6 +263,8 @@ class Problem:
             scatter = again
         covariance = np.asarray(_scaled_inverse(information), dtype=float)
         deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
+        if len(tables) > 1:
+            _pull_back(chosen, sizes)
         own = [float(sizes[id(table)][j]) for table, j in chosen]
         possible = all(_possible(table, j, size) for (table, j), size in zip(chosen, own, strict=True))
         if not possible and len(free) > 1:
@@ -380,6 +383,15 @@ def _scaled_inverse(matrix: FloatArray) -> FloatArray:
 def _possible(table: Table, j: int, size: float) -> bool:
     component, sign = table.candidate.components[j], float(np.sign(size))
     return sign in component.signs and abs(size) <= component.reach(sign)
+
+
+def _pull_back(chosen: Sequence[tuple[Table, int]], sizes: dict[int, FloatArray]) -> None:
+    """Put sizes that lie a little beyond their bounds onto them: tables of two effects describe neither exactly."""
+    for table, j in chosen:
+        size = sizes[id(table)][j]
+        component, sign = table.candidate.components[j], float(np.sign(size))
+        if sign in component.signs and abs(size) <= (1.0 + BEYOND) * component.reach(sign):
+            sizes[id(table)][j] = np.clip(size, *component.bounds)
 
 
 def _law_terms(laws: FloatArray, information: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.updating.candidates import Table
+from toolpath_stiff.updating.candidates import Table, tabulate
 from toolpath_stiff.updating.evidence import Problem, Score
 from toolpath_stiff.updating.gates import Structure, set_wild_aside
 from toolpath_stiff.updating.ranking import Family
@@ -52,7 +52,7 @@ def score_pairs(problem: Problem, families: Sequence[Family], starts: Sequence[F
         gains = [_gain(table, pulls[0], projected, problem) for _, table in partners]
         for index in np.argsort(gains)[::-1][:PARTNERS]:
             name, table = partners[int(index)]
-            found = _together(problem, first.best, table)
+            found = _together(problem, first.best, _beside(problem, first.best, table))
             if found is None:
                 continue
             key = (first.name, name) if first.name < name else (name, first.name)
@@ -61,6 +61,18 @@ def score_pairs(problem: Problem, families: Sequence[Family], starts: Sequence[F
             if key not in best or evidence > best[key].log_evidence:
                 best[key] = Pair(key, found, float(evidence))
     return sorted(best.values(), key=lambda pair: (-pair.log_evidence, pair.names))
+
+
+def _beside(problem: Problem, first: Score, table: Table) -> Table:
+    """The partner's table where the first effect is at work already, if one of the two is an instrument.
+
+    An instrument's factor acts on the whole compliance, the partner's included; mechanical effects add up as they are.
+    """
+    owner = first.candidates[0]
+    if not (owner.effect.is_instrument or table.candidate.effect.is_instrument):
+        return table
+    beside = [owner.active(first.sizes[0])]
+    return tabulate(table.candidate, problem.predictor, first.law, beside) or table
 
 
 def _gain(table: Table, pulls: FloatArray, projected: FloatArray, problem: Problem) -> float:
