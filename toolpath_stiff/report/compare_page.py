@@ -5,17 +5,13 @@ Everything from a file is escaped, and a content security policy lets the page l
 
 from __future__ import annotations
 
-import base64
-import html
-import re
-from collections.abc import Mapping, Sequence
-from importlib import resources
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.report.compare_machine import machine_png
 from toolpath_stiff.report.compare_pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare_variables import load_path_png, variables_png
-from toolpath_stiff.report.wording import plain
+from toolpath_stiff.report.sections import bullets, escaped, figures, page, picture, section, text_table
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.compare import Comparison
@@ -72,35 +68,33 @@ def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
     """The page's text, the pictures within."""
     document = found.document
     files = ", ".join(document["data"])
-    about = [f"{document['readings']} readings", files, f"machine {document['machine']}"]
     sections = [
-        _section("Findings" if document["findings"] else "No pattern stands out from scatter", _findings(document)),
-        _picture("measured_modelled.png", pictures),
-        _section("Errors by direction, plane and set-up", _errors(document)),
-        _picture("planes.png", pictures),
-        _picture("machine.png", pictures),
-        _picture("strips.png", pictures),
-        _section("Readings far off", _far_off(document)),
-        _picture("variables.png", pictures),
-        _section("Checks without a model", _model_free(document)),
-        _picture("load_path.png", pictures),
-        _section("All patterns looked for", _tests(document)),
-        _section("How much readings scatter", _noise(document)),
-        _section("Not tested", _bullets(document["not_tested"])),
-        _section("Assumptions", _bullets([*document["assumptions"], *document["notes"]])),
+        section("Findings" if document["findings"] else "No pattern stands out from scatter", _findings(document)),
+        picture("measured_modelled.png", pictures, QUESTIONS),
+        section("Errors by direction, plane and set-up", _errors(document)),
+        picture("planes.png", pictures, QUESTIONS),
+        picture("machine.png", pictures, QUESTIONS),
+        picture("strips.png", pictures, QUESTIONS),
+        section("Readings far off", _far_off(document)),
+        picture("variables.png", pictures, QUESTIONS),
+        section("Checks without a model", _model_free(document)),
+        picture("load_path.png", pictures, QUESTIONS),
+        section("All patterns looked for", _tests(document)),
+        section("How much readings scatter", _noise(document)),
+        section("Not tested", bullets(document["not_tested"])),
+        section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
     ]
-    parts = {
-        "title": _text(files),
-        "headline": _text(_headline(document)),
-        "text": _text(document["text"]),
-        "about": _text("   ·   ".join(about)),
-        "figures": _figures(document),
-        "warnings": "\n".join(f'<p class="warning">{_text(warning)}</p>' for warning in document["warnings"]),
-        "sections": "\n".join(section for section in sections if section),
-        "footer": f"tps compare, seed {document['seed']}",
-    }
-    template = resources.files("toolpath_stiff.report").joinpath("assets", "compare.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+    return page(
+        title=f"Comparison: {files}",
+        verdict="Where does the model fail?",
+        headline=_headline(document),
+        text=document["text"],
+        about=[f"{document['readings']} readings", files, f"machine {document['machine']}"],
+        figures=_figures(document),
+        warnings=document["warnings"],
+        sections=sections,
+        footer=f"tps compare, seed {document['seed']}",
+    )
 
 
 def _headline(document: Mapping[str, Any]) -> str:
@@ -108,38 +102,6 @@ def _headline(document: Mapping[str, Any]) -> str:
     if document["findings"]:
         return str(document["findings"][0]["text"])
     return f"{document['baseline']['mean_abs_error_percent']:.2g} % off in the mean, without a pattern"
-
-
-def _text(value: object) -> str:
-    return html.escape(plain(str(value)))
-
-
-def _section(title: str, body: str) -> str:
-    return f"<section><h2>{_text(title)}</h2>{body}</section>" if body else ""
-
-
-def _bullets(sentences: Sequence[object]) -> str:
-    return "<ul>" + "".join(f"<li>{_text(sentence)}</li>" for sentence in sentences) + "</ul>" if sentences else ""
-
-
-def _picture(name: str, pictures: Mapping[str, bytes]) -> str:
-    question, reading = QUESTIONS[name]
-    source = base64.b64encode(pictures[name]).decode("ascii")
-    image = f'<img alt="{_text(question)}" src="data:image/png;base64,{source}">'
-    # The picture shows its question itself, for whoever opens it alone.
-    return f'<section><h2 class="unseen">{_text(question)}</h2>{image}<p class="muted">{_text(reading)}</p></section>'
-
-
-def _table(head: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]], numeric: Sequence[int] = ()) -> str:
-    """A table of (class, texts); the columns `numeric` are aligned to the right. Empty without rows."""
-
-    def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(
-            f"<{tag}{' class=num' if i in numeric else ''}>{_text(cell)}</{tag}>" for i, cell in enumerate(row)
-        )
-
-    body = "".join(f'<tr class="{kind}">{cells("td", row)}</tr>' for kind, row in rows)
-    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>" if rows else ""
 
 
 def _figures(document: Mapping[str, Any]) -> str:
@@ -157,20 +119,20 @@ def _figures(document: Mapping[str, Any]) -> str:
     ]
     if refit:
         found.append((f"{refit['mean_abs_error_percent']:.2f} %", "mean error with the strut law refitted"))
-    return "".join(f"<li><b>{_text(value)}</b><span>{_text(name)}</span></li>" for value, name in found)
+    return figures(found)
 
 
 def _findings(document: Mapping[str, Any]) -> str:
     """Findings with their probabilities, or the strongest hints."""
     if not document["findings"]:
         hints = [("out", (*_said(one), _alike(one))) for one in document["hints"]]
-        return _table(("the strongest hints", "t", "p, corrected", "looks the same in these data"), hints, (1, 2))
+        return text_table(("the strongest hints", "t", "p, corrected", "looks the same in these data"), hints, (1, 2))
     rows = []
     for one in document["findings"]:
         after = one.get("after_strut_law_refit")
         rows.append(("finding", (*_said(one), f"{after['p_adjusted']:.2g}" if after else "-", _alike(one))))
     head = ("finding", "t", "p, corrected", "p if the strut law is refitted", "looks the same in these data")
-    return _table(head, rows, range(1, 4))
+    return text_table(head, rows, range(1, 4))
 
 
 def _said(one: Mapping[str, Any]) -> tuple[str, str, str]:
@@ -203,7 +165,7 @@ def _errors(document: Mapping[str, Any]) -> str:
         for name, one in levels
     ]
     head = ["", "readings", "mean error", "bias", "rms", *(f"rms of scatter alone ({name})" for name in names)]
-    return _table(head, rows, range(1, len(head)))
+    return text_table(head, rows, range(1, len(head)))
 
 
 def _far_off(document: Mapping[str, Any]) -> str:
@@ -221,7 +183,7 @@ def _far_off(document: Mapping[str, Any]) -> str:
         for one in document["far_off"][:MOST_FAR_OFF]
     ]
     head = ("line", "direction", "point", "beside the findings", "standard deviations")
-    return _table(head, rows, (3, 4))
+    return text_table(head, rows, (3, 4))
 
 
 def _model_free(document: Mapping[str, Any]) -> str:
@@ -235,7 +197,7 @@ def _model_free(document: Mapping[str, Any]) -> str:
         for one in found["checks"]
     ]
     rows += [("out", (one["check"], f"not checked: {one['reason']}", "", "")) for one in found["cannot_check"]]
-    return _table(("principle", "result", "t", "p, corrected"), rows, (2, 3))
+    return text_table(("principle", "result", "t", "p, corrected"), rows, (2, 3))
 
 
 def _tests(document: Mapping[str, Any]) -> str:
@@ -254,12 +216,12 @@ def _tests(document: Mapping[str, Any]) -> str:
         )
         for one in tests[:MOST_ROWS]
     ]
-    table = _table(("pattern", "kind", "readings", "t", "p, corrected"), rows, (2, 3, 4))
+    table = text_table(("pattern", "kind", "readings", "t", "p, corrected"), rows, (2, 3, 4))
     if not table:
         return ""
     remark = f"{len(tests)} patterns were looked for, each on its own here"
     remark += f"; the strongest {MOST_ROWS} are shown, all are in compare.json." if len(tests) > MOST_ROWS else "."
-    return f"<details><summary>{_text(remark)}</summary>{table}</details>"
+    return f"<details><summary>{escaped(remark)}</summary>{table}</details>"
 
 
 def _noise(document: Mapping[str, Any]) -> str:
@@ -281,4 +243,4 @@ def _noise(document: Mapping[str, Any]) -> str:
     ]
     head = ("noise", "reading", "clamping", "struts", "beyond it, place to place", "p of residuals this large",
             "origin")  # fmt: skip
-    return _table(head, rows, range(1, 6))
+    return text_table(head, rows, range(1, 6))

@@ -5,11 +5,7 @@ Everything from a file is escaped, and a content security policy lets the page l
 
 from __future__ import annotations
 
-import base64
-import html
-import re
-from collections.abc import Mapping, Sequence
-from importlib import resources
+from collections.abc import Mapping
 from typing import Any
 
 from toolpath_stiff.report.diagnose_words import (
@@ -32,7 +28,8 @@ from toolpath_stiff.report.diagnose_words import (
     remark_text,
     significant,
 )
-from toolpath_stiff.report.wording import number, plain
+from toolpath_stiff.report.sections import bullets, escaped, figures, page, picture, section, table
+from toolpath_stiff.report.wording import number
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
@@ -77,65 +74,31 @@ def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) ->
     readings = figure_of(document, "readings")
     about = [f"{readings:.0f} readings" if readings is not None else "", files, f"machine {document.get('machine')}"]
     sections = [
-        _section("Why", _bullets(entries(document, "why"))),
-        _picture("ladder.png", pictures),
-        _section("What the fits say", _candidates(document)),
-        _picture("before_after.png", pictures),
-        _picture("confounding.png", pictures),
-        _picture("detectable.png", pictures),
-        _section("What to measure or do next", _next(document)),
-        _section("What these data cannot test", _cannot_test(document)),
-        _section("How much the choice matters on the tool path", _path(document)),
-        _picture("envelope.png", pictures),
-        _section("How much readings scatter", _noise(document)),
-        _section("Assumptions", _bullets([*entries(document, "assumptions"), *entries(document, "notes")])),
+        section("Why", bullets(entries(document, "why"))),
+        picture("ladder.png", pictures, QUESTIONS),
+        section("What the fits say", _candidates(document)),
+        picture("before_after.png", pictures, QUESTIONS),
+        picture("confounding.png", pictures, QUESTIONS),
+        picture("detectable.png", pictures, QUESTIONS),
+        section("What to measure or do next", _next(document)),
+        section("What these data cannot test", _cannot_test(document)),
+        section("How much the choice matters on the tool path", _path(document)),
+        picture("envelope.png", pictures, QUESTIONS),
+        section("How much readings scatter", _noise(document)),
+        section("Assumptions", bullets([*entries(document, "assumptions"), *entries(document, "notes")])),
     ]
-    parts = {
-        "title": _text(files or verdict),
-        "verdict": _text(verdict),
-        "verdict_class": verdict if verdict in HEADLINES else "",
-        "headline": _text(headline(document)),
-        "text": _text(document.get("text") or ""),
-        "about": _text("   ·   ".join(part for part in about if part)),
-        "figures": _figures(document),
-        "warnings": "\n".join(f'<p class="warning">{_text(warning)}</p>' for warning in entries(document, "warnings")),
-        "sections": "\n".join(section for section in sections if section),
-        "footer": f"<code>{_text(document.get('command') or '')}</code> seed {_text(document.get('seed', '-'))}",
-    }
-    template = resources.files("toolpath_stiff.report").joinpath("assets", "diagnose.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
-
-
-def _text(value: object) -> str:
-    return html.escape(plain(str(value)))
-
-
-def _section(title: str, body: str) -> str:
-    return f"<section><h2>{_text(title)}</h2>{body}</section>" if body else ""
-
-
-def _bullets(sentences: Sequence[object]) -> str:
-    return "<ul>" + "".join(f"<li>{_text(sentence)}</li>" for sentence in sentences) + "</ul>" if sentences else ""
-
-
-def _picture(name: str, pictures: Mapping[str, bytes]) -> str:
-    if name not in pictures:
-        return ""
-    question, reading = QUESTIONS[name]
-    source = base64.b64encode(pictures[name]).decode("ascii")
-    image = f'<img alt="{_text(question)}" src="data:image/png;base64,{source}">'
-    # The picture shows its question itself, for whoever opens it alone.
-    return f'<section><h2 class="unseen">{_text(question)}</h2>{image}<p class="muted">{_text(reading)}</p></section>'
-
-
-def _table(head: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]], numeric: Sequence[int] = ()) -> str:
-    """A table of (class, cells that are HTML already); the columns `numeric` are aligned to the right."""
-
-    def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(f"<{tag}{' class=num' if i in numeric else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
-
-    body = "".join(f'<tr class="{kind}">{cells("td", row)}</tr>' for kind, row in rows)
-    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>"
+    return page(
+        title=f"Diagnosis: {files or verdict}",
+        verdict=verdict,
+        headline=headline(document),
+        text=document.get("text") or "",
+        about=about,
+        figures=_figures(document),
+        warnings=entries(document, "warnings"),
+        sections=sections,
+        footer=f"<code>{escaped(document.get('command') or '')}</code> seed {escaped(document.get('seed', '-'))}",
+        verdict_class=verdict if verdict in HEADLINES else "",
+    )
 
 
 def _figures(document: Mapping[str, Any]) -> str:
@@ -149,7 +112,7 @@ def _figures(document: Mapping[str, Any]) -> str:
     found.append((plausible_text(entries(document, "plausible")), "hold the truth with 95 % probability"))
     if not entries(document, "plausible"):
         found[-1] = ("no effect", "of the catalogue explains these data")
-    return "".join(f"<li><b>{_text(value)}</b><span>{_text(name)}</span></li>" for value, name in found)
+    return figures(found)
 
 
 def _candidates(document: Mapping[str, Any]) -> str:
@@ -166,32 +129,32 @@ def _candidates(document: Mapping[str, Any]) -> str:
             (
                 kind,
                 (
-                    f"{_text(name)}<small>{_text(title)}</small>",
-                    "<br>".join(f"<span class=whole>{_text(size)}</span>" for size in parameter_texts(entry)) or "-",
-                    _text(probability_text(figure_of(entry, "probability"))),
-                    _text(percent(figure_of(entry, "mean_abs_error_percent"), 2)),
-                    _text(percent(figure_of(entry, "held_out_error_percent"), 2)),
+                    f"{escaped(name)}<small>{escaped(title)}</small>",
+                    "<br>".join(f"<span class=whole>{escaped(size)}</span>" for size in parameter_texts(entry)) or "-",
+                    escaped(probability_text(figure_of(entry, "probability"))),
+                    escaped(percent(figure_of(entry, "mean_abs_error_percent"), 2)),
+                    escaped(percent(figure_of(entry, "held_out_error_percent"), 2)),
                     "-" if gain is None else f"{gain:.1f}",
-                    _text({True: "yes", False: "no"}.get(entry.get("adequate"), "-")),
-                    _text(remark_text(entry)),
+                    escaped({True: "yes", False: "no"}.get(entry.get("adequate"), "-")),
+                    escaped(remark_text(entry)),
                 ),
             )
         )
     head = ("effect", "size (95 % interval)", "probability", "mean error", "at points left out",
             "fall in standard errors", "leaves scatter only", "remark")  # fmt: skip
-    return _table(head, rows, range(2, 6))
+    return table(head, rows, range(2, 6))
 
 
 def _next(document: Mapping[str, Any]) -> str:
     """What to do, and the readings that tell most."""
     readings = [entry for entry in entries(document, "next_measurements") if isinstance(entry, Mapping)]
-    body = _bullets(entries(document, "next"))
+    body = bullets(entries(document, "next"))
     if readings:
         keys = list(dict.fromkeys(key for entry in readings for key in entry if key != "why"))
         keys = [key for key in keys if any(entry.get(key) not in ("", None) for entry in readings)]
         rows = [("", [*(_cell(entry.get(key)) for key in keys), _cell(entry.get("why"))]) for entry in readings]
         numeric = [i for i, key in enumerate(keys) if all(_is_number(entry.get(key)) for entry in readings)]
-        body += _table([*map(_text, keys), "why"], rows, numeric)
+        body += table([*map(escaped, keys), "why"], rows, numeric)
     return body
 
 
@@ -202,27 +165,27 @@ def _is_number(value: object) -> bool:
 def _cell(value: object) -> str:
     if value is None:
         return ""
-    return _text(f"{value:.6g}" if isinstance(value, float) else value)
+    return escaped(f"{value:.6g}" if isinstance(value, float) else value)
 
 
 def _cannot_test(document: Mapping[str, Any]) -> str:
     rows = []
     for entry in entries(document, "cannot_test"):
-        columns = ", ".join(f"<code>{_text(name)}</code>" for name in entry.get("missing") or [])
-        rows.append(("", [_text(entry.get("effect", "?")), columns or "nothing in these data depends on it"]))
+        columns = ", ".join(f"<code>{escaped(name)}</code>" for name in entry.get("missing") or [])
+        rows.append(("", [escaped(entry.get("effect", "?")), columns or "nothing in these data depends on it"]))
     # 80 % power is what `detectable` asks for.
     never = [e for e in entries(document, "detectable") if isinstance(e, Mapping) and e.get("detectable") is False]
     rows += [
         (
             "",
             [
-                _text(hidden_name(e)),
+                escaped(hidden_name(e)),
                 "even at its largest possible size these data would show it less than four times in five",
             ],
         )
         for e in never
     ]
-    return _table(("effect", "the column that is missing"), rows) if rows else ""
+    return table(("effect", "the column that is missing"), rows) if rows else ""
 
 
 def _path(document: Mapping[str, Any]) -> str:
@@ -232,9 +195,9 @@ def _path(document: Mapping[str, Any]) -> str:
         return ""
     explanations = (document.get("path") or {}).get("explanations") or {}
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
-    rows = [("", [_text(name), *(number(figure_of(one, key)) for key in keys)]) for name, one in explanations.items()]
-    table = _table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3)) if rows else ""
-    return f"<p>{_text(text[0].upper() + text[1:])}.</p>{table}"
+    rows = [("", [escaped(name), *(number(figure_of(one, key)) for key in keys)]) for name, one in explanations.items()]
+    listed = table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3)) if rows else ""
+    return f"<p>{escaped(text[0].upper() + text[1:])}.</p>{listed}"
 
 
 def _noise(document: Mapping[str, Any]) -> str:
@@ -249,7 +212,7 @@ def _noise(document: Mapping[str, Any]) -> str:
     if (joints := figure_of(noise, "joint_error_mm")) is not None:
         parts.append(f"joints {significant(joints, 2)} mm")
     origin = str(noise.get("origin") or "")
-    body = f"<p>Standard deviations: {_text(', '.join(parts))}. {_text(origin)}</p>" if parts else ""
+    body = f"<p>Standard deviations: {escaped(', '.join(parts))}. {escaped(origin)}</p>" if parts else ""
     found = document.get("by_noise") or {}
     if found:
         rows = []
@@ -257,10 +220,12 @@ def _noise(document: Mapping[str, Any]) -> str:
             likely = one.get("probability")
             shown = [f"{key} {probability_text(value)}" for key, value in likely.items()] if likely else []
             rows.append(
-                ("", [_text(name), _text(percent(figure_of(one, "noise_percent"))), _text(one.get("verdict", "-")),
-                      _text(plausible_text(one.get("plausible") or [])), _text(", ".join(shown[:4]))])
+                ("", [escaped(cell) for cell in (
+                    name, percent(figure_of(one, "noise_percent")), one.get("verdict", "-"),
+                    plausible_text(one.get("plausible") or []), ", ".join(shown[:4]),
+                )])
             )  # fmt: skip
-        body += _table(("noise", "one reading", "verdict", "plausible", "probability"), rows, (1,))
+        body += table(("noise", "one reading", "verdict", "plausible", "probability"), rows, (1,))
     if len(found) > 1:
         body += '<p class="muted">The noise is a guess: the verdict is what both guesses have in common.</p>'
     return body

@@ -5,14 +5,11 @@ Everything from a file is escaped, and a content security policy lets the page l
 
 from __future__ import annotations
 
-import base64
-import html
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
+from collections.abc import Mapping
 from typing import Any
 
-from toolpath_stiff.report.wording import number, plain
+from toolpath_stiff.report.sections import bullets, figures, page, picture, section, text_table
+from toolpath_stiff.report.wording import number
 
 VERDICTS = {
     "updated": "The machine is updated",
@@ -57,26 +54,24 @@ def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]
         f"machine file: {document['machine_file'] or 'none written'}",
     ]
     sections = [
-        *(_picture(name, pictures) for name in QUESTIONS if name in pictures),
-        _section("Errors by direction", _by_direction(document)),
-        _section("What was fitted", _fitted(document)),
-        _section("Does the data bear it?", _support(document)),
-        _section("Where it comes from", _bullets(record)),
-        _section("Assumptions", _bullets([*document["assumptions"], *document["notes"]])),
+        *(picture(name, pictures, QUESTIONS) for name in QUESTIONS),
+        section("Errors by direction", _by_direction(document)),
+        section("What was fitted", _fitted(document)),
+        section("Does the data bear it?", _support(document)),
+        section("Where it comes from", bullets(record)),
+        section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
     ]
-    parts = {
-        "title": _text(files),
-        "verdict": _text(VERDICTS[document["verdict"]]),
-        "headline": _text(_headline(document)),
-        "text": _text(document["text"]),
-        "about": _text(f"{document['readings']} readings   ·   {files}   ·   machine {document['machine']}"),
-        "figures": _figures(document),
-        "warnings": "\n".join(f'<p class="warning">{_text(warning)}</p>' for warning in document["warnings"]),
-        "sections": "\n".join(section for section in sections if section),
-        "footer": f"tps update, seed {document['seed']}",
-    }
-    template = resources.files("toolpath_stiff.report").joinpath("assets", "update.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+    return page(
+        title=f"Update: {files}",
+        verdict=VERDICTS[document["verdict"]],
+        headline=_headline(document),
+        text=document["text"],
+        about=[f"{document['readings']} readings", files, f"machine {document['machine']}"],
+        figures=_figures(document),
+        warnings=document["warnings"],
+        sections=sections,
+        footer=f"tps update, seed {document['seed']}",
+    )
 
 
 def _headline(document: Mapping[str, Any]) -> str:
@@ -94,7 +89,7 @@ def _figures(document: Mapping[str, Any]) -> str:
         (_percent(last["held_out_error_percent"]), "after, at left-out points"),
         (_percent(document["noise_floor_percent"]), "noise floor"),
     ]
-    return "".join(f"<li><b>{_text(value)}</b><span>{_text(name)}</span></li>" for value, name in found)
+    return figures(found)
 
 
 def _by_direction(document: Mapping[str, Any]) -> str:
@@ -112,7 +107,7 @@ def _by_direction(document: Mapping[str, Any]) -> str:
         for name, before in first.items()
     ]
     head = ("direction", "readings", "before", "after", "after, left out", "bias before", "bias after")
-    return _table(head, rows, range(1, len(head)))
+    return text_table(head, [("", row) for row in rows], range(1, len(head)))
 
 
 def _fitted(document: Mapping[str, Any]) -> str:
@@ -129,7 +124,7 @@ def _fitted(document: Mapping[str, Any]) -> str:
                 rows.append((effect, key, f"{_value(value['value'])} {value['unit']}", f"{low} to {high}"))
             else:
                 rows.append((effect, key, str(value), "chosen"))
-    return _table(("effect", "parameter", "value", "95 % interval, or sd"), rows, (2, 3))
+    return text_table(("effect", "parameter", "value", "95 % interval, or sd"), [("", row) for row in rows], (2, 3))
 
 
 def _support(document: Mapping[str, Any]) -> str:
@@ -146,7 +141,7 @@ def _support(document: Mapping[str, Any]) -> str:
             )
         )
     head = ("effect", "borne", "fall at left-out points", "gain in twice the log likelihood", "what speaks against it")
-    return _table(head, rows, (2, 3))
+    return text_table(head, [("", row) for row in rows], (2, 3))
 
 
 def _percent(value: float | None) -> str:
@@ -155,38 +150,3 @@ def _percent(value: float | None) -> str:
 
 def _value(value: float | None) -> str:
     return "inf" if value is None else f"{value:.4g}"
-
-
-def _text(value: object) -> str:
-    return html.escape(plain(str(value)))
-
-
-def _section(title: str, body: str) -> str:
-    return f"<section><h2>{_text(title)}</h2>{body}</section>" if body else ""
-
-
-def _bullets(sentences: Sequence[object]) -> str:
-    return "<ul>" + "".join(f"<li>{_text(sentence)}</li>" for sentence in sentences) + "</ul>" if sentences else ""
-
-
-def _picture(name: str, pictures: Mapping[str, bytes | str]) -> str:
-    picture = pictures[name]
-    assert isinstance(picture, bytes)
-    question, reading = QUESTIONS[name]
-    source = base64.b64encode(picture).decode("ascii")
-    image = f'<img alt="{_text(question)}" src="data:image/png;base64,{source}">'
-    # The picture shows its question itself, for whoever opens it alone.
-    return f'<section><h2 class="unseen">{_text(question)}</h2>{image}<p class="muted">{_text(reading)}</p></section>'
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numeric: Iterable[int] = ()) -> str:
-    """A table; the columns `numeric` are aligned to the right. Empty without rows."""
-    right = set(numeric)
-
-    def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(
-            f"<{tag}{' class=num' if i in right else ''}>{_text(cell)}</{tag}>" for i, cell in enumerate(row)
-        )
-
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>" if rows else ""

@@ -1,0 +1,89 @@
+"""Pages that are a headline, a few figures and sections below each other: comparison, diagnosis, update. No network.
+
+Everything from a file is escaped, and a content security policy lets the page load nothing and run nothing.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
+
+from toolpath_stiff.report.wording import plain
+
+Row = tuple[str, Sequence[str]]  # class of the row, its cells
+
+
+def escaped(value: object) -> str:
+    """Text as HTML."""
+    return html.escape(plain(str(value)))
+
+
+def section(title: str, body: str) -> str:
+    """A titled section; nothing where there is no body."""
+    return f"<section><h2>{escaped(title)}</h2>{body}</section>" if body else ""
+
+
+def bullets(sentences: Sequence[object]) -> str:
+    """A list; nothing without sentences."""
+    return "<ul>" + "".join(f"<li>{escaped(sentence)}</li>" for sentence in sentences) + "</ul>" if sentences else ""
+
+
+def picture(name: str, pictures: Mapping[str, bytes | str], questions: Mapping[str, tuple[str, str]]) -> str:
+    """A PNG under the question that it answers, with how it is read; nothing where it was not drawn."""
+    content = pictures.get(name)
+    if not isinstance(content, bytes):
+        return ""
+    question, reading = questions[name]
+    source = base64.b64encode(content).decode("ascii")
+    image = f'<img alt="{escaped(question)}" src="data:image/png;base64,{source}">'
+    # The picture shows its question itself, for whoever opens it alone.
+    return (
+        f'<section><h2 class="unseen">{escaped(question)}</h2>{image}<p class="muted">{escaped(reading)}</p></section>'
+    )
+
+
+def table(head: Sequence[str], rows: Sequence[Row], numeric: Iterable[int] = ()) -> str:
+    """A table of cells that are HTML already; the columns `numeric` are aligned to the right. Nothing without rows."""
+    right = set(numeric)
+
+    def cells(tag: str, row: Sequence[str]) -> str:
+        return "".join(f"<{tag}{' class=num' if i in right else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
+
+    body = "".join(
+        f'<tr class="{kind}">{cells("td", row)}</tr>' if kind else f"<tr>{cells('td', row)}</tr>" for kind, row in rows
+    )
+    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>" if rows else ""
+
+
+def text_table(head: Sequence[str], rows: Sequence[Row], numeric: Iterable[int] = ()) -> str:
+    """A table of plain texts."""
+    return table([*map(escaped, head)], [(kind, [*map(escaped, row)]) for kind, row in rows], numeric)
+
+
+def figures(found: Iterable[tuple[str, str]]) -> str:
+    """The few figures that say it all: (figure, what it is)."""
+    return "".join(f"<li><b>{escaped(value)}</b><span>{escaped(name)}</span></li>" for value, name in found)
+
+
+def page(
+    title: str, verdict: str, headline: str, text: str, about: Sequence[str], figures: str, warnings: Sequence[str],
+    sections: Iterable[str], footer: str, verdict_class: str = "",
+) -> str:  # fmt: skip
+    """The whole page. `figures`, `sections` and `footer` are HTML, the others text."""
+    parts = {
+        "title": escaped(title),
+        "verdict": escaped(verdict),
+        "verdict_class": verdict_class,
+        "headline": escaped(headline),
+        "text": escaped(text),
+        "about": escaped("   ·   ".join(part for part in about if part)),
+        "figures": figures,
+        "warnings": "\n".join(f'<p class="warning">{escaped(warning)}</p>' for warning in warnings),
+        "sections": "\n".join(part for part in sections if part),
+        "footer": footer,
+    }
+    template = resources.files("toolpath_stiff.report").joinpath("assets", "sections.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
