@@ -75,6 +75,11 @@ class Component:
         """Largest size in that direction, as a positive number."""
         return abs(self.bounds[0] if sign < 0.0 else self.bounds[1])
 
+    def allows(self, size: float) -> bool:
+        """Whether a size that is not 0 lies within its bounds."""
+        sign = float(np.sign(size))
+        return sign in self.signs and abs(size) <= self.reach(sign)
+
     def typical(self) -> tuple[float, float]:
         """Usual sizes as positive numbers, smallest and largest; 0 and inf where nothing is said."""
         ends = []

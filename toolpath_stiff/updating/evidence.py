@@ -266,7 +266,7 @@ class Problem:
         if len(tables) > 1:
             _pull_back(chosen, sizes)
         own = [float(sizes[id(table)][j]) for table, j in chosen]
-        possible = all(_possible(table, j, size) for (table, j), size in zip(chosen, own, strict=True))
+        possible = all(t.candidate.components[j].allows(size) for (t, j), size in zip(chosen, own, strict=True))
         if not possible and len(free) > 1:
             return None
         likelihood = float(scatter.log_likelihood(residual))
@@ -378,11 +378,6 @@ class _Scan:
 def _scaled_inverse(matrix: FloatArray) -> FloatArray:
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
-
-
-def _possible(table: Table, j: int, size: float) -> bool:
-    component, sign = table.candidate.components[j], float(np.sign(size))
-    return sign in component.signs and abs(size) <= component.reach(sign)
 
 
 def _pull_back(chosen: Sequence[tuple[Table, int]], sizes: dict[int, FloatArray]) -> None:
