@@ -5,9 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 
-from toolpath_stiff.cli.arguments import add_json_option
-from toolpath_stiff.cli.diagnose import noise_argument, spread_argument
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.cli.arguments import limit_threads
+from toolpath_stiff.cli.measurement_arguments import (
+    add_data_arguments,
+    add_noise_arguments,
+    add_output_arguments,
+    check_seed,
+)
 
 EPILOG = """\
 examples:
@@ -31,40 +35,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("data", nargs="+", metavar="DATA", help="measurement files, or nist-table1")
-    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
-    parser.add_argument("--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects")
-    group = parser.add_argument_group("noise")
-    group.add_argument(
-        "--noise", type=noise_argument, metavar="PERCENT[,PERCENT]",
-        help="sd of one reading, re-clamping included; or of the reading alone and of a clamping "
-        "(default: from repeats, else from sd_N_per_mm, else a low and a high guess)",
-    )  # fmt: skip
-    group.add_argument(
-        "--strut-spread", type=spread_argument, default=0.01, metavar="PERCENT",
-        help="of the struts' stiffness (default: 1)",
-    )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated scatter (default: 0)")
-    parser.add_argument(
-        "--jobs", type=int, default=1, metavar="N", help="threads; the low and the high guess can share them"
-    )
-    parser.add_argument("--out", default="reports/compare", metavar="DIR", help="folder (default: reports/compare)")
-    parser.add_argument("--no-plots", action="store_true", help="only compare.json and residuals.csv")
-    add_json_option(parser, "print compare.json to standard output and nothing else")
+    add_data_arguments(parser)
+    add_noise_arguments(parser)
+    add_output_arguments(parser, "compare", kept="compare.json and residuals.csv")
 
 
 def run(args: argparse.Namespace) -> int:
     """Compare, write, say where the model fails."""
+    check_seed(args.seed)
+    limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.report.compare_text import residuals_csv, terminal_text
     from toolpath_stiff.report.write import write_folder
     from toolpath_stiff.updating.compare import compare
     from toolpath_stiff.updating.measurements import read_measurements
 
-    if args.seed < 0:
-        raise InputError(f"--seed {args.seed}", expected="0 or more")
-    if args.jobs < 1:
-        raise InputError(f"--jobs {args.jobs}", expected="1 or more")
     machine = load_machine(args.machine)
     found = compare(
         machine, read_measurements(args.data, machine), noise=args.noise, strut_spread=args.strut_spread,

@@ -7,8 +7,13 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.cli.arguments import add_json_option, finite_number, limit_threads, pose_argument
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.cli.arguments import limit_threads, pose_argument
+from toolpath_stiff.cli.measurement_arguments import (
+    add_data_arguments,
+    add_noise_arguments,
+    add_output_arguments,
+    check_seed,
+)
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.diagnose import Diagnosis
@@ -35,54 +40,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("data", nargs="+", metavar="DATA", help="measurement files, or nist-table1")
-    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
-    parser.add_argument(
-        "--effects", action="append", default=[], metavar="FILE.py", help="your own effects; they take part"
-    )
-    group = parser.add_argument_group("noise")
-    group.add_argument(
-        "--noise", type=noise_argument, metavar="PERCENT[,PERCENT]",
-        help="sd of one reading, re-clamping included; or of the reading alone and of a clamping "
-        "(default: from repeats, else from sd_N_per_mm, else a low and a high guess)",
-    )  # fmt: skip
-    group.add_argument(
-        "--strut-spread",
-        type=spread_argument,
-        default=0.01,
-        metavar="PERCENT",
-        help="of the struts' stiffness (default: 1)",
-    )
+    add_data_arguments(parser)
+    add_noise_arguments(parser)
     group = parser.add_argument_group("how much the choice matters")
     group.add_argument(
         "--program", metavar="PROGRAM", help="NC program to try it on (default: the packaged case study)"
     )
     group.add_argument("--origin", type=pose_argument, metavar="X,Y,Z[,A,B,C]", help="its program zero, mm and degrees")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the bootstrap (default: 0)")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
-    parser.add_argument("--out", default="reports/diagnose", metavar="DIR", help="folder (default: reports/diagnose)")
-    parser.add_argument("--no-plots", action="store_true", help="only diagnose.json and residuals.csv")
-    add_json_option(parser, "print diagnose.json to standard output and nothing else")
-
-
-def noise_argument(text: str) -> float | tuple[float, float]:
-    """One or two percentages as relative standard deviations."""
-    parts = [finite_number(part) / 100.0 for part in text.split(",")]
-    if len(parts) > 2 or not all(0.0 <= part <= 0.5 for part in parts) or parts[0] <= 0.0:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected one or two percentages, more than 0 and at most 50")
-    return parts[0] if len(parts) == 1 else (parts[0], parts[1])
-
-
-def spread_argument(text: str) -> float:
-    """A percentage from 0 to 50 as a relative standard deviation."""
-    value = finite_number(text)
-    if not 0.0 <= value <= 50.0:
-        raise argparse.ArgumentTypeError(f"{text} %: expected 0 to 50 %")
-    return value / 100.0
+    add_output_arguments(parser, "diagnose", kept="diagnose.json and residuals.csv")
 
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write, say what was found. Any verdict is success."""
+    check_seed(args.seed)
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.report.write import write_folder
@@ -90,8 +60,6 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.updating.diagnosis_document import document
     from toolpath_stiff.updating.measurements import read_measurements
 
-    if args.seed < 0:
-        raise InputError(f"--seed {args.seed}", expected="0 or more")
     machine = load_machine(args.machine)
     data = read_measurements(args.data, machine)
     diagnosis = diagnose(

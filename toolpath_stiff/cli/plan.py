@@ -9,8 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.cli.arguments import add_json_option, finite_number, positive_number
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.cli.arguments import finite_number, limit_threads, positive_number
+from toolpath_stiff.cli.measurement_arguments import (
+    add_data_arguments,
+    add_noise_arguments,
+    add_output_arguments,
+    check_seed,
+)
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
@@ -38,8 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("data", nargs="*", metavar="DATA", help="measurement files, or nist-table1; none: a campaign")
-    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
+    add_data_arguments(parser, nargs="*", otherwise="; none: a first campaign")
     parser.add_argument("--between", type=_names, metavar="A,B", help="tell these effects apart (or `none`)")
     parser.add_argument("--n", type=int, metavar="N", help="poses (default: 6, or 24 of a first campaign)")
     group = parser.add_argument_group("what may vary")
@@ -58,18 +62,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--cost", action="append", default=[], type=_cost, metavar="WHAT=MINUTES",
         help="of a reading (default 1), a pose (15), another tool (10), another setup (45)",
     )  # fmt: skip
-    parser.add_argument(
-        "--noise", type=positive_number("%", 50.0), metavar="PERCENT", help="of one reading, if the data do not tell it"
-    )
-    parser.add_argument(
-        "--strut-spread", type=float, default=1.0, metavar="PERCENT", help="between struts (default: 1)"
-    )
-    parser.add_argument("--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="accepted for uniformity; a plan needs one")
-    parser.add_argument("--out", default="reports/plan", metavar="DIR", help="folder (default: reports/plan)")
-    parser.add_argument("--no-plots", action="store_true", help="no plan.png")
-    add_json_option(parser, "print plan.json to standard output and nothing else")
+    add_noise_arguments(parser, guess="a high guess, or 2 %% without data")
+    add_output_arguments(parser, "plan", kept="plan.csv and plan.json")
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -99,14 +93,12 @@ def _cost(text: str) -> tuple[str, float]:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, write the files, say what the plan promises."""
+    check_seed(args.seed)
+    limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.stiffness.effects.registry import known_effects
     from toolpath_stiff.updating.plan_menu import Costs
 
-    if args.seed < 0:
-        raise InputError(f"--seed {args.seed}", expected="0 or more")
-    if not 0.0 <= args.strut_spread <= 50.0:
-        raise InputError(f"--strut-spread {args.strut_spread:g}", expected="0 to 50 %")
     machine = load_machine(args.machine)
     effects = known_effects(args.effects)
     costs = Costs(**dict(args.cost))
@@ -176,15 +168,15 @@ def _told_apart(
         rivals, noise, notes, verdict = _rivals(args, machine, data, effects)
     else:
         menu = _menu(args, Menu(setups=("table", "riser")))
-        noise = CAMPAIGN_NOISE if args.noise is None else args.noise / 100.0
+        noise = CAMPAIGN_NOISE if args.noise is None else args.noise
         rivals = unfitted_rivals(args.between, effects, setup=menu.setups[-1])
         notes = ["no data: the rivals are taken at their usual sizes"]
-        notes += [] if args.noise else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
+        notes += [] if args.noise is not None else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
         verdict = ""
     n = PLAN_POSES if args.n is None else args.n
     plan = plan_measurements(
         machine, rivals, noise, n, menu=menu, costs=costs, seed=args.seed, effect_files=args.effects,
-        strut_spread=args.strut_spread / 100.0,
+        strut_spread=args.strut_spread,
     )  # fmt: skip
     plan = replace(plan, notes=(*notes, *plan.notes))
     rows = plan_rows(plan.visits, plan.chosen, taken)
@@ -216,7 +208,7 @@ def _rivals(
     from toolpath_stiff.updating.verdict import judge
 
     # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
-    noise = noise_models(data, None if args.noise is None else args.noise / 100.0, args.strut_spread / 100.0)[-1]
+    noise = noise_models(data, args.noise, args.strut_spread)[-1]
     notes = [f"noise: {noise.origin}"]
     predictor = Predictor(machine, data, args.effects)
     scatter = covariance(noise, predictor)
@@ -245,7 +237,7 @@ def _campaign(
     from toolpath_stiff.updating.plan_files import plan_csv, plan_rows
     from toolpath_stiff.updating.plan_menu import Menu
 
-    noise = CAMPAIGN_NOISE if args.noise is None else args.noise / 100.0
+    noise = CAMPAIGN_NOISE if args.noise is None else args.noise
     campaign = first_campaign(
         machine, CAMPAIGN_POSES if args.n is None else args.n, menu=_menu(args, Menu(setups=(TABLE, RISER))),
         costs=costs, seed=args.seed, effects=effects, noise=noise, effect_files=args.effects,

@@ -8,8 +8,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.cli.arguments import add_json_option, limit_threads
-from toolpath_stiff.cli.diagnose import noise_argument, spread_argument
+from toolpath_stiff.cli.arguments import limit_threads
+from toolpath_stiff.cli.measurement_arguments import (
+    add_data_arguments,
+    add_noise_arguments,
+    add_output_arguments,
+    check_seed,
+)
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,8 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("data", nargs="+", metavar="DATA", help="measurement files, or nist-table1")
-    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
+    add_data_arguments(parser)
     parser.add_argument(
         "--add", action="append", default=[], metavar="EFFECT[:KEY=VALUE,..]",
         help="effect to fit; what it acts on is searched unless it is said (weak_strut:strut=3)",
@@ -55,23 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--objective", choices=("likelihood", "mean-error"), default="likelihood",
         help="mean-error: the strut law alone, as the paper fitted it (default: likelihood)",
     )  # fmt: skip
-    parser.add_argument("--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects")
-    group = parser.add_argument_group("noise")
-    group.add_argument(
-        "--noise", type=noise_argument, metavar="PERCENT[,PERCENT]",
-        help="sd of one reading, re-clamping included; or of the reading alone and of a clamping "
-        "(default: from repeats, else from sd_N_per_mm, else a high guess)",
-    )  # fmt: skip
-    group.add_argument(
-        "--strut-spread", type=spread_argument, default=0.01, metavar="PERCENT",
-        help="of the struts' stiffness (default: 1)",
-    )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of starts and bootstraps (default: 0)")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
     parser.add_argument("-o", "--output", metavar="MACHINE.toml", help="the new machine file (default: in --out)")
-    parser.add_argument("--out", default="reports/update", metavar="DIR", help="folder (default: reports/update)")
-    parser.add_argument("--no-plots", action="store_true", help="only update.json, residuals.csv and the machine file")
-    add_json_option(parser, "print update.json to standard output and nothing else")
+    add_noise_arguments(parser, guess="a high guess")
+    add_output_arguments(parser, "update", kept="update.json, residuals.csv and the machine file")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -123,9 +113,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> None:
-    for option, least in (("seed", 0), ("jobs", 1)):
-        if getattr(args, option) < least:
-            raise InputError(f"--{option} {getattr(args, option)}", expected=f"{least} or more")
+    check_seed(args.seed)
     if args.objective == "mean-error" and (args.add or args.auto or not args.strut_law):
         raise InputError(
             "--objective mean-error is the paper's own estimation, of the strut law alone",

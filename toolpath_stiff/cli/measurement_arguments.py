@@ -1,0 +1,63 @@
+"""Arguments that the commands on measurements share: data, machine, how far readings scatter, what is written."""
+
+from __future__ import annotations
+
+import argparse
+
+from toolpath_stiff.cli.arguments import add_json_option, finite_number
+from toolpath_stiff.errors import InputError
+
+
+def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherwise: str = "") -> None:
+    """DATA, --machine and --effects."""
+    parser.add_argument("data", nargs=nargs, metavar="DATA", help="measurement files, or nist-table1" + otherwise)
+    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
+    parser.add_argument(
+        "--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects; they take part"
+    )
+
+
+def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and a high guess") -> None:
+    """--noise and --strut-spread; `guess` is made where nothing is known."""
+    group = parser.add_argument_group("noise")
+    group.add_argument(
+        "--noise", type=noise_argument, metavar="PERCENT[,PERCENT]",
+        help="sd of one reading, re-clamping included; or of the reading alone and of a clamping "
+        f"(default: from repeats, else from sd_N_per_mm, else {guess})",
+    )  # fmt: skip
+    group.add_argument(
+        "--strut-spread", type=spread_argument, default=0.01, metavar="PERCENT",
+        help="of the struts' stiffness (default: 1)",
+    )  # fmt: skip
+
+
+def add_output_arguments(parser: argparse.ArgumentParser, command: str, kept: str) -> None:
+    """--seed, --jobs, --out, --no-plots and --json; `kept` is what --no-plots writes still."""
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
+    folder = f"reports/{command}"
+    parser.add_argument("--out", default=folder, metavar="DIR", help=f"folder (default: {folder})")
+    parser.add_argument("--no-plots", action="store_true", help=f"only {kept}")
+    add_json_option(parser, f"print {command}.json to standard output and nothing else")
+
+
+def check_seed(seed: int) -> None:
+    """Raise `InputError` for a negative seed."""
+    if seed < 0:
+        raise InputError(f"--seed {seed}", expected="0 or more")
+
+
+def noise_argument(text: str) -> float | tuple[float, float]:
+    """One or two percentages as relative standard deviations."""
+    parts = [finite_number(part) / 100.0 for part in text.split(",")]
+    if len(parts) > 2 or not all(0.0 <= part <= 0.5 for part in parts) or parts[0] <= 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected one or two percentages, more than 0 and at most 50")
+    return parts[0] if len(parts) == 1 else (parts[0], parts[1])
+
+
+def spread_argument(text: str) -> float:
+    """A percentage from 0 to 50 as a relative standard deviation."""
+    value = finite_number(text)
+    if not 0.0 <= value <= 50.0:
+        raise argparse.ArgumentTypeError(f"{text} %: expected 0 to 50 %")
+    return value / 100.0
