@@ -16,6 +16,9 @@ NORMAL_95 = NormalDist().inv_cdf(0.975)
 SCATTER_PERCENT = math.hypot(2.0, 1.0)
 FLOOR_PERCENT = 0.80 * SCATTER_PERCENT
 FLOOR_RATIO = 1.3
+# Detectability of the smallest effects that the rig draws (`toolpath_stiff.rig.size.DETECTABLE`); one whose largest
+# size of 30 % stays below cannot be seen in the layout.
+JUST_SEEN = 3.9
 
 
 def wilson(count: int, of: int) -> tuple[float, float]:
@@ -161,6 +164,7 @@ def _of_layout(layout: str, records: Sequence[Record]) -> list[Figure]:
     one = of("one")
     checks = [check for r in one if r.get("choice_right") for check in r["parameters"]]
     ratios = [floor_ratio(r) for r in one]
+    seen = [r for r in one if r["effects"][0]["detectability"] >= JUST_SEEN]
     in_plausible = "one hidden: the truth is in `plausible`"
     return [
         each(in_plausible, "one", holds_truth, at_least=0.95),
@@ -168,6 +172,7 @@ def _of_layout(layout: str, records: Sequence[Record]) -> list[Figure]:
              1.6 if barred else 4.0),
         each("one hidden: first place right", "one", lambda r: r["first"] == truth_of(r), at_least=bar(0.90)),
         each("one hidden: `identified` and right", "one", named, at_least=bar(0.85)),
+        share(layout, f"the same, of those with a detectability of {JUST_SEEN:g} or more", [named(r) for r in seen]),
         each("one hidden: `identified` and wrong", "one", misnamed, at_most=bar(0.05)),
         each("one hidden: `unexplained`", "one", lambda r: r["verdict"] == "unexplained", at_most=bar(0.10)),
         each("none hidden: anything but `adequate`", "none", lambda r: r["verdict"] != "adequate", at_most=bar(0.10)),
@@ -191,6 +196,17 @@ def planned_figures(records: Sequence[Record]) -> list[Figure]:
             bar = 0.80 if (n, label) == (6, "planned") else None
             found.append(share("tilted", f"ambiguous, settleable: settled by {n} {label} poses", hits, at_least=bar))
     if can:
+        expected = sum(r["forecast"] for r in can)
+        found.append(
+            Figure(
+                "tilted",
+                "ambiguous, settleable: the plans' own forecast of the share that six poses settle",
+                f"{100 * expected / len(can):.1f} % ({expected:.1f} of {len(can)})",
+                "",
+                "",
+                None,
+            )
+        )
         totals = [sum(r[f"{label}_{n}"][2] for r in can for n in (2, 4, 6)) for label in ("planned", "random")]
         found.append(
             Figure(
