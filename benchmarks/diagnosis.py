@@ -149,8 +149,8 @@ _WHAT = (
     "not hidden, also beside the right one."
 )
 _DETECTABILITY = (
-    "Whitened length of the effect's signature beside strut law and nuisances. The rig's smallest effects have 3.9 (80 % "
-    "power at 5 % family-wise), but for those whose largest size, 30 %, has less."
+    "Whitened length of the effect's signature beside strut law and nuisances. The rig's smallest effects have 3.9 (80 "
+    "% power at 5 % family-wise), but for those whose largest size, 30 %, has less."
 )
 _CALIBRATION = (
     "All hypotheses of cases with one or no hidden effect that were not `unexplained`. The cases are not mixed as the "
