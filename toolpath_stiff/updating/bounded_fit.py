@@ -90,12 +90,22 @@ def _without_zeros(fit: Fit) -> Fit:
     if len(kept) == len(fit.free):
         return fit
     columns = [0, 1, *(2 + k for k in kept)]
+    # Where the data would pull them, could they go below zero: what an upper limit is counted from.
+    gradient = fit.jacobian.T @ fit.scatter.inverse @ fit.residual
+    gradient[:2] -= fit.law / LAW_PRIOR**2 if fit.law_free else 0.0
+    step, variance = fit.covariance @ gradient, np.diag(fit.covariance)
+    absent = {
+        index: (float(step[2 + k]), float(np.sqrt(max(variance[2 + k], 0.0))))
+        for k, index in enumerate(fit.free)
+        if k not in kept
+    }
     information = _scaled_inverse(fit.covariance)[np.ix_(columns, columns)]
     return replace(
         fit,
         free=tuple(fit.free[k] for k in kept),
         jacobian=fit.jacobian[:, columns],
         covariance=_scaled_inverse(information),
+        absent=absent,
     )
 
 
