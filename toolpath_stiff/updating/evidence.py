@@ -22,7 +22,6 @@ from toolpath_stiff.updating.scatter import Scatter
 from toolpath_stiff.updating.size_prior import Sight, SizePrior, likely_interval, log_comparable
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 GRID = 24  # sizes a sign
@@ -263,8 +262,10 @@ class Problem:
             scatter = again
         covariance = np.asarray(_scaled_inverse(information), dtype=float)
         deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
-        if len(tables) > 1:
-            _pull_back(chosen, sizes)
+        held = _pull_back(chosen, sizes) if len(tables) > 1 else []
+        if held:  # the others once more beside them
+            settled = self._gauss_newton(tables, [c for c in chosen if c not in held], sizes, law, scatter.inverse)
+            law, residual = (law, residual) if settled is None else settled[:2]
         own = [float(sizes[id(table)][j]) for table, j in chosen]
         possible = all(t.candidate.components[j].allows(size) for (t, j), size in zip(chosen, own, strict=True))
         if not possible and len(free) > 1:
@@ -380,13 +381,15 @@ def _scaled_inverse(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
 
 
-def _pull_back(chosen: Sequence[tuple[Table, int]], sizes: dict[int, FloatArray]) -> None:
-    """Put sizes that lie a little beyond their bounds onto them: tables of two effects describe neither exactly."""
+def _pull_back(chosen: Sequence[tuple[Table, int]], sizes: dict[int, FloatArray]) -> list[tuple[Table, int]]:
+    """Those a little beyond their bounds, put onto them: tables of two effects describe neither exactly."""
+    held = []
     for table, j in chosen:
-        size = sizes[id(table)][j]
-        component, sign = table.candidate.components[j], float(np.sign(size))
-        if sign in component.signs and abs(size) <= (1.0 + BEYOND) * component.reach(sign):
-            sizes[id(table)][j] = np.clip(size, *component.bounds)
+        component, own = table.candidate.components[j], sizes[id(table)]
+        if not component.allows(own[j]) and component.allows(own[j] / (1.0 + BEYOND)):
+            own[j] = np.clip(own[j], *component.bounds)
+            held.append((table, j))
+    return held
 
 
 def _law_terms(laws: FloatArray, information: FloatArray) -> FloatArray:
