@@ -184,7 +184,7 @@ def test_the_gain_of_the_best_of_many_is_judged_against_the_best_of_many():
     for k in range(20):
         base = refitted(problem, null_logs(1000 + k))
         families = score_families(problem, effects, base)
-        gain = max((2.0 * (f.best.log_likelihood - base.log_likelihood) for f in families if f.best), default=0.0)
+        gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
         simulator = Simulator.of(noise(), spread, seed=k)
         gate = absolute_gate(
             problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain

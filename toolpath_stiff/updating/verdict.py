@@ -101,7 +101,8 @@ def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Seque
     families = score_families(problem, effects, base)
     forms = discrepancy_forms(problem.predictor)
     simulator = Simulator.of(noise, covariance, seed)
-    gain = max((2.0 * (f.best.log_likelihood - base.log_likelihood) for f in families if f.best), default=0.0)
+    # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
+    gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
     base_gate = absolute_gate(
         problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain
     )
