@@ -63,7 +63,8 @@ def test_a_sparse_campaign_without_anything_hidden_is_adequate_too():
     ["strut_law", "weak_strut", "frame_compliance", "table_compliance", "setup_compliance", "gauge_scale"],
 )
 def test_42_readings_name_what_leaves_its_own_mark(name):
-    judgement = judged(7, "paper", name, STRONG)
+    # 10 % are beyond the bound of the law's curvature, and what lies at its bound may have a second one beside it.
+    judgement = judged(7, "paper", name, 0.05 if name == "strut_law" else STRONG)
     assert (judgement.verdict, judgement.plausible) == ("identified", (name,))
 
 
