@@ -45,8 +45,6 @@ REFUSALS = [
     ("M99", 1, 1, "subprogram return"),
     ("G65 P100", 1, 1, "macro call"),
     ("G41 D1 X1", 1, 1, "cutter compensation"),
-    ("G68 X0 Y0 R30", 1, 1, "rotated coordinate system"),
-    ("G16", 1, 1, "polar"),
     ("G1 F100 @5 ^30", 1, 9, "polar"),
     ("G5.1 I1 J1", 1, 1, "spline"),
     ("G38.2 Z-5", 1, 1, "probing"),

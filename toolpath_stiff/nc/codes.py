@@ -1,7 +1,7 @@
 """What each G and M code means to a tool path: acted upon, harmless, or refused with the reason.
 
 Codes and modal groups follow LinuxCNC (its manual, "G-Code overview", modal groups), because its interpreter is what
-the results are compared with; where Fanuc-style controls differ in a code that changes the path, it is refused.
+the results are compared with; polar words and rotation, which it does not have, follow Fanuc's controls.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ G_GROUPS: dict[str, str] = {
     **dict.fromkeys(("G61", "G61.1", "G64"), PATH_CONTROL),
     **dict.fromkeys(("G96", "G97"), SPINDLE_MODE),
     **dict.fromkeys(("G8",), DIAMETER),
-    "G15": "polar",
+    **dict.fromkeys(("G15", "G16"), "polar"),
+    **dict.fromkeys(("G68", "G69"), "rotation"),
     "G50": "scaling",
-    "G69": "rotation",
 }
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
@@ -54,7 +54,6 @@ G_REFUSED = {
     "G7": ("lathe diameter mode", "this is a mill"),
     "G12": ("a pocket cycle of one control", "post the program with arcs"),
     "G13": ("a pocket cycle of one control", "post the program with arcs"),
-    "G16": ("polar coordinates", "post the program in Cartesian coordinates"),
     "G17.1": ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C"),
     "G18.1": ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C"),
     "G19.1": ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C"),
@@ -73,7 +72,6 @@ G_REFUSED = {
     "G51": ("scaling", "post the program at its size"),
     "G65": ("a macro call", "expand macros before analysing"),
     "G66": ("a macro call", "expand macros before analysing"),
-    "G68": ("a rotated coordinate system", "turn the work with --origin X,Y,Z,0,0,C instead"),
     "G68.2": ("a tilted work plane", "post X, Y, Z, A, B, C of the tool tip"),
     "G70": ("a lathe cycle", "this is a mill"),
     "G71": ("a lathe cycle", "this is a mill"),

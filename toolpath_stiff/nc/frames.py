@@ -1,8 +1,9 @@
 """Coordinates of a control: program, work offsets, G92 and G52, tool length, machine. mm and degrees.
 
-As LinuxCNC: control = Rz(rotation) (program + g92) + offset, and the spindle nose = control + tool length. The
-"control" coordinates are those in which the work offsets are numbers; the set-up frame of `Moves` is the control frame
-shifted so that G54 (its value at the first motion) is zero; the machine frame places that at the origin.
+As LinuxCNC: control = Rz(rotation) (program + g92) + offset, and the spindle nose = control + tool length; G68 turns
+the program's X and Y about its own centre before all that. The "control" coordinates are those in which the work
+offsets are numbers; the set-up frame of `Moves` is the control frame shifted so that G54 (its value at the first
+motion) is zero; the machine frame places that at the origin.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass, field
 from toolpath_stiff.nc.tables import Offsets
 
 Pose = tuple[float, float, float, float, float, float]
+Rotation = tuple[float, float, float]  # of G68: centre X, Y in program coordinates, angle in degrees
 
 
 @dataclass
@@ -29,6 +31,8 @@ class Frames:
         Index of the work offset in force.
     g92
         Shift of G92 or G52; `g92_kept` remembers it while G92.2 suspends it.
+    rotation
+        Rotation of G68 in force.
     tool
         Tool length offset in force along Z.
     position
@@ -45,6 +49,7 @@ class Frames:
     active: int = 0
     g92: list[float] = field(default_factory=lambda: [0.0] * 6)
     g92_kept: list[float] = field(default_factory=lambda: [0.0] * 6)
+    rotation: Rotation | None = None
     tool: float = 0.0
     position: list[float] = field(default_factory=lambda: [0.0] * 6)
     from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
@@ -54,6 +59,8 @@ class Frames:
     def to_control(self, program: list[float]) -> list[float]:
         """Control coordinates of a point in program coordinates."""
         offset = self.offsets.table[self.active]
+        if self.rotation is not None:
+            program = _about(self.rotation, program, self.rotation[2])
         moved = [p + g for p, g in zip(program, self.g92, strict=True)]
         if offset.rotation:
             moved[0], moved[1] = _turned(moved[0], moved[1], offset.rotation)
@@ -65,11 +72,17 @@ class Frames:
         moved = [c - o for c, o in zip(control, offset.axes, strict=True)]
         if offset.rotation:
             moved[0], moved[1] = _turned(moved[0], moved[1], -offset.rotation)
-        return [m - g for m, g in zip(moved, self.g92, strict=True)]
+        program = [m - g for m, g in zip(moved, self.g92, strict=True)]
+        return program if self.rotation is None else _about(self.rotation, program, -self.rotation[2])
+
+    @property
+    def turned(self) -> float:
+        """Degrees by which the program's X and Y axes are turned from the control's: work offset and G68."""
+        return self.offsets.table[self.active].rotation + (self.rotation[2] if self.rotation else 0.0)
 
     def turn_direction(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A direction of the program's axes in control axes."""
-        rotation = self.offsets.table[self.active].rotation
+        rotation = self.turned
         if not rotation:
             return vector
         return (*_turned(vector[0], vector[1], rotation), vector[2])
@@ -122,6 +135,12 @@ class Frames:
 def _turned(x: float, y: float, degrees: float) -> tuple[float, float]:
     cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     return (cos * x - sin * y, sin * x + cos * y)
+
+
+def _about(rotation: Rotation, point: list[float], degrees: float) -> list[float]:
+    """A point (6) turned by `degrees` about the centre of a rotation."""
+    x, y = _turned(point[0] - rotation[0], point[1] - rotation[1], degrees)
+    return [rotation[0] + x, rotation[1] + y, *point[2:]]
 
 
 def _matrix(origin: Pose) -> list[list[float]]:

@@ -9,6 +9,7 @@ import math
 
 from toolpath_stiff.nc.blocks import AXES, Codes
 from toolpath_stiff.nc.codes import ARCS, CYCLES, MOTION, WORK_OFFSETS
+from toolpath_stiff.nc.coordinates import XY
 from toolpath_stiff.nc.motion import SECONDS_PER_DAY, Mover
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.tables import ToolEntry
@@ -59,13 +60,14 @@ class Interpreter(Mover):
         self._tools(codes)
         for _, word in [c for c in codes.once if c[0] == "G4"]:
             self._dwell(word)
-        plane = codes.get("plane")
-        if plane is not None:
-            self.plane = plane
+        self._plane(codes)
+        self._polar_mode(codes.get("polar"))
         self._tool_length(codes)
         offset = codes.get("work offset")
-        if offset is not None:
+        if offset is not None and WORK_OFFSETS.index(offset) != self.frames.active:
+            self._refuse_while_rotated(codes.groups["work offset"][1], "takes another work offset")
             self.frames.active = WORK_OFFSETS.index(offset)
+            self._forget_polar()
         if codes.get("path control"):
             self.take("P")
             self.take("Q")
@@ -80,6 +82,13 @@ class Interpreter(Mover):
         self.retract = codes.get("cycle return") or self.retract
         if any(group.startswith("M ") for group in codes.groups) or any(w.letter == "M" for w in self.block.words):
             self._drop_m_parameters(codes)
+
+    def _plane(self, codes: Codes) -> None:
+        plane = codes.get("plane")
+        if plane is not None and plane != self.plane:
+            self._refuse_while_rotated(codes.groups["plane"][1], "takes another plane")
+            self.plane = plane
+            self._forget_polar()
 
     def _drop_m_parameters(self, codes: Codes) -> None:
         """M codes may carry P, Q, E words; unless the block moves, these are theirs."""
@@ -156,22 +165,27 @@ class Interpreter(Mover):
 
     def _once(self, codes: Codes) -> None:
         takers = [(c, w) for c, w in codes.once if c in USES_AXES]
+        rotation = codes.groups.get("rotation")
+        if rotation is not None and rotation[0] == "G68":
+            takers.append(rotation)
         moving = codes.groups.get(MOTION)
         if len(takers) > 1 or (takers and moving and moving[0] != "G80"):
             other = moving[0] if moving and len(takers) == 1 else takers[0][0]
             raise self.fail(takers[-1][1], f"and {other} both want the axis words of their block", "two blocks")
+        if rotation is not None:
+            self._rotate(*rotation)
         for code, word in codes.once:
             if code == "G10":
                 self._g10(word)
             elif code in ("G28", "G30"):
-                self._go_home(code)
+                self._go_home(code, word)
             elif code in ("G28.1", "G30.1"):
                 home = self.frames.offsets.home_g28 if code == "G28.1" else self.frames.offsets.home_g30
                 home[:] = self.frames.machine_position()
             elif code in ("G92", "G52"):
                 self._shift(code, word)
             elif code in ("G92.1", "G92.2", "G92.3"):
-                self._g92_state(code)
+                self._g92_state(code, word)
 
     def _g10(self, word: Word) -> None:
         level, number = self.take("L"), self.take("P")
@@ -180,6 +194,8 @@ class Interpreter(Mover):
             return
         if level not in (2, 20):
             raise self.fail(word, f"with L{level:g}" if level is not None else "without L", "L2, L20 (offsets) or L1")
+        self._refuse_while_rotated(word, "sets a work offset")
+        self._forget_polar()
         if number is None or number != int(number) or not 0 <= number <= len(WORK_OFFSETS):
             raise self.fail(word, "needs the work offset", f"P0 (the active one) or P1 to P{len(WORK_OFFSETS)}")
         index = self.frames.active if number == 0 else int(number) - 1
@@ -220,11 +236,13 @@ class Interpreter(Mover):
         tool.length = words.get(2, tool.length)
         tool.diameter = tool.diameter if radius is None else 2.0 * radius * self._scale
 
-    def _go_home(self, code: str) -> None:
+    def _go_home(self, code: str, word: Word) -> None:
         """G28, G30: rapid to the intermediate point, then the axes named there, or all, to the reference point."""
         words = self._axis_words()
+        self._leave_program_coordinates(word, words)
         if words:
-            self._straight(RAPID, self._target(words), set(words))
+            between = self._cartesian(self.frames.to_program(self.frames.position), words)
+            self._straight(RAPID, self.frames.to_control(between), set(words))
         home = self.frames.offsets.home_g28 if code == "G28" else self.frames.offsets.home_g30
         if not any(home):
             self._assume(f"the reference point of {code}, not given by any offsets file, is machine 0, 0, 0")
@@ -236,7 +254,17 @@ class Interpreter(Mover):
         point = [there[axis] if axis in going else here[axis] for axis in range(6)]
         self._straight(RAPID, frames.to_control(point), set(), machine=going)
 
+    def _leave_program_coordinates(self, word: Word, words: dict[int, float]) -> None:
+        """A move of `words` (none: all axes) by machine coordinates: harmless under G68 only off the rotated plane."""
+        if not words or XY & words.keys():
+            self._refuse_while_rotated(word, "moves X and Y by machine coordinates")
+            self._forget_polar()
+            if not words or words.keys() >= XY:
+                self.unsettled = None
+
     def _shift(self, code: str, word: Word) -> None:
+        self._refuse_while_rotated(word, "shifts the zero")
+        self._forget_polar()
         words = self._axis_words()
         if not words:
             raise self.fail(word, "without axis words", "X, Y, Z, A, B or C")
@@ -250,7 +278,9 @@ class Interpreter(Mover):
                 frames.g92[axis] += here[axis] - value
         frames.g92_kept = list(frames.g92)
 
-    def _g92_state(self, code: str) -> None:
+    def _g92_state(self, code: str, word: Word) -> None:
+        self._refuse_while_rotated(word, "shifts the zero")
+        self._forget_polar()
         frames = self.frames
         if code == "G92.3":
             frames.g92 = list(frames.g92_kept)
@@ -280,8 +310,9 @@ class Interpreter(Mover):
         if machine_word is not None:
             self._machine_move(machine_word)
         elif self.motion in ("G0", "G1") and axes:
-            words = self._axis_words()
-            target = self._target(words)
+            words = self._point_words()
+            frames = self.frames
+            target = frames.to_control(self._destination(frames.to_program(frames.position), words))
             self._straight(RAPID if self.motion == "G0" else FEED, target, set(words))
         elif self.motion in ARCS and (axes or any(self.has(c) for c in "IJKR") or given):
             self._arc()
@@ -299,6 +330,8 @@ class Interpreter(Mover):
         words = self._axis_words()
         if any(axis > 2 for axis in words) and any(self.frames.origin[3:]):
             raise self.fail(word, "with rotary axes, while the work is turned", "X, Y, Z alone")
+        if words:
+            self._leave_program_coordinates(word, words)
         point = self.frames.machine_position()
         for axis, value in words.items():
             point[axis] = value

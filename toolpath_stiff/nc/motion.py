@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc import arcs
-from toolpath_stiff.nc.blocks import AXES, BlockReader
+from toolpath_stiff.nc.blocks import AXES
+from toolpath_stiff.nc.coordinates import Coordinates
 from toolpath_stiff.nc.cycles import SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import ARC, CYCLE, RAPID, ToolUse
@@ -13,48 +14,26 @@ from toolpath_stiff.nc.recorder import Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
-LINEAR = frozenset("XYZ")
 SECONDS_PER_DAY = 86400.0
 
 
-class Mover(BlockReader):
+class Mover(Coordinates):
     """The modal state, and the moves that it makes of words; `recorder` holds those found so far."""
 
     def __init__(self, name: str, frames: Frames, tools: dict[int, ToolEntry] | None) -> None:
-        super().__init__(name)
-        self.frames, self.tools = frames, tools
+        super().__init__(name, frames)
+        self.tools = tools
         self.recorder = Recorder()
         self.used_tools: dict[int, ToolUse] = {}
         self.motion: str | None = None
-        self.plane, self.feed_mode = "G17", "G94"
+        self.feed_mode = "G94"
         self.retract: str | None = None  # G98 or G99, once said; LinuxCNC starts as in G99
-        self.absolute, self.arc_absolute, self.inch = True, False, False
+        self.arc_absolute = False
         self.feed: float | None = None
         self.speed = 0.0
         self.tool, self.selected = 0, 0
         self.tool_length = math.nan
         self.sticky: dict[str, float] = {}
-
-    @property
-    def _scale(self) -> float:
-        """Millimetres of one length unit of the program."""
-        return MM_PER_INCH if self.inch else 1.0
-
-    def _axis_words(self) -> dict[int, float]:
-        """Axis index -> value of the block's axis words in mm and degrees; they are thereby used."""
-        found = {}
-        for index, letter in enumerate(AXES):
-            value = self.take(letter)
-            if value is not None:
-                found[index] = value * self._scale if letter in LINEAR else value
-        return found
-
-    def _target(self, words: dict[int, float]) -> list[float]:
-        """Control coordinates of the axis words' point in the distance mode in force."""
-        point = self.frames.to_program(self.frames.position)
-        for axis, value in words.items():
-            point[axis] = value if self.absolute else point[axis] + value
-        return self.frames.to_control(point)
 
     def _straight(
         self, motion: int, control: list[float], work: set[int], machine: set[int] | None = None, dwell: float = 0.0
@@ -107,9 +86,7 @@ class Mover(BlockReader):
                 "is a feed move before any feed" if self.feed_mode != "G93" else "is a feed move without F under G93",
                 "F above 0",
             )
-        linear = math.dist(start[:3], end[:3])
-        if arc is not None:
-            linear = max(linear, abs(arc.sweep) * math.dist(start[:3], arc.center))
+        linear = math.dist(start[:3], end[:3]) if arc is None else _arc_length(arc, start, end)
         turn = max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
         if self.feed_mode == "G93":
             feed, self.feed = self.feed, None  # every move needs its own
@@ -129,10 +106,8 @@ class Mover(BlockReader):
         clockwise = self.motion == "G2"
         frames = self.frames
         here = frames.to_program(frames.position)
-        words = self._axis_words()
-        target = list(here)
-        for axis, value in words.items():
-            target[axis] = value if self.absolute else here[axis] + value
+        words = self._point_words()
+        target = self._destination(here, words)
         start, end = (here[first], here[second]), (target[first], target[second])
         turns = self._turns()
         try:
@@ -173,6 +148,8 @@ class Mover(BlockReader):
         if self.has(off_plane):
             raise self.fail(self.values[off_plane], f"is off the plane {self.plane}", " and ".join(sorted(in_plane)))
         offsets = [self.take(letter) for letter in in_plane]
+        if self.polar is not None and offsets != [None, None]:
+            raise arcs.ArcError("an arc with I, J or K in polar mode (G16)", "R")
         if radius is not None:
             if offsets != [None, None]:
                 raise self.fail(self.values["R"], "and a centre (I, J, K) are both given", "one of them")
@@ -195,13 +172,13 @@ class Mover(BlockReader):
     def _cycle(self, given: bool) -> None:
         """One block of a canned cycle: its holes, expanded."""
         code = self.motion or ""
-        first, second, normal = arcs.PLANES[self.plane]
+        normal = arcs.PLANES[self.plane][2]
         repeats = self._repeats()
         for letter in "RQP":
             value = self.take(letter)
             if value is not None:
                 self.sticky[letter] = value if letter == "P" else value * self._scale
-        words = self._axis_words()
+        words = self._point_words()
         if not words and given:
             raise self.fail(None, f"{code} without axis words", "X, Y, Z")
         if any(axis > 2 for axis in words):
@@ -228,10 +205,7 @@ class Mover(BlockReader):
         level = here if here > retract + SAME_HEIGHT_MM else clear
         hole = Drilling(code, bottom, retract, clear, self.sticky.get("Q", 0.0), self.sticky.get("P", 0.0))
         for _ in range(repeats):
-            place = frames.to_program(frames.position)
-            for axis in (first, second):
-                if axis in words:
-                    place[axis] = words[axis] if self.absolute else place[axis] + words[axis]
+            place = self._destination(frames.to_program(frames.position), words)
             place[normal] = level
             self._straight(RAPID, frames.to_control(place), set(words))
             level = clear
@@ -267,3 +241,11 @@ class Mover(BlockReader):
             self._straight(motion, frames.to_control(place), {normal})
         if dwell:
             self.recorder.add_dwell(dwell)
+
+
+def _arc_length(arc: Arc, start: list[float], end: list[float]) -> float:
+    """Length of an arc or helix as `path.move_lengths` has it, so that G93's F is one over the move's time."""
+    climb = sum((e - s) * n for s, e, n in zip(start, end, arc.normal, strict=False))
+    first = math.dist(start[:3], arc.center)
+    last = math.sqrt(max(math.dist(end[:3], arc.center) ** 2 - climb**2, 0.0))
+    return math.hypot(arc.sweep * (first + last) / 2.0, climb, last - first)

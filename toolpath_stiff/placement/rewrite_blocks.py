@@ -51,6 +51,8 @@ class Rewriter(Controls):
         if not source.segments:
             return [self._emit(edit)]
         last = source.segments[-1]
+        if source.polar is not None:
+            raise self._refusal("polar words (G16) cannot be rewritten", "post the program in Cartesian coordinates")
         if "G53" in once:
             self._note("moves of G53 keep their machine coordinates")
         elif any(code in USES_AXES for code in once):

@@ -78,8 +78,7 @@ class Controls:
     @property
     def _matrix(self) -> FloatArray:
         """The turn in the program axes in force."""
-        frames = self.out.frames
-        return self.turn.in_program(frames.offsets.table[frames.active].rotation)
+        return self.turn.in_program(self.out.frames.turned)
 
     def _image(self, plane: str) -> tuple[str, float] | None:
         """The plane that a plane is turned into, and the sign of its normal; None if it is none of the three."""

@@ -1,0 +1,182 @@
+"""What the axis words of a block mean: distance mode, polar words (G16), the rotated coordinate system (G68).
+
+Polar words and the rotation follow Fanuc's milling controls (operator's manuals of the series 16 and 15i, "Polar
+coordinate command" and "Coordinate system rotation"); LinuxCNC has neither code. Where these manuals leave the point to
+parameters or forbid the block, it is refused. mm and degrees.
+"""
+
+from __future__ import annotations
+
+import math
+
+from toolpath_stiff.nc import arcs
+from toolpath_stiff.nc.blocks import AXES, BlockReader
+from toolpath_stiff.nc.frames import Frames, Rotation
+from toolpath_stiff.nc.words import Word
+from toolpath_stiff.units import MM_PER_INCH
+
+LINEAR = frozenset("XYZ")
+SAME_PLACE_MM = 1e-9
+XY = frozenset((0, 1))
+
+
+class Coordinates(BlockReader):
+    """Turns axis words into points.
+
+    Attributes
+    ----------
+    polar
+        The last programmed radius (mm) and angle (degrees), nan before there is one; None: Cartesian words (G15).
+    unsettled
+        "G68" or "G69", whichever changed the numbers of the present X and Y last, until both are programmed anew.
+    """
+
+    def __init__(self, name: str, frames: Frames) -> None:
+        super().__init__(name)
+        self.frames = frames
+        self.plane = "G17"
+        self.absolute, self.inch = True, False
+        self.polar: list[float] | None = None
+        self.unsettled: str | None = None
+
+    @property
+    def _scale(self) -> float:
+        """Millimetres of one length unit of the program."""
+        return MM_PER_INCH if self.inch else 1.0
+
+    def _axis_words(self) -> dict[int, float]:
+        """Axis index -> value of the block's axis words in mm and degrees; they are thereby used."""
+        found = {}
+        for index, letter in enumerate(AXES):
+            value = self.take(letter)
+            if value is not None:
+                found[index] = value * self._scale if letter in LINEAR else value
+        return found
+
+    def _point_words(self) -> dict[int, float]:
+        """As `_axis_words`, of a block that moves in program coordinates: under G16 the second one is an angle."""
+        if self.polar is None:
+            words = self._axis_words()
+            if self.unsettled:
+                self._settle(words)
+            return words
+        second = arcs.PLANES[self.plane][1]
+        angle = self.take(AXES[second])
+        words = self._axis_words()
+        if angle is not None:
+            words[second] = angle
+        return words
+
+    def _cartesian(self, here: list[float], words: dict[int, float]) -> list[float]:
+        """The point that words name in the distance mode in force, coming from `here`."""
+        point = list(here)
+        for axis, value in words.items():
+            point[axis] = value if self.absolute else here[axis] + value
+        return point
+
+    def _destination(self, here: list[float], words: dict[int, float]) -> list[float]:
+        """Program coordinates of the point that words from `_point_words` name, coming from `here`."""
+        point = self._cartesian(here, words)
+        if self.polar is not None:
+            first, second, _ = arcs.PLANES[self.plane]
+            if first in words or second in words:
+                point[first], point[second] = self._polar_point(words.get(first), words.get(second))
+        return point
+
+    # -- polar words -----------------------------------------------------------------------------------------------
+
+    def _polar_mode(self, code: str | None) -> None:
+        if code is not None:
+            self.polar = [math.nan, math.nan] if code == "G16" else None
+
+    def _forget_polar(self) -> None:
+        """The tool went, or the zero moved, otherwise than by polar words: the next ones must name both."""
+        if self.polar is not None:
+            self.polar = [math.nan, math.nan]
+
+    def _polar_point(self, radius: float | None, angle: float | None) -> tuple[float, float]:
+        first, second = (AXES[axis] for axis in arcs.PLANES[self.plane][:2])
+        polar = self.polar
+        assert polar is not None
+        if radius is not None:
+            if not self.absolute:
+                raise self.fail(
+                    self.values[first],
+                    "is a polar radius in incremental mode (G91)",
+                    "a radius from the program zero (G90); the angle alone may be incremental",
+                )
+            polar[0] = radius
+        if angle is not None:
+            polar[1] = angle if self.absolute else polar[1] + angle
+        if math.isnan(polar[0]) or math.isnan(polar[1]):
+            raise self.fail(
+                self.values[second if radius is None else first],
+                "is half of a polar point, and nothing before says the other half",
+                f"{first} (radius) and {second} (angle), absolute",
+            )
+        self.unsettled = None
+        turn = math.radians(polar[1])
+        return (polar[0] * math.cos(turn), polar[0] * math.sin(turn))
+
+    # -- rotation --------------------------------------------------------------------------------------------------
+
+    def _rotate(self, code: str, word: Word) -> None:
+        """G68 X Y R: programmed points turn about X, Y (absolute; without them about the present point). G69: no more.
+
+        On Fanuc's controls incremental words between G68 and the first absolute ones turn about the tool's place at
+        G68: from there on they are turned steps, as they are here.
+        """
+        frames = self.frames
+        here = frames.to_program(frames.position)
+        if code == "G69":
+            frames.rotation = None
+        else:
+            rotation = self._rotation_of(word, here)
+            if frames.rotation is not None and frames.rotation[:2] != rotation[:2]:
+                raise self.fail(word, "with another centre while a rotation is in force", "G69 before it")
+            frames.rotation = rotation
+        there = frames.to_program(frames.position)
+        if math.dist(here[:2], there[:2]) > SAME_PLACE_MM:
+            self.unsettled = code
+
+    def _rotation_of(self, word: Word, here: list[float]) -> Rotation:
+        if self.plane != "G17":
+            raise self.fail(word, f"in the plane {self.plane}, which is not supported", "G17")
+        solid = next((self.values[letter] for letter in "ZIJK" if self.has(letter)), None)
+        if solid is not None:
+            raise self.fail(solid, "makes G68 a rotation in space, which is not supported", "G68 X Y R in G17")
+        angle = self.take("R")
+        if angle is None:
+            raise self.fail(word, "without its angle, which is then a parameter of the control", "R in degrees")
+        if not self.absolute and self.frames.rotation is not None:
+            raise self.fail(
+                word,
+                "in incremental mode (G91) under a rotation: a parameter of the control says whether R adds",
+                "G90, or G69 before it",
+            )
+        x, y = self.take("X"), self.take("Y")
+        if self.frames.rotation is not None:
+            here = [*self.frames.rotation[:2], *here[2:]] if x is None and y is None else here
+        return (
+            here[0] if x is None else x * self._scale,
+            here[1] if y is None else y * self._scale,
+            angle,
+        )
+
+    def _settle(self, words: dict[int, float]) -> None:
+        """Refuse what a control may take for another point: X and Y had other numbers before the rotation changed."""
+        named = XY & words.keys()
+        if not named:
+            return
+        word = self.values[AXES[min(named)]]
+        if self.absolute and named == XY:
+            self.unsettled = None
+        elif self.absolute:
+            raise self.fail(word, f"alone in the first move after {self.unsettled}", "both X and Y")
+        elif self.unsettled == "G69":
+            raise self.fail(word, "is incremental in the first move after G69", "absolute X and Y (G90)")
+
+    def _refuse_while_rotated(self, word: Word, what: str) -> None:
+        """What Fanuc's controls forbid between G68 and G69."""
+        if self.frames.rotation is not None:
+            raise self.fail(word, f"{what} while the coordinate system is rotated (G68)", "G69 before it")
