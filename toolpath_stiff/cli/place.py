@@ -18,6 +18,7 @@ from toolpath_stiff.cli.arguments import (
     range_argument,
     read_program_for,
 )
+from toolpath_stiff.cli.measurement_arguments import check_seed
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ A placement is where program zero sits and how the work is turned about it: the 
 report.html (click a placement of the front, see the path there).
 """
 FARTHEST_MM = 1e5
+FARTHEST_TURN = 720.0
 OBJECTIVES = ("balanced", "mean", "range", "min")
 
 
@@ -126,6 +128,7 @@ def run(args: argparse.Namespace) -> int:
 
     if not 2 <= args.points <= 1000:
         raise InputError(f"--points {args.points}", expected="2 to 1000")
+    check_seed(args.seed)
     _check_write(args)
     model = build_model(load_machine(args.machine), args.effects)
     program = read_program_for(args, args.program, model.machine)
@@ -150,11 +153,11 @@ def run(args: argparse.Namespace) -> int:
         argparse.Namespace(**{**vars(args), "origin": pose_of(found.best)}), args.program, model.machine
     )
     best = analyse(model, again, origin=pose_of(found.best), **options)
-    front = front_rows(model, again, found, args.step)
+    front = front_rows(model, again, found, args.step, args.force)
     summary = placement_summary(program, found, best, before, reason, front, args.objective, args.seed)
     rewritten, summary["written"] = _rewrite(args, again, best, origin)
     out = Path(args.out) if args.out else Path("reports") / f"{Path(args.program).stem}-place"
-    files = _write(args, out, summary, best, before)
+    files = _write(args, out, summary, best, before, program)
     if rewritten is not None:
         files.append(write_atomically(args.write, rewritten))
     if args.json:
@@ -227,6 +230,8 @@ def _bounds(args: argparse.Namespace, machine: Machine) -> Bounds:
     if max(abs(v) for pair in box for v in pair) > FARTHEST_MM:
         raise InputError("bounds beyond 100 m", expected="mm")
     turns = [args.tilt_a, args.tilt_b, args.rotate]
+    if max(abs(v) for pair in turns for v in pair) > FARTHEST_TURN:
+        raise InputError(f"a turn or tilt beyond {FARTHEST_TURN:g} degrees", expected="at most two whole turns")
     limits = [[*(m_from_mm(pair[end]) for pair in box), *(rad_from_deg(pair[end]) for pair in turns)] for end in (0, 1)]
     heights = tuple(m_from_mm(z) for z in args.z_values) if args.z_values else ()
     return Bounds(np.array(limits[0]), np.array(limits[1]), heights)
@@ -243,7 +248,14 @@ def _keepouts(args: argparse.Namespace) -> tuple[Keepout, ...]:
     return tuple(boxes)
 
 
-def _write(args: argparse.Namespace, out: Path, summary: dict[str, Any], best: Any, before: Any) -> list[Path]:
+def _write(
+    args: argparse.Namespace,
+    out: Path,
+    summary: dict[str, Any],
+    best: Analysis,
+    before: Analysis | None,
+    program: Program,
+) -> list[Path]:
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.placement.report_data import COLUMNS
 
@@ -256,7 +268,7 @@ def _write(args: argparse.Namespace, out: Path, summary: dict[str, Any], best: A
         from toolpath_stiff.report.place_page import place_page
         from toolpath_stiff.report.place_picture import front_picture, profiles_picture, setup_sheet, workspace_picture
 
-        contents["report.html"] = place_page(summary, best)
+        contents["report.html"] = place_page(summary, best, program, _keepouts(args))
         contents["front.png"] = front_picture(summary)
         contents["profiles.png"] = profiles_picture(best, before)
         contents["map.png"] = workspace_picture(best, before)

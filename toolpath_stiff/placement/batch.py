@@ -73,12 +73,14 @@ class Keepout:
 class PlacementFigures:
     """Figures of k placements. SI; nan where a placement is infeasible.
 
-    `margin` is the smallest margin of any sample to any limit or keep-out, negative where infeasible.
+    `compliance` is the mean (by length) of 1/stiffness, m/N: times a force, the mean deflection. `margin` is the
+    smallest margin of any sample to any limit or keep-out, negative where infeasible.
     """
 
     mean: FloatArray
     spread: FloatArray
     lowest: FloatArray
+    compliance: FloatArray
     margin: FloatArray
 
 
@@ -240,14 +242,16 @@ class Evaluator:
         """Length-weighted mean, range and minimum per placement from (k, m) stiffnesses and margins."""
         worst = margin.min(axis=1)
         for box in self.keepouts:
-            worst = np.minimum(worst, _clearance(box, position))
+            worst = np.minimum(worst, clearances(box, np.moveaxis(position, 0, -1)).min(axis=-1))
         counted = path.weight > 0.0
         values, weight = stiffness[:, counted], path.weight[counted]
         feasible = worst >= 0.0
-        mean = np.where(feasible, values @ weight / max(float(weight.sum()), 1e-300), np.nan)
+        length = max(float(weight.sum()), 1e-300)
+        mean = np.where(feasible, values @ weight / length, np.nan)
+        compliance = np.where(feasible, (1.0 / values) @ weight / length, np.nan)
         low = np.where(feasible, values.min(axis=1, initial=np.inf), np.nan)
         high = np.where(feasible, values.max(axis=1, initial=-np.inf), np.nan)
-        return PlacementFigures(mean, high - low, low, worst)
+        return PlacementFigures(mean, high - low, low, compliance, worst)
 
 
 def placed_path(path: WorkPath, placement: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -259,8 +263,7 @@ def placed_path(path: WorkPath, placement: FloatArray) -> tuple[FloatArray, Floa
     return position, path.tangent @ turn.T, place_orientations(path.abc, placement)
 
 
-def _clearance(box: Keepout, position: FloatArray) -> FloatArray:
-    """(k,) how far the paths (3, k, m) stay out of a box, in m, negative inside: its depth below the nearest face."""
-    low, high = np.array(box.low)[:, None, None], np.array(box.high)[:, None, None]
-    outside = np.maximum(low - position, position - high).max(axis=0)
-    return np.asarray(outside.min(axis=1))
+def clearances(box: Keepout, position: FloatArray) -> FloatArray:
+    """(...,) m, how far points (..., 3) lie outside a box, negative inside: the depth below the nearest face."""
+    outside = np.maximum(np.array(box.low) - position, position - np.array(box.high))
+    return np.asarray(outside.max(axis=-1))

@@ -16,7 +16,7 @@ from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.offset_blocks import offset_blocks
 from toolpath_stiff.placement.search import PlacementResult
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FloatArray = NDArray[np.float64]
 
@@ -30,6 +30,7 @@ COLUMNS = (
     "mean_N_per_mm",
     "range_N_per_mm",
     "min_N_per_mm",
+    "mean_deflection_um",
     "extrapolated_share",
     "margin",
 )
@@ -54,14 +55,17 @@ def placement_row(placement: FloatArray) -> dict[str, float]:
     }
 
 
-def front_rows(model: StiffnessModel, program: Program, found: PlacementResult, step: float) -> list[dict[str, float]]:
-    """Rows of `placements.csv`, by rising mean."""
+def front_rows(
+    model: StiffnessModel, program: Program, found: PlacementResult, step: float, force: float
+) -> list[dict[str, float]]:
+    """Rows of `placements.csv`, by rising mean; deflections under `force` in N."""
     rows = []
     for i, placement in enumerate(found.front):
         row = placement_row(placement)
         row["mean_N_per_mm"] = n_per_mm_from_n_per_m(float(found.figures.mean[i]))
         row["range_N_per_mm"] = n_per_mm_from_n_per_m(float(found.figures.spread[i]))
         row["min_N_per_mm"] = n_per_mm_from_n_per_m(float(found.figures.lowest[i]))
+        row["mean_deflection_um"] = um_from_m(force * float(found.figures.compliance[i]))
         row["extrapolated_share"] = _extrapolated(model, program, placement, step)
         row["margin"] = float(found.figures.margin[i])
         rows.append(row)

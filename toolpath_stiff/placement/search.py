@@ -8,7 +8,7 @@ along it, and the recommended one on the whole path. Every figure that is return
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any
 
@@ -18,7 +18,15 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.placement.batch import Evaluator, Keepout, PlacementFigures, WorkPath, placed_path, telling_path
+from toolpath_stiff.placement.batch import (
+    Evaluator,
+    Keepout,
+    PlacementFigures,
+    WorkPath,
+    clearances,
+    placed_path,
+    telling_path,
+)
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -172,7 +180,7 @@ def search_placements(
 
 
 def _pick(figures: PlacementFigures, rows: NDArray[np.int64]) -> PlacementFigures:
-    return PlacementFigures(figures.mean[rows], figures.spread[rows], figures.lowest[rows], figures.margin[rows])
+    return PlacementFigures(*(getattr(figures, column.name)[rows] for column in fields(PlacementFigures)))
 
 
 def _unit(bounds: Bounds, placements: FloatArray) -> FloatArray:
@@ -279,7 +287,8 @@ def _add(
 
 
 def _joined(one: PlacementFigures, two: PlacementFigures) -> PlacementFigures:
-    return PlacementFigures(*(np.concatenate(pair) for pair in zip(_columns(one), _columns(two), strict=True)))
+    columns = [column.name for column in fields(PlacementFigures)]
+    return PlacementFigures(*(np.concatenate([getattr(one, name), getattr(two, name)]) for name in columns))
 
 
 def _climb(
@@ -346,10 +355,6 @@ def _finish(
     return np.vstack([candidates, more]), _joined(figures, extra)
 
 
-def _columns(figures: PlacementFigures) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    return figures.mean, figures.spread, figures.lowest, figures.margin
-
-
 def _front_rows(figures: PlacementFigures) -> NDArray[np.int64]:
     """Feasible rows that no other beats in both mean and range, by rising mean."""
     rows = np.flatnonzero(figures.margin >= 0.0)
@@ -385,9 +390,12 @@ def _infeasible(
     x, y, z = (mm_from_m(float(v)) for v in placement[:3])
     where = f"X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {deg_from_rad(float(placement[5])):.1f} degrees"
     if found.margin[worst] >= 0.0:
-        names = ", ".join(box.name for box in keepouts)
+        depths = [clearances(box, position) for box in keepouts]
+        deepest = int(np.argmin([depth.min() for depth in depths]))
+        row = int(np.argmin(depths[deepest]))
         return UnreachableError(
-            f"no placement is feasible: the least bad one ({where}) runs into a keep-out ({names})",
+            f"no placement is feasible: at the least bad one ({where}) line {int(path.line[row])} runs "
+            f"{mm_from_m(-float(depths[deepest][row])):.1f} mm deep into the keep-out {keepouts[deepest].name}",
             hint="make the keep-out smaller or the bounds wider",
         )
     return UnreachableError(

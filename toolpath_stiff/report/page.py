@@ -46,7 +46,7 @@ def page(
     data = page_data(analysis, required, other)
     script = '\n"use strict";\n(() => {\n' + "".join(_asset(name) for name in SCRIPTS) + "})();\n"
     program = html.escape(plain(str(summary["program"])))
-    return _filled(
+    return filled(
         _asset("report.html"),
         {
             "title": f"{program}: stiffness along the path",
@@ -54,7 +54,7 @@ def page(
             "heading": html.escape(_heading(summary)),
             "style": _asset("report.css"),
             "script": script,
-            "script_hash": _script_hash(script),
+            "script_hash": script_hash(script),
             "data": json_for_script(data),
             "warnings": "\n".join(f'<p class="warning">{html.escape(plain(w))}</p>' for w in summary["warnings"]),
             "note": _thinned_note(data["count"], len(analysis.samples)),
@@ -73,7 +73,7 @@ def json_for_script(value: Any) -> str:
     return re.sub("[\ud800-\udfff]", "\N{REPLACEMENT CHARACTER}", text)
 
 
-def _filled(template: str, parts: Mapping[str, str]) -> str:
+def filled(template: str, parts: Mapping[str, str]) -> str:
     """The template with its {{names}} replaced in one pass, so that nothing inserted is looked at again."""
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
 
@@ -82,7 +82,7 @@ def _asset(name: str) -> str:
     return resources.files("toolpath_stiff.report").joinpath("assets", name).read_text(encoding="utf-8")
 
 
-def _script_hash(script: str) -> str:
+def script_hash(script: str) -> str:
     """The source expression of Content Security Policy Level 3, section 2.3.1."""
     return "sha256-" + base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 

@@ -65,8 +65,8 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "weakest": [int(np.searchsorted(rows, row)) for row in weakest_places(analysis)],
         "scale": limits,
         "extend": {"low": extend in ("min", "both"), "high": extend in ("max", "both")},
-        "colours": _colours(0.0, 0.93),  # the lightest yellow does not show on white,
-        "colours_dark": _colours(0.22, 1.0),  # nor the darkest violet on black
+        "colours": class_colours(0.0, 0.93),  # the lightest yellow does not show on white,
+        "colours_dark": class_colours(0.22, 1.0),  # nor the darkest violet on black
         "mean": stiffness_figures(analysis, analysis.counted)["mean_N_per_mm"],
         "required": None if required is None else n_per_mm_from_n_per_m(required),
         "other": None if other is None else _other_curve(other),
@@ -121,7 +121,7 @@ def _base64(array: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
 
 
-def _colours(start: float, end: float) -> list[str]:
+def class_colours(start: float, end: float) -> list[str]:
     """CSS colours of the classes, weakest first: viridis, perceptually uniform."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex

@@ -1,35 +1,164 @@
-"""The placements as a page: click a point of the front, see the path there. One file, no network."""
+"""The placements as a page: click a point of the front, see the path there. One file, no network.
+
+The page holds the thinned path once, in the program's axes, and its stiffness at every placement, evaluated here. Its
+script turns and moves the points rigidly, by the very rule of `path.turns`, and colours them; it evaluates nothing.
+"""
 
 from __future__ import annotations
 
+import html
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolpath_stiff.analysis import Analysis
-from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.report.page import json_for_script
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.placement.batch import Keepout
+from toolpath_stiff.placement.drawn_path import DrawnPath, drawn_path
+from toolpath_stiff.report.page import filled, json_for_script, script_hash
+from toolpath_stiff.report.page_data import class_colours
+from toolpath_stiff.report.wording import number, plain
+from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
-MOST_POINTS = 6000  # of the outline; more would not be seen from above
+FloatArray = NDArray[np.float64]
+
+POINTS = (150, 800)  # of the path on the page, fewest and most
+ENDS = (0.05, 0.95)  # of the path's length, all placements together, between which the colours run
+VALUES = 48_000  # points times placements that the page holds, some 300 kB
+PLACEMENT = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "rotation_deg")
 
 
-def place_page(summary: dict[str, Any], best: Analysis) -> str:
-    """The page's text."""
-    keys = ("program", "machine", "load", "objective", "recommended", "before", "before_reason", "front")
-    data = {key: summary[key] for key in keys} | {"path": _outline(best)}
-    template = (resources.files("toolpath_stiff") / "report" / "assets" / "place.html").read_text(encoding="utf-8")
-    return template.replace("__DATA__", json_for_script(data))
+def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepouts: Sequence[Keepout] = ()) -> str:
+    """The page's text.
+
+    Parameters
+    ----------
+    summary
+        As in `placement.json`.
+    best
+        The analysis at the recommended placement: model, load, force and step are taken from it.
+    program
+        In the set-up frame, as read.
+    keepouts
+        Boxes to draw.
+    """
+    front, recommended = _choices(summary)
+    shown = front + ([summary["before"]] if summary["before"] else [])
+    placements = np.array([_placement(row) for row in shown])
+    path = drawn_path(
+        best.model,
+        program,
+        placements,
+        best.load,
+        force=best.force,
+        step=best.step,
+        points=int(np.clip(VALUES // len(shown), *POINTS)),
+    )
+    data = {
+        "front": front,
+        "recommended": recommended,
+        "before": summary["before"],
+        "before_reason": plain(summary["before_reason"] or ""),
+        "force": best.force,
+        "keepouts": [{"name": plain(box.name), "box": _box(box.low, box.high)} for box in keepouts],
+        "workspace": _workspace(best),
+        **_drawn(path),
+        "colours": class_colours(0.0, 0.93),
+        "colours_dark": class_colours(0.22, 1.0),
+    }
+    script = '\n"use strict";\n(() => {\n' + _asset("place.js") + "})();\n"
+    name = html.escape(plain(summary["program"]))
+    about = f"machine {summary['machine']} · load {summary['load']}, {summary['force_N']:g} N"
+    return filled(
+        _asset("place.html"),
+        {
+            "program": name,
+            "about": html.escape(plain(about)),
+            "objective": html.escape(summary["objective"]),
+            "load": html.escape(summary["load"]),
+            "note": _note(path)
+            + f" Colours span the middle {ENDS[1] - ENDS[0]:.0%} of the length at all placements.".replace("%", " %"),
+            "script": script,
+            "script_hash": script_hash(script),
+            "data": json_for_script(data),
+        },
+    )
 
 
-def _outline(best: Analysis) -> list[list[list[float]]]:
-    """The cutting path in program axes, seen from above in mm, one polyline between two rapids."""
-    samples = best.samples
-    cutting = np.flatnonzero(samples.cutting)
-    turn = rotation_matrices(best.origin[3:])
-    flat = mm_from_m(((samples.position - np.array(best.origin[:3])) @ turn)[:, :2])
-    pieces = np.split(cutting, np.flatnonzero(np.diff(cutting) > 1) + 1)
-    step = max(1, len(cutting) // MOST_POINTS)
-    kept = [np.unique([*piece[::step], piece[-1]]) for piece in pieces if len(piece)]
-    return [np.round(flat[piece], 3).tolist() for piece in kept]
+def _choices(summary: dict[str, Any]) -> tuple[list[dict[str, Any]], int]:
+    """The placements to choose from, and which is the recommended one: it may lie off the front of mean and range."""
+    front, best = list(summary["front"]), summary["recommended"]
+    for i, row in enumerate(front):
+        if all(abs(row[key] - best[key]) < 1e-9 for key in PLACEMENT):
+            return front, i
+    return [*front, best], len(front)
+
+
+def _placement(row: dict[str, Any]) -> FloatArray:
+    """(6,) m and rad of a row in mm and degrees."""
+    values = np.array([row[key] for key in PLACEMENT])
+    return np.concatenate([m_from_mm(values[:3]), rad_from_deg(values[3:])])
+
+
+def _drawn(path: DrawnPath) -> dict[str, Any]:
+    """The path in the program's axes and its stiffness; the tool's axis where it leans."""
+    stiffness = n_per_mm_from_n_per_m(path.stiffness)
+    finite = stiffness[np.isfinite(stiffness)]
+    length = np.broadcast_to(_lengths(path), stiffness.shape)[np.isfinite(stiffness)]
+    low, high = _scale(finite, length)
+    digits = max(0, 5 - int(np.log10(max(float(finite.max()), 1.0))))  # six digits
+    leaning = bool((path.axis[:, 2] < 1.0 - 1e-12).any())
+    values = [[None if np.isnan(v) else round(v, digits) for v in row] for row in stiffness.tolist()]
+    if digits == 0:
+        values = [[None if v is None else int(v) for v in row] for row in values]
+    return {
+        "position": np.round(mm_from_m(path.position), 3).tolist(),
+        "axis": np.round(path.axis, 5).tolist() if leaning else None,
+        "s": np.round(mm_from_m(path.s), 2).tolist(),
+        "cut": path.cut.tolist(),
+        "stiffness": values,
+        "scale": [low, high],
+        "beyond": [bool(finite.min() < low), bool(finite.max() > high)],
+    }
+
+
+def _scale(stiffness: FloatArray, length: FloatArray) -> tuple[float, float]:
+    """Ends of the colour scale in N/mm: a few plunges, stiffer by far, would otherwise take all the contrast."""
+    order = np.argsort(stiffness, kind="stable")
+    along = np.cumsum(length[order])
+    low, high = (float(v) for v in stiffness[order[np.searchsorted(along, np.array(ENDS) * along[-1])]])
+    return (low, high) if high > low * (1.0 + 1e-6) else (low * (1.0 - 1e-3), high * (1.0 + 1e-3))
+
+
+def _lengths(path: DrawnPath) -> FloatArray:
+    """(m,) length in m that each drawn point stands for: half the way to its neighbours in the same cut."""
+    step = np.where(np.diff(path.cut) == 0, np.diff(path.s), 0.0)
+    length = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
+    return np.asarray(length if length.any() else np.ones(len(length)))
+
+
+def _workspace(best: Analysis) -> list[list[float | None]]:
+    """Lower and upper corner in mm; None where the machine file sets no bound."""
+    corners = mm_from_m(best.machine.limits.workspace)
+    return [[round(float(v), 3) if np.isfinite(v) else None for v in corner] for corner in corners]
+
+
+def _box(low: Sequence[float], high: Sequence[float]) -> list[list[float]]:
+    return [[round(mm_from_m(v), 3) for v in corner] for corner in (low, high)]
+
+
+def _note(path: DrawnPath) -> str:
+    shown = len(path.s)
+    if shown == path.samples:
+        return f"All {number(shown)} samples of the cutting path are drawn."
+    return (
+        f"Drawn are {number(shown)} of the {number(path.samples)} samples of the cutting path, joined by straight "
+        "lines, each with the stiffness that was evaluated there; the figures in the table are of all samples."
+    )
+
+
+def _asset(name: str) -> str:
+    return resources.files("toolpath_stiff.report").joinpath("assets", name).read_text(encoding="utf-8")

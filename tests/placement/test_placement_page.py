@@ -1,0 +1,146 @@
+"""The page of placements: its numbers against plain analysis, its drawing in a browser, its bytes, its size."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolpath_stiff.analysis import analyse
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.path import sample_moves
+from toolpath_stiff.placement.drawn_path import thinned_rows
+
+ROOT = Path(__file__).parent.parent.parent
+NIST = load_machine("nist")
+BOUNDS = ["--x", "-150:150", "--y", "-150:150", "--z", "700:1000", "--step", "2", "--points", "12"]
+
+
+def placed(tmp_path: Path, name: str, *more: str) -> tuple[str, dict]:
+    program = str(ROOT / "programs" / f"{name}.nc")
+    assert main(["place", program, *BOUNDS, *more, "--out", str(tmp_path)]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
+    return page, json.loads(data[1])
+
+
+def pose_of(row: dict) -> tuple[float, ...]:
+    mm, degrees = ("x_mm", "y_mm", "z_mm"), ("a_deg", "b_deg", "rotation_deg")
+    return (*(row[key] / 1e3 for key in mm), *(float(np.deg2rad(row[key])) for key in degrees))
+
+
+def turned(row: dict, points: np.ndarray) -> np.ndarray:
+    """Points of the set-up where the placement puts them, by scipy's rotations (extrinsic x, y, z)."""
+    from scipy.spatial.transform import Rotation
+
+    angles = [row["a_deg"], row["b_deg"], row["rotation_deg"]]
+    zero = np.array([row["x_mm"], row["y_mm"], row["z_mm"]])
+    return Rotation.from_euler("xyz", angles, degrees=True).apply(points) + zero
+
+
+@pytest.mark.parametrize(
+    ("name", "more"), [("pocket", ()), ("tilted_five_axis", ("--tilt-a", "-8:8", "--tilt-b", "-8:8"))]
+)
+def test_page_tells_what_analysis_finds(tmp_path, capsys, name, more):
+    data = placed(tmp_path, name, *more)[1]
+    program = read_program(ROOT / "programs" / f"{name}.nc")
+    assert len(data["stiffness"]) == len(data["front"]) + 1  # and the original
+    for i in (0, len(data["front"]) // 2, data["recommended"]):
+        row = data["front"][i]
+        found = analyse(NIST, program, origin=pose_of(row), step=2e-3)
+        for key, value in found.summary().items():
+            if key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "mean_deflection_um"):
+                # placement.json holds mm to the last digit; the range is a difference of large numbers
+                assert row[key] == pytest.approx(value, rel=1e-7)
+        # Each drawn point is a sample of the analysis, with its stiffness to the whole N/mm.
+        samples = found.samples
+        position = turned(row, np.array(data["position"]))
+        for k in range(0, len(position), 7):
+            near = np.linalg.norm(1e3 * samples.position - position[k], axis=1) < 2e-3
+            near &= samples.cutting & (np.abs(1e3 * samples.s - data["s"][k]) < 2e-2)
+            assert np.abs(found.at.stiffness[near] / 1e3 - data["stiffness"][i][k]).min() <= 0.5 + 1e-6
+    original = analyse(NIST, program, step=2e-3).summary()
+    assert data["before"]["mean_N_per_mm"] == pytest.approx(original["mean_N_per_mm"], rel=1e-12)
+
+
+def test_tools_lean_as_programmed(tmp_path, capsys):
+    data = placed(tmp_path, "tilted_five_axis")[1]
+    program = read_program(ROOT / "programs" / "tilted_five_axis.nc")
+    samples = sample_moves(program.moves, 2e-3)
+    lean = np.arccos(np.cos(samples.abc[:, 0]) * np.cos(samples.abc[:, 1]))[samples.cutting]
+    drawn = np.arccos(np.array(data["axis"])[:, 2])
+    assert drawn.max() == pytest.approx(lean.max(), abs=1e-4)
+    assert np.linalg.norm(data["axis"], axis=1) == pytest.approx(np.ones(len(drawn)), abs=1e-4)
+
+
+def test_same_bytes_twice_and_nothing_from_the_network(tmp_path, capsys):
+    keep_out = ("--keep-out", "<b>vice</b>:100,100,0,300,300,900")
+    page, data = placed(tmp_path / "one", "case_study", *keep_out)
+    assert page == placed(tmp_path / "two", "case_study", *keep_out)[0]
+    assert data["keepouts"] == [{"name": "<b>vice</b>", "box": [[100, 100, 0], [300, 300, 900]]}]
+    assert "<b>vice" not in page
+    assert "default-src 'none'" in page
+    assert not re.findall(r"""(?:src|href)=|url\(["']?https?:|@import|fetch\(|XMLHttp""", page)
+
+
+@pytest.mark.parametrize("points", [50, 150, 800])
+@pytest.mark.parametrize("name", ["pocket", "drilling", "three_tools", "incremental_slots", "surface_50000"])
+def test_thinned_paths_keep_their_ends_and_are_no_longer_than_asked(name, points):
+    program = read_program(ROOT / "programs" / f"{name}.nc", tool_table=ROOT / "programs" / "tools.tbl")
+    samples = sample_moves(program.moves, 2e-3)
+    rows = np.flatnonzero(samples.cutting)
+    cut = np.unique(np.cumsum(~samples.cutting)[rows], return_inverse=True)[1]
+    kept = thinned_rows(samples.take(rows), cut, points)
+    assert len(kept) <= points
+    assert (np.diff(kept) > 0).all()
+    assert {0, len(rows) - 1} <= set(kept.tolist())
+
+
+def test_more_cuts_than_points_leaves_whole_cuts_out():
+    holes = "".join(f"G0 X{i} Z5\nG1 Z-5 F100\nG0 Z5\n" for i in range(400))
+    samples = sample_moves(parse_program(holes, "holes.nc").moves, 1e-3)
+    rows = np.flatnonzero(samples.cutting)
+    cut = np.unique(np.cumsum(~samples.cutting)[rows], return_inverse=True)[1]
+    kept = thinned_rows(samples.take(rows), cut, 100)
+    assert len(kept) <= 100
+    assert (np.bincount(cut[kept])[np.unique(cut[kept])] == 2).all()  # where a hole begins and where it ends
+
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+def test_a_browser_draws_the_placement_of_the_address(tmp_path, capsys):
+    data = placed(tmp_path, "tilted_five_axis")[1]
+    third = data["front"][2]
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
+    done = subprocess.run(
+        [
+            str(BROWSER),
+            *options,
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--dump-dom",
+            f"{(tmp_path / 'report.html').as_uri()}#3,workspace",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "CONSOLE" not in done.stderr  # neither an error nor a blocked script
+    assert f"Placement 3 of {len(data['front'])}" in done.stdout
+    assert f"{third['x_mm']:.3f}" in done.stdout
+    drawings = dict(re.findall(r'<svg id="(\w+)"[^>]*>(.*?)</svg>', done.stdout, re.S))
+    for name in ("chosen", "before"):
+        assert drawings[name].count('class="tool"') == 3  # the tool leans in all three views
+        assert drawings[name].count('class="frame"') == 3
+        assert set(re.findall(r'stroke="(#\w+)"', drawings[name])) <= {*data["colours"], *data["colours_dark"]}
+    assert drawings["front"].count("<circle") == len(data["front"])
+    assert drawings["front"].count('aria-checked="true"') == 1
