@@ -43,7 +43,11 @@ def test_a_rotated_system_is_rewritten(there):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("G16 G1 F100 X10 Y30\nG15 X0 Y0 Z0\nM30\n", "polar words")],
+    [
+        ("G16 G1 F100 X10 Y30\nG15 X0 Y0 Z0\nM30\n", "polar words"),
+        ("G0 X0 Y0 Z0\nG1 F100 X10 Y30\nM98 P1\nM30\nO1\nG1 X3\nM99\n", "M98, M99"),
+        ("G0 X0 Y0 Z0\nG1 F100 X10 Y30\nM99\n", "M98, M99"),
+    ],
 )
 def test_what_cannot_be_rewritten_is_refused(text, words):
     with pytest.raises(InputError, match=words):

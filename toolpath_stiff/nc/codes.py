@@ -85,15 +85,17 @@ G_REFUSED = {
 }
 
 M_STOP, M_TOOL, M_SPINDLE, M_COOLANT = "stop", "tool change", "spindle", "coolant"
+M_SUBPROGRAM = "subprogram"
 # M codes that are acted upon, or that no tool path depends on and every program has.
 M_GROUPS: dict[str, str] = {
     **dict.fromkeys(("M0", "M1", "M2", "M30", "M60"), M_STOP),
     **dict.fromkeys(("M6", "M61"), M_TOOL),
     **dict.fromkeys(("M3", "M4", "M5", "M19"), M_SPINDLE),
     **dict.fromkeys(("M7", "M8", "M9"), M_COOLANT),
+    **dict.fromkeys(("M98", "M99"), M_SUBPROGRAM),
     **dict.fromkeys(("M48", "M49", "M50", "M51", "M52", "M53"), "overrides"),
 }
-M_QUIET = ("M0", "M1", "M2", "M30", "M60", "M6", "M61", "M3", "M4", "M5")
+M_QUIET = ("M0", "M1", "M2", "M30", "M60", "M6", "M61", "M3", "M4", "M5", "M98", "M99")
 M_HARMLESS = {
     "M7": "coolant",
     "M8": "coolant",
@@ -107,9 +109,7 @@ M_HARMLESS = {
     "M53": "overrides",
 }
 M_REFUSED = {
-    "M98": ("a subprogram call", "expand subprograms before analysing"),
-    "M99": ("a subprogram return", "expand subprograms before analysing"),
-    "M97": ("a local subprogram call", "expand subprograms before analysing"),
+    "M97": ("a call of a block within the program", "make it a subprogram of its own (O number, M98, M99)"),
     "M70": ("saved modal state", "post the program without M70 to M73"),
     "M71": ("saved modal state", "post the program without M70 to M73"),
     "M72": ("saved modal state", "post the program without M70 to M73"),

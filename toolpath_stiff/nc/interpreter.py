@@ -6,10 +6,12 @@ Order of execution within a block and start-up state are LinuxCNC's (manual, "G-
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from toolpath_stiff.nc.blocks import AXES, Codes
-from toolpath_stiff.nc.codes import ARCS, CYCLES, MOTION, WORK_OFFSETS
+from toolpath_stiff.nc.codes import ARCS, CYCLES, M_SUBPROGRAM, MOTION, WORK_OFFSETS
 from toolpath_stiff.nc.coordinates import XY
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.motion import SECONDS_PER_DAY, Mover
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.tables import ToolEntry
@@ -19,13 +21,31 @@ from toolpath_stiff.units import MM_PER_INCH
 USES_AXES = ("G10", "G28", "G30", "G52", "G92")  # non-modal codes that take the axis words of their block
 
 
+@dataclass(frozen=True)
+class Call:
+    """A subprogram call: its P, its L (None: not given), and the column of its M98."""
+
+    number: int
+    repeats: int | None
+    column: int
+
+
 class Interpreter(Mover):
-    """Executes blocks in order; `recorder` holds the moves found so far."""
+    """Executes blocks in order; `recorder` holds the moves found so far.
+
+    `call` and `returns` are the M98 and M99 of the last block, for whoever chooses the next one.
+    """
+
+    def __init__(self, name: str, frames: Frames, tools: dict[int, ToolEntry] | None) -> None:
+        super().__init__(name, frames, tools)
+        self.call: Call | None = None
+        self.returns = False
 
     def execute(self, block: Block) -> bool:
         """Execute a block; False once the program has ended."""
         if not block.words:
             self.block = block
+            self.call, self.returns = None, False
             return True
         return self.finish(self.begin(block))
 
@@ -63,6 +83,7 @@ class Interpreter(Mover):
         self._plane(codes)
         self._polar_mode(codes.get("polar"))
         self._tool_length(codes)
+        self._subprogram(codes)
         offset = codes.get("work offset")
         if offset is not None and WORK_OFFSETS.index(offset) != self.frames.active:
             self._refuse_while_rotated(codes.groups["work offset"][1], "takes another work offset")
@@ -82,6 +103,32 @@ class Interpreter(Mover):
         self.retract = codes.get("cycle return") or self.retract
         if any(group.startswith("M ") for group in codes.groups) or any(w.letter == "M" for w in self.block.words):
             self._drop_m_parameters(codes)
+
+    def _subprogram(self, codes: Codes) -> None:
+        """M98 and M99: whoever runs the blocks acts upon them, after the block's own moves."""
+        code = codes.get(f"M {M_SUBPROGRAM}")
+        self.call, self.returns = None, code == "M99"
+        if code is None:
+            return
+        word = codes.groups[f"M {M_SUBPROGRAM}"][1]
+        if code == "M99":
+            if self.has("P"):
+                raise self.fail(self.values["P"], "makes M99 return to another block, which is not supported", "M99")
+            return
+        if any(other in ("G4", "G10") for other, _ in codes.once):
+            raise self.fail(word, "beside a code that wants the P word too", "two blocks")
+        number, repeats = self._whole("P", word), self._whole("L", word)
+        if number is None:
+            raise self.fail(word, "without P", "P with the number of the subprogram")
+        self.call = Call(number, repeats, word.column)
+
+    def _whole(self, letter: str, word: Word) -> int | None:
+        value = self.take(letter)
+        if value is None:
+            return None
+        if value != int(value) or value < 1:
+            raise self.fail(self.values[letter], f"beside {word.text} is no count", "a whole number from 1")
+        return int(value)
 
     def _plane(self, codes: Codes) -> None:
         plane = codes.get("plane")

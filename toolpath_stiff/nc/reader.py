@@ -11,10 +11,14 @@ from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.nc.source import read_lines, split_lines
+from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
-from toolpath_stiff.nc.words import read_block
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 
+INTERPRETERS = ("builtin", "linuxcnc", "auto")
+Given = tuple[
+    tuple[str, ...], str, str, Iterable[float] | None, Iterable[float], Offsets, dict[int, ToolEntry] | None, bool
+]
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
@@ -27,6 +31,8 @@ def read_program(
     offsets_file: str | Path | None = None,
     tool_table: str | Path | None = None,
     block_delete: bool = False,
+    interpreter: str = "builtin",
+    rs274: str | None = None,
 ) -> Program:
     """Read an NC program file to its moves in the set-up frame.
 
@@ -43,6 +49,10 @@ def read_program(
         Tool lengths: a LinuxCNC tool table or CSV.
     block_delete
         Leave out blocks that begin with a slash.
+    interpreter
+        "builtin"; "linuxcnc", LinuxCNC's own (`rs274`); "auto", the first and, where it refuses, the second.
+    rs274
+        Path of the program `rs274`, if it is not on PATH.
 
     Raises
     ------
@@ -58,6 +68,8 @@ def read_program(
         read_offsets(offsets_file) if offsets_file else Offsets(),
         read_tool_table(tool_table) if tool_table else None,
         block_delete,
+        interpreter,
+        rs274,
     )
 
 
@@ -70,10 +82,13 @@ def parse_program(
     offsets: Offsets | None = None,
     tools: dict[int, ToolEntry] | None = None,
     block_delete: bool = False,
+    interpreter: str = "builtin",
+    rs274: str | None = None,
 ) -> Program:
     """Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`."""
     lines = split_lines(text, name)
-    return _read(lines, name, "", origin, default_origin, offsets or Offsets(), tools, block_delete)
+    tables = (offsets or Offsets(), tools)
+    return _read(lines, name, "", origin, default_origin, *tables, block_delete, interpreter, rs274)
 
 
 def _read(
@@ -85,15 +100,92 @@ def _read(
     offsets: Offsets,
     tools: dict[int, ToolEntry] | None,
     block_delete: bool,
+    interpreter: str,
+    rs274: str | None,
 ) -> Program:
+    """Choose the interpreter: the built-in one, LinuxCNC's, or that where the first refuses."""
+    if interpreter not in INTERPRETERS:
+        raise InputError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in lines):
         raise InputError("the program is empty", expected="an NC program", file=name)
+    given = (lines, name, path, origin, default_origin, offsets, tools, block_delete)
+    if interpreter == "linuxcnc":
+        return _read_by_linuxcnc(*given, rs274)
+    try:
+        return _read_built_in(*given)
+    except InputError as error:
+        if interpreter == "builtin":
+            raise
+        return _second_opinion(error, given, rs274)
+
+
+def _second_opinion(error: InputError, given: Given, rs274: str | None) -> Program:
+    """What the built-in interpreter refused with `error`, by the second one if it is there and the program harmless."""
+    from toolpath_stiff.nc.linuxcnc.reading import refusal
+    from toolpath_stiff.nc.linuxcnc.runner import find_rs274
+
+    refused = refusal(given[0], given[1])
+    if refused is not None:
+        raise refused from None
+    try:
+        found = find_rs274(rs274)
+    except InputError as missing:
+        raise InputError(
+            error.found,
+            expected=error.expected,
+            hint=f"LinuxCNC's interpreter may read it: {missing.hint}",
+            file=error.file,
+            line=error.line,
+            column=error.column,
+        ) from None
+    return _read_by_linuxcnc(*given, found)
+
+
+def _read_by_linuxcnc(
+    lines: tuple[str, ...],
+    name: str,
+    path: str,
+    origin: Iterable[float] | None,
+    default_origin: Iterable[float],
+    offsets: Offsets,
+    tools: dict[int, ToolEntry] | None,
+    block_delete: bool,
+    rs274: str | None,
+) -> Program:
+    from toolpath_stiff.nc.linuxcnc.reading import read
+
+    place, default = None if origin is None else _to_mm(origin), _to_mm(default_origin)
+    reading = read(lines, name, place, default, offsets, tools, block_delete, rs274=rs274)
+    return Program(
+        name=name,
+        path=path,
+        source=lines,
+        moves=reading.moves,
+        origin=_to_si(reading.origin),
+        origin_source=reading.source,
+        unsupported=reading.unsupported,
+        warnings=reading.warnings,
+        assumptions=reading.assumptions,
+        tools=reading.tools,
+        interpreter="linuxcnc",
+    )
+
+
+def _read_built_in(
+    lines: tuple[str, ...],
+    name: str,
+    path: str,
+    origin: Iterable[float] | None,
+    default_origin: Iterable[float],
+    offsets: Offsets,
+    tools: dict[int, ToolEntry] | None,
+    block_delete: bool,
+) -> Program:
     frames = Frames(copy.deepcopy(offsets), None if origin is None else _to_mm(origin), _to_mm(default_origin))
     interpreter = Interpreter(name, frames, copy.deepcopy(tools))
-    warnings = _execute(interpreter, lines, name, block_delete)
+    warnings = ProgramRun(interpreter, lines, name, block_delete).run()
     if not interpreter.recorder.cuts:
         raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)
-    x, y, z, a, b, c = frames.origin
     g54 = offsets.table[0].given or frames.offsets.table[0].given
     if frames.source == "option" and g54:
         warnings.append(
@@ -104,7 +196,7 @@ def _read(
         path=path,
         source=lines,
         moves=interpreter.recorder.moves(),
-        origin=(m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c)),
+        origin=_to_si(frames.origin),
         origin_source=frames.source,
         unsupported=tuple(interpreter.unsupported),
         warnings=(*warnings, *interpreter.warnings),
@@ -113,30 +205,11 @@ def _read(
     )
 
 
-def _execute(interpreter: Interpreter, lines: tuple[str, ...], name: str, block_delete: bool) -> list[str]:
-    """Run the blocks up to the end of the program; returns warnings."""
-    started = False
-    for number, line in enumerate(lines, 1):
-        block = read_block(line, number, name)
-        if block.percent:
-            if started:
-                return _left_over(lines, number, "%")
-            started = True
-            continue
-        started = started or bool(block.words)
-        if block.optional and block_delete:
-            continue
-        if not interpreter.execute(block):
-            return _left_over(lines, number, "the program's end")
-    return []
-
-
-def _left_over(lines: tuple[str, ...], number: int, what: str) -> list[str]:
-    """A warning if anything but tape marks follows the end."""
-    rest = [line for line in lines[number:] if line.strip() not in ("", "%")]
-    return [f"what follows {what} in line {number} is not part of the program (lines: {len(rest)})"] if rest else []
-
-
 def _to_mm(origin: Iterable[float]) -> Pose:
     x, y, z, a, b, c = origin
     return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))
+
+
+def _to_si(origin: Pose) -> Pose:
+    x, y, z, a, b, c = origin
+    return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))

@@ -59,7 +59,7 @@ def read_block(text: str, line: int, name: str) -> Block:
         start = 1
         while start < len(compact) and compact[start].isdigit():  # /1 to /9: numbered switches
             start += 1
-    if compact.startswith("O", start):
+    if compact.startswith(("O", ":"), start):  # `:` is O on ISO tape
         return _program_number(compact[start:], columns[start], line, name)
     words = _tokens(compact, columns, start, text, line, name)
     return Block(line, _through_pygcode(words, line, name), optional=optional)
@@ -67,12 +67,12 @@ def read_block(text: str, line: int, name: str) -> Block:
 
 def _program_number(compact: str, column: int, line: int, name: str) -> Block:
     """`O1234` alone is a program's number; any other O word steers subprograms or loops."""
-    if compact[1:].isdigit():
+    if compact[1:].isascii() and compact[1:].isdigit():
         return Block(line, (Word("O", float(compact[1:]), column, compact),))
     raise InputError(
         f"O word {compact[:20]!r}: subprograms and loops are not supported",
         expected="plain moves",
-        hint="expand subprograms and loops before analysing (the control or the post can do it)",
+        hint="expand it before analysing (the control or the post can do it), or give --interpreter linuxcnc",
         file=name,
         line=line,
         column=column,

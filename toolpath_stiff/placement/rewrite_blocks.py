@@ -34,6 +34,11 @@ class Rewriter(Controls):
         source.segments = []
         first, first_out = len(source.recorder.line), len(out.recorder.line)
         codes = source.begin(block)
+        if source.call is not None or source.returns:
+            raise self._refusal(
+                "a subprogram (M98, M99) cannot be rewritten: it may run at several places",
+                "expand subprograms before",
+            )
         axes = [letter for letter in AXES if source.has(letter)]
         plane_before = out.plane
         out.begin(block)

@@ -1,0 +1,207 @@
+"""The order in which a file's blocks run: tape marks, program numbers, M98 and M99, the program's end.
+
+Subprograms are those of Fanuc's controls: O numbers within the file, after the main program or before it, called by
+`M98 P1000 L2` or, with the repeats before the four digits of the number, `M98 P21000`; they end with M99. LinuxCNC
+reads the first form alike. Modal state goes through a call unchanged, as it does on both.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.interpreter import Call, Interpreter
+from toolpath_stiff.nc.words import Block, read_block
+
+DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
+MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
+MOST_REPEATS = 9999
+HEAD = re.compile(r"\s*/?\s*[oO:]\s*(\d+)\s*(?:[(;].*)?$")
+REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
+
+
+@dataclass
+class _Level:
+    """A subprogram that runs: its number, first line (from 0), where to go on, and how often it runs again."""
+
+    number: int
+    first: int
+    back: int
+    again: int
+
+
+class ProgramRun:
+    """Runs the blocks of a file on an interpreter.
+
+    Parameters
+    ----------
+    interpreter
+        Executes them.
+    lines, name
+        The file.
+    block_delete
+        Whether blocks that begin with a slash are left out.
+    """
+
+    def __init__(self, interpreter: Interpreter, lines: tuple[str, ...], name: str, block_delete: bool) -> None:
+        self.interpreter, self.lines, self.name = interpreter, lines, name
+        self.block_delete = block_delete
+        self._levels: list[_Level] = []
+        self._programs: dict[int, int] | None = None
+        self._called: dict[int, Block] = {}  # blocks of subprograms by line, from 0: each is read once
+        self._blocks = 0
+
+    def run(self) -> list[str]:
+        """Run to the program's end; returns warnings. Raises `InputError` with the line."""
+        at, percent, numbered = 0, False, False
+        while at < len(self.lines):
+            block = self._block(at)
+            if block.percent:
+                if percent:
+                    return self._end(at, "%")
+                percent = True
+            elif block.words:
+                percent = True  # from the first word on, a tape mark is the last one
+                if block.words[0].letter == "O":
+                    self._check_head(block, numbered)
+                    numbered = True
+                if not (block.optional and self.block_delete):
+                    if not self.interpreter.execute(block):
+                        return self._end(at, "the program's end", ended=True)
+                    if self.interpreter.call is not None:
+                        at = self._enter(at, self.interpreter.call)
+                        continue
+                    if self.interpreter.returns:
+                        if not self._levels:
+                            return [
+                                f"M99 in line {at + 1}, outside any subprogram, makes the control start the program "
+                                "again, without end: it is read once",
+                                *self._end(at, "M99"),
+                            ]
+                        at = self._leave()
+                        continue
+            at += 1
+        return self._end(len(self.lines) - 1, "the file")
+
+    def _block(self, at: int) -> Block:
+        if not self._levels:
+            return read_block(self.lines[at], at + 1, self.name)
+        self._blocks += 1
+        if self._blocks > MOST_BLOCKS:
+            raise self._fail(at, f"the subprograms run more than {MOST_BLOCKS} blocks", "fewer repeats")
+        block = self._called.get(at)
+        if block is None:
+            block = self._called[at] = read_block(self.lines[at], at + 1, self.name)
+        return block
+
+    def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
+        return InputError(found, expected=expected, hint=hint, file=self.name, line=at + 1, column=column)
+
+    def _check_head(self, block: Block, numbered: bool) -> None:
+        """A program number within a program: the next one begins where this one did not end."""
+        if self._levels:
+            raise self._unended(block.line - 1)
+        if numbered or self.interpreter.recorder.line:
+            raise self._fail(
+                block.line - 1,
+                f"{block.words[0].text} begins another program before the first one has ended",
+                "M30 or M2 before it",
+                column=block.words[0].column,
+            )
+
+    def _unended(self, at: int) -> InputError:
+        level = self._levels[-1]
+        return self._fail(at, f"the subprogram O{level.number} of line {level.first + 1} has no end", "M99")
+
+    def _end(self, at: int, what: str, ended: bool = False) -> list[str]:
+        """A warning if anything but tape marks and the subprograms that ran follows the end."""
+        if self._levels and not ended:
+            raise self._unended(at)
+        rest = [
+            line
+            for index, line in enumerate(self.lines[at + 1 :], at + 1)
+            if line.strip() not in ("", "%") and index not in self._called and index + 1 not in self._called
+        ]
+        if not rest:
+            return []
+        return [f"what follows {what} in line {at + 1} is not part of the program (lines: {len(rest)})"]
+
+    # -- calls -----------------------------------------------------------------------------------------------------
+
+    def _enter(self, at: int, call: Call) -> int:
+        """The line at which the called subprogram begins."""
+        number, repeats = self._target(at, call)
+        if any(level.number == number for level in self._levels):
+            raise self._fail(at, f"M98 calls O{number}, which is running: it would never end", column=call.column)
+        if len(self._levels) == DEEPEST:
+            raise self._fail(at, f"more than {DEEPEST} subprograms within each other", column=call.column)
+        first = self._heads()[number]
+        if first == self._main:
+            raise self._fail(at, f"M98 calls O{number}, the main program itself", column=call.column)
+        self._levels.append(_Level(number, first, at + 1, repeats - 1))
+        return first + 1
+
+    def _leave(self) -> int:
+        level = self._levels[-1]
+        if level.again:
+            level.again -= 1
+            return level.first + 1
+        self._levels.pop()
+        return level.back
+
+    def _target(self, at: int, call: Call) -> tuple[int, int]:
+        """Program number and repeats of a call."""
+        heads = self._heads()
+        meanings = {(call.number, call.repeats or 1)}
+        if call.repeats is None and call.number >= REPEATS_IN_P:
+            repeats, number = divmod(call.number, REPEATS_IN_P)
+            meanings.add((number, repeats))
+        known = [meaning for meaning in sorted(meanings) if meaning[0] in heads]
+        if not known:
+            names = " or ".join(f"O{number}" for number, _ in sorted(meanings))
+            raise self._fail(
+                at,
+                f"M98 calls {names}, and the file has no such subprogram",
+                hint="put the subprogram into the file, after the main program's M30",
+                column=call.column,
+            )
+        if len(known) > 1:
+            raise self._fail(
+                at,
+                f"M98 P{call.number} calls O{call.number} or, {known[0][1]} times, O{known[0][0]}: the file has both",
+                hint="give the number of repeats as L",
+                column=call.column,
+            )
+        number, repeats = known[0]
+        if not 1 <= repeats <= MOST_REPEATS:
+            raise self._fail(at, f"M98 with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
+        return number, repeats
+
+    def _heads(self) -> dict[int, int]:
+        """Program number -> line (from 0) of its O word; what follows the last tape mark is no program."""
+        if self._programs is None:
+            self._programs = {}
+            started = False
+            for index, line in enumerate(self.lines):
+                if line.strip() == "%" and started:
+                    break
+                started = started or bool(line.strip())
+                head = HEAD.match(line)
+                if head is None:
+                    continue
+                number = int(head[1])
+                if number in self._programs:
+                    raise self._fail(index, f"O{number} is in line {self._programs[number] + 1} already")
+                self._programs[number] = index
+        return self._programs
+
+    @property
+    def _main(self) -> int:
+        """The line of the main program's own number; -1 if it has none."""
+        for index, line in enumerate(self.lines):
+            if HEAD.match(line):
+                return index
+            if line.strip() not in ("", "%") and not line.lstrip().startswith("("):
+                break
+        return -1
