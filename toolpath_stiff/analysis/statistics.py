@@ -97,6 +97,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
     band = band_figures(analysis)
     return {
         "program": analysis.program.name,
+        "interpreter": analysis.program.interpreter,
         "machine": analysis.machine.name,
         "load": str(analysis.load),
         "force_N": analysis.force,

@@ -117,6 +117,14 @@ def add_program_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--offsets", metavar="FILE", help="work offsets G54 to G59.3")
     group.add_argument("--tools", metavar="FILE", help="tool table: LinuxCNC .tbl, or CSV tool,length_mm,diameter_mm")
     group.add_argument("--block-delete", action="store_true", help="leave out blocks that begin with /")
+    group.add_argument(
+        "--interpreter",
+        choices=("builtin", "linuxcnc", "auto"),
+        default="builtin",
+        help="who reads the program: ours; LinuxCNC's rs274, which knows variables, O words and cutter compensation; "
+        "auto: the second where the first refuses (default: builtin)",
+    )
+    group.add_argument("--rs274", metavar="PATH", help="LinuxCNC's interpreter, if it is not on PATH")
 
 
 def add_machine_options(parser: argparse.ArgumentParser) -> None:
@@ -164,4 +172,6 @@ def read_program_for(args: argparse.Namespace, file: str, machine: Machine | Non
         offsets_file=args.offsets,
         tool_table=args.tools,
         block_delete=args.block_delete,
+        interpreter=args.interpreter,
+        rs274=args.rs274,
     )

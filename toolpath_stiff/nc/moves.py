@@ -120,6 +120,8 @@ class Program:
         What was read but not acted upon; what deserves a look; what was assumed. Sentences for people.
     tools
         The tools that the program used.
+    interpreter
+        Who read it: "builtin" or "linuxcnc".
     """
 
     name: str
@@ -132,3 +134,4 @@ class Program:
     warnings: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     tools: tuple[ToolUse, ...] = field(default=())
+    interpreter: str = "builtin"

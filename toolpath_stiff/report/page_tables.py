@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.report.comparison import FIGURES
-from toolpath_stiff.report.wording import duration, number, plain
+from toolpath_stiff.report.wording import READERS, duration, number, plain
 
 TITLES = ("mean N/mm", "min N/mm", "max N/mm", "range N/mm", "mean deflection um")
 MOST_ROWS = 200  # of lines below the required stiffness; all are in summary.json
@@ -62,6 +62,7 @@ def _figures(summary: Mapping[str, Any]) -> str:
         ("Time", duration(summary["time_s"])),
         ("Samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
         ("Program zero (G54) mm, deg", f"{origin} ({summary['origin_source']})"),
+        ("Program read by", READERS[summary["interpreter"]]),
         ("Effects", ", ".join(summary["effects"]) or "none"),
         ("Outside the strut law", f"{summary['extrapolated_share']:.1%} of the cutting samples"),
         ("Out of reach", f"{number(summary['out_of_reach_samples'])} cutting samples"),

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.report.comparison import FIGURES, compare_summaries
-from toolpath_stiff.report.wording import duration, number, plain, shortened
+from toolpath_stiff.report.wording import READERS, duration, number, plain, shortened
 
 WIDTH = 100
 LABEL = 14  # columns of the left-hand words
@@ -31,6 +31,7 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
     """
     lines = [
         *_entry("program", summary["program"]),
+        *(_entry("read by", READERS[summary["interpreter"]]) if summary["interpreter"] != "builtin" else ()),
         *_entry("machine", _machine(summary)),
         *_entry("load", f"{summary['load']}, {summary['force_N']:g} N"),
         *_entry("program zero", _origin(summary)),

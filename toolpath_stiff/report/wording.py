@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+# Who read a program, for headings (`Program.interpreter`).
+READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
+
 
 def number(value: float | None, digits: int = 0) -> str:
     """A figure with thin groups of thousands ("45 123"), "-" where there is none."""

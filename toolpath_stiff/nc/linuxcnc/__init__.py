@@ -1,0 +1,1 @@
+"""LinuxCNC's own interpreter (`rs274`) as a second reader of NC programs, fenced."""

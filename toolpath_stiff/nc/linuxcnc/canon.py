@@ -1,0 +1,377 @@
+"""The canonical commands that `rs274` prints, to moves.
+
+Motions are given in program coordinates of the controlled point, in the active length unit; the frame is printed when
+it changes. As measured (2.9): world = Rz(rotation) (program + g92) + g5x, spindle nose = world + tool length, and the
+nose stands still when frame or tool length change. ARC_FEED has end 1, end 2, centre 1, centre 2, turns, axis end, a, b
+and c; NURBS moves have no points. mm, degrees, mm/min inside, as in the built-in reader.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.arcs import arc_sweep
+from toolpath_stiff.nc.blocks import AXES
+from toolpath_stiff.nc.linuxcnc.copy import Line
+from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID
+from toolpath_stiff.nc.recorder import Arc, Recorder
+from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.units import MM_PER_INCH
+
+CALL = re.compile(r"\s*\d+\s+N(?:\.+|(\d+))\s*([A-Z][A-Z0-9_]*)\((.*)\)\s*$")
+NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
+PLANES = {"XY": (0, 1, 2), "XZ": (2, 0, 1), "YZ": (1, 2, 0)}
+MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")
+CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
+MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
+HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
+AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
+DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
+LENGTH_UNKNOWN_BELOW_MM = -9e4  # see tables.UNKNOWN_LENGTH_MM
+# Four decimals are printed of point, offset and tool length: two units in the last place, in the unit in force.
+SAME_PLACE = 2e-4
+
+Vector = list[float]
+
+
+@dataclass
+class Follower:
+    """Follows the canonical commands; `recorder` holds the moves in control coordinates less the `reference`."""
+
+    name: str
+    lines: Sequence[Line]
+    tools: dict[int, ToolEntry] | None
+    tagged: bool
+    numbers: Sequence[int] = ()
+    reference: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    recorder: Recorder = field(default_factory=Recorder)
+    warnings: list[str] = field(default_factory=list)
+    used_tools: list[int] = field(default_factory=list)
+    first_motion: int | None = None
+    ended: bool = False
+
+    scale: float = 1.0
+    plane: str = "XY"
+    g5x: Vector = field(default_factory=lambda: [0.0] * 6)
+    g92: Vector = field(default_factory=lambda: [0.0] * 6)
+    rotation: float = 0.0
+    tool_z: float = 0.0
+    position: Vector = field(default_factory=lambda: [0.0] * 6)
+    feed: float = 0.0  # mm/min, mm/rev, or what is left of it for degrees
+    feed_scale: float = 1.0
+    feed_line: int = 0
+    per_revolution: bool = False
+    synchronised: float = 0.0
+    speed: float = 0.0
+    tool: int = 0
+    renamed: bool = False
+    tool_length: float = math.nan
+    line: int = 0
+    reading: int = 0
+    cycle: bool = False
+    frame_changed: bool = False
+    turned_by: int = 0
+    moves_of_line: int = 0
+    from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
+
+    def follow(self, text: str) -> None:
+        """Take every command. Raises `InputError` for what is no path: probing, splines, a tool without its length."""
+        actions: dict[str, Callable[[str], None]] = {
+            name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
+        }
+        for raw in text.splitlines():
+            match = CALL.match(raw)
+            if match is None:
+                continue
+            number, name, inner = match.groups()
+            action = actions.get(name)
+            if action is None:
+                continue
+            if number is not None:
+                self.reading = int(number)
+                if not self.tagged:
+                    self.line = self.reading
+            action(inner)
+
+    def fail(self, line: int, found: str, expected: str = "", hint: str = "") -> InputError:
+        """An error of a line of the program."""
+        return InputError(found, expected=expected, hint=hint, file=self.name, line=line or None)
+
+    # -- frames ----------------------------------------------------------------------------------------------------
+
+    def world(self, program: Vector) -> Vector:
+        """Control coordinates (mm, degrees) of a point as printed."""
+        s, g, o = self.scale, self.g92, self.g5x
+        x, y, z, a, b, c = program
+        x, y = x * s + g[0], y * s + g[1]
+        if self.rotation:
+            x, y = self._turn(x, y)
+        return [x + o[0], y + o[1], z * s + g[2] + o[2], a + g[3] + o[3], b + g[4] + o[4], c + g[5] + o[5]]
+
+    def _turn(self, x: float, y: float) -> tuple[float, float]:
+        cos, sin = math.cos(self.rotation), math.sin(self.rotation)
+        return (cos * x - sin * y, sin * x + cos * y)
+
+    def _lengths(self, inner: str) -> Vector:
+        return [v * self.scale if i < 3 else v for i, v in enumerate(_numbers(inner)[:6])]
+
+    def _on_use_length_units(self, inner: str) -> None:
+        scale = MM_PER_INCH if "INCH" in inner else 1.0
+        if scale != self.scale and self.tool_z:
+            raise self.fail(
+                self.reading,
+                "G20 or G21 changes the unit while a tool length is in force: LinuxCNC's rs274 loses the length",
+                "G49 before it",
+            )
+        self.frame_changed = True
+        self.scale = scale
+        if self.feed_line == self.reading:  # `G20 F20`: rs274 takes F first, controls mean inches
+            self.feed_scale = scale
+
+    def _on_set_g5x_offset(self, inner: str) -> None:
+        self.g5x = self._lengths(inner.partition(",")[2])
+        self.frame_changed = True
+
+    def _on_set_g92_offset(self, inner: str) -> None:
+        self.g92 = self._lengths(inner)
+        self.frame_changed = True
+
+    def _on_set_xy_rotation(self, inner: str) -> None:
+        rotation = math.radians(_numbers(inner)[0])
+        # G10 that turns the offset in force: rs274 keeps the old numbers of axes that the next move does not name.
+        if rotation != self.rotation and "G10" in self._words(self.reading):
+            self.turned_by = self.reading
+        self.rotation = rotation
+        self.frame_changed = True
+
+    def _on_use_tool_length_offset(self, inner: str) -> None:
+        x, y, z, *rest = (v * self.scale for v in _numbers(inner))
+        if x or y or any(rest):
+            raise self.fail(self.reading, "a tool offset in other directions than Z", "a length along Z alone")
+        if z < LENGTH_UNKNOWN_BELOW_MM:
+            missing = "and there is no tool table" if self.tools is None else "which the tool table does not give"
+            raise self.fail(
+                self.reading, f"G43 needs a tool's length, {missing}", hint="give it in a tool table (--tools FILE)"
+            )
+        words = self._words(self.reading)
+        if self.renamed and "G43" in words and "H" not in words and "G43.1" not in words:
+            raise self.fail(self.reading, "G43 after M61: LinuxCNC's rs274 takes the length of the tool before", "H")
+        self.position = [*self.position[:2], self.position[2] + self.tool_z - z, *self.position[3:]]
+        self.tool_z = z
+        cancelled = z == 0.0 and "G49" in words
+        self.tool_length = math.nan if cancelled or not self.reading else z
+        self.frame_changed = True
+
+    def _on_select_plane(self, inner: str) -> None:
+        self.plane = inner.removeprefix("CANON_PLANE_")
+
+    # -- feeds and tools -------------------------------------------------------------------------------------------
+
+    def _on_set_feed_rate(self, inner: str) -> None:
+        self.feed, self.feed_scale, self.feed_line = _numbers(inner)[0], self.scale, self.reading
+
+    def _on_set_feed_mode(self, inner: str) -> None:
+        self.per_revolution = _numbers(inner)[-1] != 0.0
+
+    def _on_set_spindle_speed(self, inner: str) -> None:
+        self.speed = _numbers(inner)[-1]
+
+    def _on_start_speed_feed_sync(self, inner: str) -> None:
+        self.synchronised = abs(_numbers(inner)[0]) * self.scale
+
+    def _on_stop_speed_feed_synch(self, _: str) -> None:
+        self.synchronised = 0.0
+
+    def _feed_of(self, start: Vector, end: Vector, arc: bool) -> float:
+        """mm/min, or deg/min of a move of the rotary axes alone."""
+        if self.synchronised or self.per_revolution:
+            if self.speed == 0.0:
+                raise self.fail(self.line, "a feed per revolution with the spindle at S0", "S above 0")
+            return (self.synchronised or self.feed * self.feed_scale) * self.speed
+        rotary = not arc and start[:3] == end[:3]
+        return self.feed if rotary else self.feed * self.feed_scale
+
+    def _on_change_tool(self, inner: str) -> None:
+        place = int(_numbers(inner)[0])
+        self.tool = self.numbers[place - 1] if place else 0
+        self.renamed = False
+
+    def _on_change_tool_number(self, inner: str) -> None:
+        self._on_change_tool(inner)
+        self.renamed = True  # and rs274 goes on with the old one's length and diameter
+
+    def _on_dwell(self, inner: str) -> None:
+        self.recorder.add_dwell(_numbers(inner)[0])
+
+    # -- lines -----------------------------------------------------------------------------------------------------
+
+    def _words(self, line: int) -> str:
+        return self.lines[line - 1].plain if line else ""
+
+    def _on_comment(self, inner: str) -> None:
+        text = inner.strip('"')
+        if text.isdigit():
+            self.line, self.moves_of_line = int(text), 0
+            codes = MOTION_CODE.findall(self._words(self.line))
+            if codes:
+                self.cycle = codes[-1] in CYCLE_CODES
+        elif text.startswith("interpreter: cutter radius compensation on"):
+            self._check_diameter()
+
+    def _check_diameter(self) -> None:
+        """rs274 takes 0 for a diameter that its table does not give, and would compensate by nothing."""
+        words = self._words(self.reading)
+        if "G41.1" in words or "G42.1" in words:
+            return
+        named = DIAMETER_WORD.search(words)
+        if named is None and "D" in words:
+            raise self.fail(self.reading, "the tool of G41 or G42 is computed", "D with a tool's number, or G41.1")
+        number = int(named[1]) if named and int(named[1]) else self.tool
+        if self.renamed and number == self.tool:
+            raise self.fail(self.reading, "G41 or G42 after M61: LinuxCNC's rs274 takes the tool before", "T and M6")
+        tool = (self.tools or {}).get(number)
+        if tool is None or math.isnan(tool.diameter):
+            raise self.fail(
+                self.reading,
+                f"cutter compensation needs the diameter of tool {number}",
+                hint="give it in a tool table (--tools FILE)",
+            )
+
+    def _on_nurbs_feed(self, _: str) -> None:
+        raise self.fail(self.reading, "a spline, whose points LinuxCNC does not print", hint="post arcs and lines")
+
+    def _on_straight_probe(self, _: str) -> None:
+        raise self.fail(self.reading, "probing: what follows depends on what is met", hint="leave probing out")
+
+    def _on_program_end(self, _: str) -> None:
+        self.ended = True
+
+    # -- moves -----------------------------------------------------------------------------------------------------
+
+    def _on_straight_traverse(self, inner: str) -> None:
+        self._move(RAPID, _numbers(inner), None)
+
+    def _on_straight_feed(self, inner: str) -> None:
+        self._move(CYCLE if self.cycle else FEED, _numbers(inner), None)
+
+    def _on_rigid_tap(self, inner: str) -> None:
+        """Down and, the spindle reversed, back."""
+        start = [*self._program_point(), 0.0, 0.0, 0.0]
+        end = _numbers(inner)
+        rotary = [p - g - o for p, g, o in zip(self.position[3:], self.g92[3:], self.g5x[3:], strict=True)]
+        self._move(CYCLE, [*end[:3], *rotary], None)
+        self._move(CYCLE, [*start[:3], *rotary], None)
+
+    def _program_point(self) -> Vector:
+        """Where the controlled point is, in program coordinates of the active unit."""
+        x, y, z = (p - o for p, o in zip(self.position[:3], self.g5x[:3], strict=True))
+        if self.rotation:
+            cos, sin = math.cos(self.rotation), math.sin(self.rotation)
+            x, y = cos * x + sin * y, cos * y - sin * x
+        return [(v - g) / self.scale for v, g in zip((x, y, z), self.g92[:3], strict=True)]
+
+    def _on_arc_feed(self, inner: str) -> None:
+        e1, e2, c1, c2, turns, axis_end, a, b, c = _numbers(inner)
+        if self.plane not in PLANES:
+            raise self.fail(self.line, f"an arc in the plane {self.plane}", "G17, G18 or G19")
+        first, second, normal = PLANES[self.plane]
+        end = [0.0, 0.0, 0.0, a, b, c]
+        end[first], end[second], end[normal] = e1, e2, axis_end
+        self._move(ARC, end, (first, second, normal, c1, c2, turns))
+
+    def _move(self, motion: int, printed: Vector, arc: tuple[int, int, int, float, float, float] | None) -> None:
+        """One move to a point as printed; an arc with its axes, centre and turns."""
+        end = self.world(printed)
+        start, self.position = self.position, end
+        if self.line == 0:  # a move of ours, before the program
+            self.frame_changed = False
+            return
+        if self.first_motion is None:
+            self.first_motion = self.line
+        if self.turned_by:
+            self._check_turned()
+        if self.frame_changed:  # the same place in other numbers, up to the digits printed
+            near = SAME_PLACE * self.scale
+            start = [e if abs(e - s) < near else s for s, e in zip(start, end, strict=True)]
+            self.frame_changed = False
+        centred = self._arc(start, end, arc) if arc else None
+        shift = (*self.reference, 0.0, 0.0, 0.0)
+        start = [s - r for s, r in zip(start, shift, strict=True)]
+        end = [e - r for e, r in zip(end, shift, strict=True)]
+        feed = math.nan if motion == RAPID else self._feed_of(start, end, arc is not None)
+        flags = self._machine_flags(start, end)
+        added = self.recorder.add(self.line, motion, start, end, feed, self.tool, self.tool_length, flags, centred)
+        if added and self.tool not in self.used_tools:
+            self.used_tools.append(self.tool)
+
+    def _arc(self, start: Vector, end: Vector, arc: tuple[int, int, int, float, float, float]) -> Arc:
+        first, second, normal, c1, c2, turns = arc
+        # In the plane the sweep is that of program coordinates, before any rotation.
+        here = self._unrotated(start)
+        there = self._unrotated(end)
+        if max(abs(here[first] - there[first]), abs(here[second] - there[second])) < SAME_PLACE * self.scale:
+            there = here  # a full circle, up to the digits printed
+        middle = list(here)
+        g = self.g92
+        middle[first], middle[second] = c1 * self.scale + g[first], c2 * self.scale + g[second]
+        sweep = arc_sweep(
+            (here[first], here[second]),
+            (there[first], there[second]),
+            (middle[first], middle[second]),
+            turns < 0,
+            int(abs(turns)) or 1,
+        )
+        x, y = self._turn(middle[0], middle[1]) if self.rotation else (middle[0], middle[1])
+        center = [v + o - r for v, o, r in zip((x, y, middle[2]), self.g5x[:3], self.reference, strict=True)]
+        vector = [0.0, 0.0, 0.0]
+        vector[normal] = 1.0
+        if self.rotation:
+            vector[0], vector[1] = self._turn(vector[0], vector[1])
+        return Arc((center[0], center[1], center[2]), (vector[0], vector[1], vector[2]), sweep)
+
+    def _unrotated(self, control: Vector) -> Vector:
+        """Control coordinates less the work offset, turned back: those to which G92 adds."""
+        x, y, z = (p - o for p, o in zip(control[:3], self.g5x[:3], strict=True))
+        if not self.rotation:
+            return [x, y, z]
+        cos, sin = math.cos(self.rotation), math.sin(self.rotation)
+        return [cos * x + sin * y, cos * y - sin * x, z]
+
+    def _check_turned(self) -> None:
+        words = self._words(self.line)
+        if not ("X" in words and "Y" in words):
+            raise self.fail(
+                self.turned_by,
+                "G10 turns the work offset in force, and the next move does not name both X and Y: "
+                "LinuxCNC's rs274 would take the old numbers for them",
+                "X and Y in the move that follows",
+            )
+        self.turned_by = 0
+
+    def _machine_flags(self, start: Vector, end: Vector) -> tuple[bool, bool]:
+        """Whether start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
+        if not self.tagged or (self.cycle and start == end):
+            return (False, False)
+        was = any(self.from_machine)
+        words = self._words(self.line)
+        named = {AXES.index(letter) for letter in AXIS_WORD.findall(words)}
+        machine = bool(MACHINE_MOVE.search(words))
+        if HOME_MOVE.search(words):  # first to the intermediate point, then home
+            machine = self.moves_of_line > 0
+            named = named or (set(range(6)) if machine else set())
+        self.moves_of_line += 1
+        if self.cycle:  # down to R before the first hole, the other axes have not moved yet
+            normal = PLANES[self.plane][2]
+            if all(start[axis] == end[axis] for axis in range(6) if axis != normal):
+                named = {normal}
+        for axis in named:
+            self.from_machine[axis] = machine
+        return (was, any(self.from_machine))
+
+
+def _numbers(inner: str) -> Vector:
+    return [float(value) for value in NUMBER.findall(inner)]

@@ -1,0 +1,179 @@
+"""Running `rs274` in a folder of its own: no shell, no network, no way out, and an end.
+
+Limits on time, memory and file size by the kernel (`setrlimit`); bubblewrap, where it is installed and works, makes the
+whole file system but that folder read-only and takes away the network.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from toolpath_stiff.errors import InputError, TpsError
+
+HOW_TO_GET = "install LinuxCNC (Debian, Ubuntu: apt install linuxcnc-uspace), or name the program with --rs274 PATH"
+PROGRAM, CANON, PARAMETERS, TOOLS, ERRORS = "program.ngc", "canon.txt", "rs274.var", "tool.tbl", "errors.txt"
+LONGEST_MESSAGE = 4000
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a run may use: processor time, memory, and size of any file it writes."""
+
+    seconds: int = 60
+    memory_bytes: int = 1 << 30
+    file_bytes: int = 1 << 29
+
+
+@dataclass(frozen=True)
+class Run:
+    """What rs274 left: its canonical commands, its message ("" if it went well), its parameter file."""
+
+    canon: str
+    message: str
+    parameters: str
+
+
+def find_rs274(path: str | None = None) -> str:
+    """The interpreter's path. Raises `InputError` with how to get it."""
+    found = shutil.which(path or "rs274")
+    if found is None:
+        what = f"{path!r} is no program that can be run" if path else "LinuxCNC's interpreter rs274 is not installed"
+        raise InputError(what, hint=HOW_TO_GET)
+    return str(Path(found).resolve())
+
+
+def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: Limits | None = None) -> Run:
+    """Run the interpreter on a program that has passed the fence.
+
+    Raises
+    ------
+    TpsError
+        It exceeded a limit, or could not be started.
+    """
+    if sys.platform == "win32":
+        raise TpsError("LinuxCNC's interpreter runs on Linux only")
+    limits = limits or Limits()
+    with tempfile.TemporaryDirectory(prefix="tps-rs274-") as name:
+        folder = Path(name)
+        (folder / PROGRAM).write_text(program, encoding="ascii")
+        (folder / PARAMETERS).write_text(parameters, encoding="ascii")
+        (folder / TOOLS).write_text(tools, encoding="ascii")
+        command = [rs274, "-g", "-t", TOOLS, "-v", PARAMETERS, PROGRAM, CANON]
+        code = _execute([*_limiter(limits), *_sandbox(folder), *command], folder, limits)
+        message = _text(folder / ERRORS, LONGEST_MESSAGE)
+        over = _exceeded(code, limits)
+        if over:
+            raise TpsError(over)
+        return Run(_text(folder / CANON), message if code else "", _text(folder / PARAMETERS))
+
+
+def _execute(command: list[str], folder: Path, limits: Limits) -> int:
+    """Exit code, -9 if it had to be stopped by the clock."""
+    environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LC_ALL": "C", "TMPDIR": str(folder)}
+    with (folder / ERRORS).open("wb") as errors:
+        try:
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=errors,
+                stderr=errors,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise InputError(f"cannot run {command[0]!r}: {error.strerror}", hint=HOW_TO_GET) from None
+        try:
+            # A process that sleeps uses no processor time; twice that on the clock ends it too.
+            return process.wait(timeout=2 * limits.seconds + 5)
+        except subprocess.TimeoutExpired:
+            return -signal.SIGKILL
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def _limiter(limits: Limits) -> list[str]:
+    """A command before the command: a small Python that limits itself and becomes what follows.
+
+    Setting the limits between fork and exec of this process would not be safe where it has threads.
+    """
+    code = (
+        "import os, resource, sys; "
+        "cpu, memory, size = map(int, sys.argv[1:4]); "
+        "resource.setrlimit(resource.RLIMIT_CPU, (cpu, cpu + 1)); "
+        "resource.setrlimit(resource.RLIMIT_AS, (memory, memory)); "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)); "
+        "resource.setrlimit(resource.RLIMIT_CORE, (0, 0)); "
+        "os.execv(sys.argv[4], sys.argv[4:])"
+    )
+    values = (limits.seconds, limits.memory_bytes, limits.file_bytes)
+    return [sys.executable, "-I", "-S", "-c", code, *(str(value) for value in values)]
+
+
+def _exceeded(code: int, limits: Limits) -> str:
+    """Which limit an exit code tells of; a shell's or bubblewrap's 128 + n is signal n."""
+    number = -code if code < 0 else code - 128
+    end = "an endless loop, or a program too long for it"
+    if number in (signal.SIGXCPU, signal.SIGKILL):
+        return f"LinuxCNC's interpreter was stopped after {limits.seconds} s of processor time: {end}"
+    if number == signal.SIGXFSZ:
+        return f"LinuxCNC's interpreter was stopped after {limits.file_bytes / 1e6:.0f} MB of output: {end}"
+    if number in (signal.SIGABRT, signal.SIGSEGV, signal.SIGBUS):
+        memory = limits.memory_bytes >> 20
+        return f"LinuxCNC's interpreter broke down (signal {number}; its memory is limited to {memory} MB)"
+    return ""
+
+
+def _sandbox(folder: Path) -> list[str]:
+    """Bubblewrap around the command, if it can be used here."""
+    wrapper = _bubblewrap()
+    if wrapper is None:
+        return []
+    return [*wrapper, "--bind", str(folder), str(folder), "--chdir", str(folder)]
+
+
+@cache
+def _bubblewrap() -> tuple[str, ...] | None:
+    """Its command line so far; None where it is missing or may not make name spaces (many containers)."""
+    path = shutil.which("bwrap")
+    if path is None:
+        return None
+    read_only = ("--ro-bind", "/", "/", "--dev", "/dev", "--proc", "/proc", "--tmpfs", "/run")
+    wrapper = (path, *read_only, "--unshare-all", "--new-session", "--die-with-parent")
+    try:
+        tried = subprocess.run([*wrapper, "/bin/true"], capture_output=True, check=False, timeout=20)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return wrapper if tried.returncode == 0 else None
+
+
+def _text(path: Path, most: int | None = None) -> str:
+    try:
+        with path.open(encoding="latin-1") as stream:
+            return stream.read() if most is None else stream.read(most)
+    except FileNotFoundError:
+        return ""
+
+
+def message_and_line(message: str) -> tuple[str, int | None]:
+    """What rs274 complains of, and the line: it repeats the line it was reading, with our N word."""
+    lines = [line.strip() for line in message.splitlines()]
+    lines = [line for line in lines if line and line != "executing" and not line.startswith("link (updating")]
+    if not lines:
+        return "", None
+    number = re.match(r"N(\d+)", lines[-1])
+    if number and len(lines) > 1:
+        return " ".join(lines[:-1]), int(number[1])
+    return " ".join(lines[:-1] or lines), None
