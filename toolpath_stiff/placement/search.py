@@ -18,15 +18,8 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.placement.batch import (
-    Evaluator,
-    Keepout,
-    PlacementFigures,
-    WorkPath,
-    clearances,
-    placed_path,
-    telling_path,
-)
+from toolpath_stiff.placement import batch
+from toolpath_stiff.placement.batch import Evaluator, Keepout, PlacementFigures, WorkPath, placed_path, telling_path
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -180,7 +173,7 @@ def search_placements(
 
 
 def _pick(figures: PlacementFigures, rows: NDArray[np.int64]) -> PlacementFigures:
-    return PlacementFigures(*(getattr(figures, column.name)[rows] for column in fields(PlacementFigures)))
+    return PlacementFigures(*(getattr(figures, column.name)[rows] for column in fields(figures)))
 
 
 def _unit(bounds: Bounds, placements: FloatArray) -> FloatArray:
@@ -199,10 +192,10 @@ def _scout(scout: Evaluator, bounds: Bounds, rng: np.random.Generator, start: Fl
     if len(feasible) < POPULATION:
         return np.asarray(placements[np.argsort(-figures.margin, kind="stable")[:POPULATION]])
     weights = np.linspace(0.0, 1.0, POPULATION)
-    gain = _scaled(figures.mean[feasible]), _scaled(figures.spread[feasible])
-    picks = [int(feasible[np.argmax((1 - w) * gain[0] - w * gain[1])]) for w in weights]
-    spread = rng.permutation(feasible)[: POPULATION // 2]
-    return np.asarray(placements[np.unique([*picks, *spread])])
+    mean, spread = _scaled(figures.mean[feasible]), _scaled(figures.spread[feasible])
+    picks = [int(feasible[np.argmax((1 - w) * mean - w * spread)]) for w in weights]
+    others = rng.permutation(feasible)[: POPULATION // 2]
+    return np.asarray(placements[np.unique([*picks, *others])])
 
 
 def _scaled(values: FloatArray) -> FloatArray:
@@ -287,8 +280,7 @@ def _add(
 
 
 def _joined(one: PlacementFigures, two: PlacementFigures) -> PlacementFigures:
-    columns = [column.name for column in fields(PlacementFigures)]
-    return PlacementFigures(*(np.concatenate([getattr(one, name), getattr(two, name)]) for name in columns))
+    return PlacementFigures(*(np.concatenate([getattr(one, c.name), getattr(two, c.name)]) for c in fields(one)))
 
 
 def _climb(
@@ -390,7 +382,7 @@ def _infeasible(
     x, y, z = (mm_from_m(float(v)) for v in placement[:3])
     where = f"X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {deg_from_rad(float(placement[5])):.1f} degrees"
     if found.margin[worst] >= 0.0:
-        depths = [clearances(box, position) for box in keepouts]
+        depths = [batch.clearances(box, position) for box in keepouts]
         deepest = int(np.argmin([depth.min() for depth in depths]))
         row = int(np.argmin(depths[deepest]))
         return UnreachableError(

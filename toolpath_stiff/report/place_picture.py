@@ -15,6 +15,7 @@ from toolpath_stiff.report.wording import number, plain
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 BLUE = "#2457a6"
+G68_NOTE = "G68 follows the program's own G17 and G54, and holds until G69"
 AROUND = 0.06  # m of the workspace shown about the paths
 
 
@@ -134,12 +135,11 @@ def setup_sheet(summary: dict[str, Any], best: Analysis) -> bytes:
         lines = [
             ("program zero (G54)", f"X {x:.4f}   Y {y:.4f}   Z {row['z_mm']:.4f} mm"),
             ("turn of the work about Z", f"{row['rotation_deg']:.4f} degrees"),
+            *_tilt_line(row),
             ("heights of the cut", f"Z {position[:, 2].min():.3f} to {position[:, 2].max():.3f} mm (machine)"),
             ("LinuxCNC", blocks["linuxcnc"] or blocks["linuxcnc_reason"]),
             ("Fanuc-style", blocks["fanuc"] or blocks["fanuc_reason"]),
-            ("", "G68 follows the program's own G17 and G54, and holds until G69")
-            if "G68" in (blocks["fanuc"] or "")
-            else ("", ""),
+            *([("", G68_NOTE)] if "G68" in (blocks["fanuc"] or "") else []),
             ("mean stiffness", f"{number(row['mean_N_per_mm'])} N/mm"),
             ("range, weakest", f"{number(row['range_N_per_mm'])} N/mm, {number(row['min_N_per_mm'])} N/mm"),
             (
@@ -159,6 +159,14 @@ def setup_sheet(summary: dict[str, Any], best: Analysis) -> bytes:
         buffer = io.BytesIO()
         figure.savefig(buffer, format="pdf", metadata={"CreationDate": None, "Producer": None, "Creator": None})
         return buffer.getvalue()
+
+
+def _tilt_line(row: dict[str, Any]) -> list[tuple[str, str]]:
+    if not (row["a_deg"] or row["b_deg"]):
+        return []
+    return [
+        ("tilt of the set-up", f"A {row['a_deg']:.4f}, B {row['b_deg']:.4f} degrees (about X first, then Y, then Z)")
+    ]
 
 
 def _wrapped(text: str) -> list[str]:

@@ -31,6 +31,7 @@ MARKS = (
 )
 PANEL = 3.5  # inches a side
 MOST_PANELS = 5
+CLOSE = 0.06  # m between marks whose labels would cover each other
 ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
 
 
@@ -131,8 +132,20 @@ def _marks(
         axes.plot(x, y, marker, ms=8, mfc=colour, mec=INK, mew=1.2, zorder=6, ls="none")
         if numbers[k] not in labelled:
             box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
+            # Towards the middle, so that labels stay in their panel; each elsewhere where marks crowd.
+            near = [j for j in own if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
+            place = list(dict.fromkeys(numbers[j] for j in near)).index(numbers[k]) % 4
+            left, above = (x > 0.25 * half) != (place >= 2), place % 2 == 0
             axes.annotate(
-                numbers[k], (x, y), xytext=(7, 6), textcoords="offset points", fontsize=7.5, zorder=7, bbox=box
+                numbers[k],
+                (x, y),
+                xytext=(-7 if left else 7, 6 if above else -6),
+                textcoords="offset points",
+                ha="right" if left else "left",
+                va="bottom" if above else "top",
+                fontsize=7.5,
+                zorder=7,
+                bbox=box,
             )
             labelled.add(numbers[k])
     axes.set_xlim(-half, half)
@@ -149,4 +162,15 @@ def _legend(figure: Any, kinds: Sequence[str]) -> None:
         Line2D([], [], marker=MARKS[k % len(MARKS)][0], ls="none", ms=8, mfc=MARKS[k % len(MARKS)][1], mec=INK)
         for k in range(len(names))
     ]
-    figure.legend(handles, names, loc="lower left", ncol=len(names), frameon=False, fontsize=9, borderaxespad=0.6)
+    left = 0.75 / figure.get_size_inches()[0]
+    figure.legend(
+        handles,
+        names,
+        loc="lower left",
+        bbox_to_anchor=(left, 0.0),
+        handletextpad=0.2,
+        ncol=len(names),
+        frameon=False,
+        fontsize=9,
+        borderaxespad=0.6,
+    )

@@ -473,13 +473,18 @@ def plan_document(plan: Plan) -> dict[str, Any]:
     }
 
 
+def _percent(share: float) -> str:
+    """Never "100 %" for what is only expected."""
+    return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
+
+
 def plan_text(plan: Plan) -> list[str]:
     """What the plan promises, in sentences."""
     count = len(plan.chosen)
     lines = [
         f"{count} pose{'s' if count > 1 else ''}, about {plan.minutes:.0f} minutes: the probability of the right "
-        f"explanation is expected to rise from {100 * plan.before.truth:.0f} % to {100 * plan.after.truth:.0f} %, "
-        f"and the verdict to be settled in {100 * plan.after.settled:.0f} of 100 cases"
+        f"explanation is expected to rise from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}, "
+        f"and the verdict to be settled in {_percent(plan.after.settled)} of cases"
     ]
     if plan.enough is not None and plan.enough < count:
         lines.append(f"{plan.enough} of the poses should do for {100 * SETTLED:.0f} %; the others are in reserve")
