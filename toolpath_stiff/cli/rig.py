@@ -64,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
             args.out, args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at
         )
         print(f"{args.out}: {count} measurements, the nominal machine and the sealed truth")
+        folder = args.out.rstrip("/")
+        print(f"next: tps diagnose {folder}/measurements.csv --machine {folder}/machine.toml")
         return 0
     if args.action == "measure":
         count = rig.measure_again(args.folder, args.at, args.out, args.visit)

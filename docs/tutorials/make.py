@@ -1,0 +1,168 @@
+"""Runs the tutorials: brings the outputs that they show and their pictures up to date, or checks them.
+
+    python docs/tutorials/make.py            rewrites outputs and pictures
+    python docs/tutorials/make.py --check    only says what differs; exit code 1 if anything does
+
+A block ```console holds commands (`$ tps ...`) and what they print. A line `...` stands for lines left out. The commands
+of one tutorial run in the order of its text, in one folder that is empty but for `programs/` and the Python files that
+stand beside this one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import io
+import os
+import re
+import shlex
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+TUTORIALS = sorted(HERE.glob("[0-9]*.md"))
+ELLIPSIS = "..."
+BLOCK = re.compile(r"```console\n(.*?)```", re.DOTALL)
+DRAWS = ("analyze", "compare", "diagnose", "plan", "update")  # commands that know --no-plots
+WIDTH, COLOURS = 1000, 64  # pixels and palette of a committed picture: below 150 kB each
+
+# Picture in pictures/ -> the tutorial, the file in its folder, and how much of it is shown, from the top.
+PICTURES = {
+    "1_variables.png": ("1_named_at_once.md", "ex1/compare/variables.png", 0.18),
+    "1_ladder.png": ("1_named_at_once.md", "ex1/diagnose/ladder.png", 1.0),
+    "1_before_after.png": ("1_named_at_once.md", "ex1/update/before_after.png", 1.0),
+    "2_ladder.png": ("2_after_a_plan.md", "ex2/first/ladder.png", 1.0),
+    "2_plan.png": ("2_after_a_plan.md", "ex2/plan/plan.png", 1.0),
+    "2_ladder_again.png": ("2_after_a_plan.md", "ex2/second/ladder.png", 1.0),
+    "3_variables.png": ("3_outside_the_catalogue.md", "ex3/compare/variables.png", 0.18),
+    "3_before_after.png": ("3_outside_the_catalogue.md", "ex3/update/before_after.png", 1.0),
+}
+
+
+@contextlib.contextmanager
+def workshop() -> Iterator[Path]:
+    """The folder in which a tutorial is run, made the current one."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "programs").symlink_to(HERE.parent.parent / "programs")
+        for file in HERE.glob("*.py"):
+            if file != Path(__file__).resolve():
+                shutil.copy(file, folder)
+        os.chdir(folder)
+        try:
+            yield folder
+        finally:
+            os.chdir(before)
+
+
+def commands(block: str) -> list[tuple[str, list[str]]]:
+    """Commands of a block, each with the lines shown below it."""
+    found: list[tuple[str, list[str]]] = []
+    for line in block.splitlines():
+        if line.startswith("$ "):
+            found.append((line[2:], []))
+        else:
+            found[-1][1].append(line)
+    return found
+
+
+def printed(command: str, pictures: bool) -> list[str]:
+    """Run one command of the text here and now; lines that it prints."""
+    from toolpath_stiff.cli.main import main
+
+    arguments = shlex.split(command)
+    if arguments[0] != "tps":
+        raise ValueError(f"{command}: the tutorials run tps only")
+    if not pictures and arguments[1] in DRAWS:
+        arguments.append("--no-plots")
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        code = main(arguments[1:])
+    if code != 0:
+        raise RuntimeError(f"{command}: exit code {code}")
+    return [line.rstrip() for line in output.getvalue().splitlines()]
+
+
+def agrees(shown: list[str], lines: list[str]) -> bool:
+    """Whether these lines are what is shown, an ellipsis standing for any number of lines."""
+    if not shown:
+        return True
+    pieces = "\n".join(shown)
+    pattern = "".join(r"(?:.*\n)*?" if line == ELLIPSIS else re.escape(line) + r"\n" for line in pieces.splitlines())
+    return re.fullmatch(pattern, "".join(f"{line}\n" for line in lines)) is not None
+
+
+def renewed(shown: list[str], lines: list[str]) -> list[str]:
+    """What to show now: each line by the one most like it in its letters, in order; ellipses stay."""
+    if ELLIPSIS not in shown:
+        return lines if shown else []
+    letters = [re.sub(r"[^a-zA-Z]", "", line) for line in lines]
+    found, position = [], 0
+    for line in shown:
+        if line == ELLIPSIS:
+            found.append(line)
+            continue
+        wanted = re.sub(r"[^a-zA-Z]", "", line)
+        scores = [difflib.SequenceMatcher(None, wanted, other).ratio() for other in letters[position:]]
+        if not scores:
+            raise ValueError(f"nothing like {line!r} is printed any more: edit the text by hand")
+        position += scores.index(max(scores))
+        found.append(lines[position])
+        position += 1
+    return found
+
+
+def play(tutorial: Path, pictures: bool) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Commands of a tutorial, in the current folder: command, lines shown, lines printed."""
+    for block in BLOCK.finditer(tutorial.read_text(encoding="utf-8")):
+        for command, shown in commands(block.group(1)):
+            yield command, shown, printed(command, pictures)
+
+
+def shrink(source: Path, target: Path, share: float) -> None:
+    """A picture small enough to be kept: its upper share, narrower, with a palette."""
+    from PIL import Image
+
+    picture = Image.open(source).convert("RGB")
+    picture = picture.crop((0, 0, picture.width, round(share * picture.height)))
+    if picture.width > WIDTH:
+        picture = picture.resize((WIDTH, round(picture.height * WIDTH / picture.width)), Image.Resampling.LANCZOS)
+    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+
+
+def remake(tutorial: Path) -> None:
+    """Rewrite the outputs shown in a tutorial, and its pictures."""
+    text = tutorial.read_text(encoding="utf-8")
+    with workshop() as folder:
+        for command, shown, lines in play(tutorial, pictures=True):
+            if not agrees(shown, lines):
+                old = "\n".join([f"$ {command}", *shown]) + "\n"
+                text = text.replace(old, "\n".join([f"$ {command}", *renewed(shown, lines)]) + "\n")
+                print(f"{tutorial.name}: {command}: output renewed")
+        for name, (owner, file, share) in PICTURES.items():
+            if owner == tutorial.name:
+                shrink(folder / file, HERE / "pictures" / name, share)
+    tutorial.write_text(text, encoding="utf-8")
+
+
+def check(tutorial: Path) -> bool:
+    """Whether all that a tutorial shows is printed; says what is not."""
+    good = True
+    with workshop():
+        for command, shown, lines in play(tutorial, pictures=False):
+            if not agrees(shown, lines):
+                good = False
+                print(f"{tutorial.name}: {command}: prints otherwise than shown", file=sys.stderr)
+                print("\n".join(difflib.unified_diff(shown, lines, "shown", "printed", lineterm="")), file=sys.stderr)
+    return good
+
+
+if __name__ == "__main__":
+    if "--check" in sys.argv[1:]:
+        sys.exit(0 if all([check(tutorial) for tutorial in TUTORIALS]) else 1)
+    for each in TUTORIALS:
+        remake(each)
