@@ -14,6 +14,7 @@ from toolpath_stiff.units import m_from_mm, rad_from_deg
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
     from toolpath_stiff.nc import Program
+    from toolpath_stiff.nc.controller import Controller
 
 Pose = tuple[float, float, float, float, float, float]
 
@@ -116,6 +117,17 @@ def add_program_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--offsets", metavar="FILE", help="work offsets G54 to G59.3")
     group.add_argument("--tools", metavar="FILE", help="tool table: LinuxCNC .tbl, or CSV tool,length_mm,diameter_mm")
+    group.add_argument(
+        "--controller",
+        metavar="FILE",
+        help="what belongs to the control (TOML: dialect, block_delete, offsets, tools; or LinuxCNC's .var or .tbl)",
+    )
+    group.add_argument(
+        "--dialect",
+        choices=("generic", "linuxcnc", "fanuc", "haas"),
+        help="how the control reads what others read otherwise: X10 without a decimal point, the time of G4 P, "
+        "G70 and G71, `;` (default: the controller file's, else generic)",
+    )
     group.add_argument("--block-delete", action="store_true", help="leave out blocks that begin with /")
     group.add_argument(
         "--interpreter",
@@ -161,6 +173,25 @@ def add_json_option(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--json", action="store_true", help=text)
 
 
+def controller_for(args: argparse.Namespace) -> Controller:
+    """The control that the options of `add_program_options` describe, tables included."""
+    from dataclasses import replace
+
+    from toolpath_stiff.nc.controller import Controller, read_controller
+    from toolpath_stiff.nc.dialects import dialect_named
+    from toolpath_stiff.nc.tables import read_offsets, read_tool_table
+
+    if args.controller:
+        controller = read_controller(args.controller, args.dialect)
+    else:
+        controller = Controller(dialect_named(args.dialect or "generic"))
+    if args.offsets:
+        controller = replace(controller, offsets=read_offsets(args.offsets))
+    if args.tools:
+        controller = replace(controller, tools=read_tool_table(args.tools))
+    return controller
+
+
 def read_program_for(args: argparse.Namespace, file: str, machine: Machine | None) -> Program:
     """Read a program with the options of `add_program_options`; without a machine the default origin is 0."""
     from toolpath_stiff.nc import read_program
@@ -169,9 +200,8 @@ def read_program_for(args: argparse.Namespace, file: str, machine: Machine | Non
         file,
         origin=args.origin,
         default_origin=machine.default_origin if machine else (0.0,) * 6,
-        offsets_file=args.offsets,
-        tool_table=args.tools,
         block_delete=args.block_delete,
         interpreter=args.interpreter,
         rs274=args.rs274,
+        controller=controller_for(args),
     )

@@ -13,6 +13,7 @@ from toolpath_stiff.cli.arguments import (
     add_load_options,
     add_machine_options,
     add_program_options,
+    controller_for,
     finite_number,
     length_m,
     range_argument,
@@ -192,13 +193,13 @@ def _rewrite(
         return None, None
     import numpy as np
 
-    from toolpath_stiff.nc.tables import read_offsets, read_tool_table
     from toolpath_stiff.placement.report_data import placement_row
     from toolpath_stiff.placement.rewrite import rewrite_program, rewriting_differences
 
+    controller = controller_for(args)
     reading: dict[str, Any] = {
-        "offsets": read_offsets(args.offsets) if args.offsets else None,
-        "tools": read_tool_table(args.tools) if args.tools else None,
+        "offsets": controller.offsets,
+        "tools": controller.tools,
         "block_delete": args.block_delete,
     }
     rewritten = rewrite_program(

@@ -9,6 +9,7 @@ from toolpath_stiff.nc.codes import (
     G_GROUPS,
     G_HARMLESS,
     G_REFUSED,
+    INCH_METRIC,
     M_GROUPS,
     M_HARMLESS,
     M_QUIET,
@@ -16,6 +17,7 @@ from toolpath_stiff.nc.codes import (
     ONCE,
     code_name,
 )
+from toolpath_stiff.nc.dialects import GENERIC, Dialect
 from toolpath_stiff.nc.moves import Unsupported
 from toolpath_stiff.nc.words import Block, Word
 
@@ -39,14 +41,16 @@ class Codes:
 class BlockReader:
     """The block in hand: its codes by modal group, its words until something takes them, and what is to be said."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, name: str, dialect: Dialect = GENERIC) -> None:
+        self.name, self.dialect = name, dialect
         self.unsupported: list[Unsupported] = []
         self.warnings: list[str] = []
         self.assumptions: list[str] = []
         self.values: dict[str, Word] = {}
         self.free: set[str] = set()
         self.block = Block(0, ())
+        self._bare: tuple[int, Word] | None = None  # the first length without a point, and its line
+        self._pointed = False  # whether any length ends with its point, as `X10.`
 
     def fail(self, word: Word | None, found: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block, or at the block."""
@@ -80,6 +84,10 @@ class BlockReader:
 
     def _collect_g(self, codes: Codes, word: Word) -> None:
         code = code_name("G", word.value)
+        if code in INCH_METRIC:
+            if not self.dialect.inch_metric:
+                raise self.fail(word, f"is {self.dialect.g70[0]}, which is not supported", hint=self.dialect.g70[1])
+            code = INCH_METRIC[code]
         if code in G_REFUSED:
             what, hint = G_REFUSED[code]
             raise self.fail(word, f"is {what}, which is not supported", hint=hint)

@@ -35,6 +35,7 @@ G_GROUPS: dict[str, str] = {
     **dict.fromkeys(("G68", "G69"), "rotation"),
     "G50": "scaling",
 }
+INCH_METRIC = {"G70": "G20", "G71": "G21"}  # where the dialect has them
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
 # Harmless G codes: the path does not change, the user is told.
@@ -73,8 +74,6 @@ G_REFUSED = {
     "G65": ("a macro call", "expand macros before analysing"),
     "G66": ("a macro call", "expand macros before analysing"),
     "G68.2": ("a tilted work plane", "post X, Y, Z, A, B, C of the tool tip"),
-    "G70": ("a lathe cycle", "this is a mill"),
-    "G71": ("a lathe cycle", "this is a mill"),
     "G72": ("a lathe cycle", "this is a mill"),
     "G74": ("left-hand tapping", "leave tapping out"),
     "G76": ("a threading cycle", "leave threading out"),

@@ -10,12 +10,22 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc import arcs
-from toolpath_stiff.nc.blocks import AXES, BlockReader
+from toolpath_stiff.nc.blocks import AXES, BlockReader, Codes
+from toolpath_stiff.nc.dialects import GENERIC, INCREMENT_DEGREE, INCREMENT_INCH, INCREMENT_MM, Dialect
 from toolpath_stiff.nc.frames import Frames, Rotation
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import MM_PER_INCH
 
 LINEAR = frozenset("XYZ")
+LENGTHS = frozenset("XYZIJKRQ")
+INCREMENTS = (
+    "lengths and angles without a decimal point count least increments (0.001 mm, 0.0001 inch, 0.001 degrees: IS-B), "
+    "as the dialect {} has it"
+)
+MIXED = (
+    "some lengths end with their decimal point (X10.), and {} in line {} has none: Fanuc's and Haas' controls count "
+    "such a number in 0.001 mm or 0.0001 inch; here it counts whole units, unless --dialect says otherwise"
+)
 SAME_PLACE_MM = 1e-9
 XY = frozenset((0, 1))
 
@@ -31,8 +41,8 @@ class Coordinates(BlockReader):
         "G68" or "G69", whichever changed the numbers of the present X and Y last, until both are programmed anew.
     """
 
-    def __init__(self, name: str, frames: Frames) -> None:
-        super().__init__(name)
+    def __init__(self, name: str, frames: Frames, dialect: Dialect = GENERIC) -> None:
+        super().__init__(name, dialect)
         self.frames = frames
         self.plane = "G17"
         self.absolute, self.inch = True, False
@@ -43,6 +53,38 @@ class Coordinates(BlockReader):
     def _scale(self) -> float:
         """Millimetres of one length unit of the program."""
         return MM_PER_INCH if self.inch else 1.0
+
+    def _read_numbers(self, codes: Codes) -> None:
+        """Give the block's words their values in program units, by the dialect's decimal-point rule."""
+        if not self.dialect.increments:
+            if self.dialect.name == GENERIC.name and (self._bare is None or not self._pointed):
+                self._watch_points()
+            return
+        inch = (codes.get("units") or ("G20" if self.inch else "G21")) == "G20"
+        angles = {"A", "B", "C"}
+        if codes.get("rotation") == "G68":
+            angles.add("R")
+        polar = codes.get("polar") == "G16" if codes.get("polar") else self.polar is not None
+        if polar and not codes.once:
+            angles.add(AXES[arcs.PLANES[codes.get("plane") or self.plane][1]])
+        for letter, word in self.values.items():
+            if "." in word.text or not word.value or not (letter in LENGTHS or letter in angles):
+                continue
+            unit = INCREMENT_DEGREE if letter in angles else INCREMENT_INCH if inch else INCREMENT_MM
+            self.values[letter] = word._replace(value=word.value * unit)
+            self._assume(INCREMENTS.format(self.dialect.name))
+
+    def _watch_points(self) -> None:
+        """Notice what looks like a program for a control that counts increments."""
+        for letter, word in self.values.items():
+            if letter not in LENGTHS or not word.value:
+                continue
+            if word.text.endswith("."):
+                self._pointed = True
+            elif self._bare is None and "." not in word.text and "E" not in word.text.upper():
+                self._bare = (self.block.line, word)
+        if self._pointed and self._bare is not None:
+            self.warnings.append(MIXED.format(self._bare[1].text, self._bare[0]))
 
     def _axis_words(self) -> dict[int, float]:
         """Axis index -> value of the block's axis words in mm and degrees; they are thereby used."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from toolpath_stiff.nc.blocks import AXES, Codes
 from toolpath_stiff.nc.codes import ARCS, CYCLES, M_SUBPROGRAM, MOTION, WORK_OFFSETS
 from toolpath_stiff.nc.coordinates import XY
+from toolpath_stiff.nc.dialects import GENERIC, SECONDS, Dialect
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.motion import SECONDS_PER_DAY, Mover
 from toolpath_stiff.nc.moves import FEED, RAPID
@@ -36,8 +37,10 @@ class Interpreter(Mover):
     `call` and `returns` are the M98 and M99 of the last block, for whoever chooses the next one.
     """
 
-    def __init__(self, name: str, frames: Frames, tools: dict[int, ToolEntry] | None) -> None:
-        super().__init__(name, frames, tools)
+    def __init__(
+        self, name: str, frames: Frames, tools: dict[int, ToolEntry] | None, dialect: Dialect = GENERIC
+    ) -> None:
+        super().__init__(name, frames, tools, dialect)
         self.call: Call | None = None
         self.returns = False
 
@@ -53,6 +56,7 @@ class Interpreter(Mover):
         """Take a block's codes and set its modes, not moving yet; to do so twice changes nothing but dwells."""
         self.block = block
         codes = self._collect(block)
+        self._read_numbers(codes)
         self._modes(codes)
         return codes
 
@@ -150,6 +154,8 @@ class Interpreter(Mover):
             word = self.values["F"]
             if feed < 0.0:
                 raise self.fail(word, "is a negative feed", "F above 0")
+            if "." not in word.text and feed and self.feed_mode != "G93":
+                self._check_bare_feed(word)
             scale = MM_PER_INCH if self.inch and self.feed_mode != "G93" else 1.0
             self.feed = feed * scale if feed > 0.0 else None
         speed = self.take("S")
@@ -157,6 +163,16 @@ class Interpreter(Mover):
             if speed < 0.0:
                 raise self.fail(self.values["S"], "is a negative speed", "S of 0 or more")
             self.speed = speed
+
+    def _check_bare_feed(self, word: Word) -> None:
+        units = "inch" if self.inch else "mm"
+        per_revolution = self.dialect.increments and self.feed_mode == "G95"
+        if per_revolution or units in self.dialect.feed_needs_point:
+            raise self.fail(
+                word,
+                f"without a decimal point is a feed that hangs on the control's parameters ({self.dialect.name})",
+                f"{word.text}. if it is that many {units} per {'revolution' if self.feed_mode == 'G95' else 'minute'}",
+            )
 
     def _tools(self, codes: Codes) -> None:
         number = self.take("T")
@@ -172,7 +188,7 @@ class Interpreter(Mover):
             self.tool = self.selected
 
     def _dwell(self, word: Word) -> None:
-        seconds = self.take("P")
+        seconds = self._seconds("X" if self.dialect.dwell != SECONDS and self.has("X") else "P")
         if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
             raise self.fail(word, "needs its time", "P with the seconds, 0 or more")
         self.recorder.add_dwell(seconds)

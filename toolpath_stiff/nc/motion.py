@@ -8,6 +8,7 @@ from toolpath_stiff.nc import arcs
 from toolpath_stiff.nc.blocks import AXES
 from toolpath_stiff.nc.coordinates import Coordinates
 from toolpath_stiff.nc.cycles import SAME_HEIGHT_MM, Drilling, strokes
+from toolpath_stiff.nc.dialects import GENERIC, MILLISECONDS, SECONDS, Dialect
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import ARC, CYCLE, RAPID, ToolUse
 from toolpath_stiff.nc.recorder import Arc, Recorder
@@ -15,25 +16,29 @@ from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
 SECONDS_PER_DAY = 86400.0
+MOST_STROKES = 100_000  # of one block; beyond, Q or L is a slip
 
 
 class Mover(Coordinates):
     """The modal state, and the moves that it makes of words; `recorder` holds those found so far."""
 
-    def __init__(self, name: str, frames: Frames, tools: dict[int, ToolEntry] | None) -> None:
-        super().__init__(name, frames)
+    def __init__(
+        self, name: str, frames: Frames, tools: dict[int, ToolEntry] | None, dialect: Dialect = GENERIC
+    ) -> None:
+        super().__init__(name, frames, dialect)
         self.tools = tools
         self.recorder = Recorder()
         self.used_tools: dict[int, ToolUse] = {}
         self.motion: str | None = None
         self.feed_mode = "G94"
-        self.retract: str | None = None  # G98 or G99, once said; LinuxCNC starts as in G99
-        self.arc_absolute = False
+        self.retract = dialect.retract  # G98 or G99, once said; LinuxCNC starts as in G99
+        self.arc_absolute = dialect.arc_absolute
         self.feed: float | None = None
         self.speed = 0.0
         self.tool, self.selected = 0, 0
         self.tool_length = math.nan
         self.sticky: dict[str, float] = {}
+        self._heights = (True, 0.0, 0.0)  # of the last hole: whether in G90, R plane, bottom
 
     def _straight(
         self, motion: int, control: list[float], work: set[int], machine: set[int] | None = None, dwell: float = 0.0
@@ -74,7 +79,12 @@ class Mover(Coordinates):
     def _use_tool(self) -> None:
         entry = (self.tools or {}).get(self.tool, ToolEntry(self.tool))
         self.used_tools[self.tool] = ToolUse(
-            self.tool, m_from_mm(entry.length), m_from_mm(entry.diameter), entry.remark
+            self.tool,
+            m_from_mm(entry.length),
+            m_from_mm(entry.diameter),
+            entry.remark,
+            m_from_mm(entry.stick_out),
+            entry.material,
         )
 
     def _feed_of(self, start: list[float], end: list[float], arc: Arc | None) -> float:
@@ -174,10 +184,13 @@ class Mover(Coordinates):
         code = self.motion or ""
         normal = arcs.PLANES[self.plane][2]
         repeats = self._repeats()
-        for letter in "RQP":
+        self._keep_heights(code, normal)
+        for letter in "RQ":
             value = self.take(letter)
             if value is not None:
-                self.sticky[letter] = value if letter == "P" else value * self._scale
+                self.sticky[letter] = value * self._scale
+        if self.has("P"):
+            self.sticky["P"] = self._seconds("P") or 0.0
         words = self._point_words()
         if not words and given:
             raise self.fail(None, f"{code} without axis words", "X, Y, Z")
@@ -192,6 +205,7 @@ class Mover(Coordinates):
         initial = self.sticky.setdefault("level", here)
         retract = self.sticky["R"] if self.absolute else self.sticky["R"] + initial
         bottom = self.sticky["Z"] if self.absolute else retract + self.sticky["Z"]
+        self._heights = (self.absolute, retract, bottom)
         if retract < bottom:
             raise self.fail(None, f"{code}: R at {retract:g} mm is below the bottom at {bottom:g} mm", "R above it")
         if self.retract is None:
@@ -203,6 +217,7 @@ class Mover(Coordinates):
             here = retract
         clear = max(initial, retract) if self.retract == "G98" else retract
         level = here if here > retract + SAME_HEIGHT_MM else clear
+        self._check_pecks(code, retract - bottom, repeats)
         hole = Drilling(code, bottom, retract, clear, self.sticky.get("Q", 0.0), self.sticky.get("P", 0.0))
         for _ in range(repeats):
             place = self._destination(frames.to_program(frames.position), words)
@@ -212,6 +227,38 @@ class Mover(Coordinates):
             self._along_normal(normal, retract, RAPID)
             for stroke in strokes(hole):
                 self._along_normal(normal, stroke.height, CYCLE if stroke.feed else RAPID, stroke.dwell)
+
+    def _keep_heights(self, code: str, normal: int) -> None:
+        """G90 or G91 since Z and R were given: Fanuc's hole stays where it is, LinuxCNC reads the numbers anew."""
+        absolute, retract, bottom = self._heights
+        if absolute == self.absolute or not {"R", "Z"} <= self.sticky.keys():
+            return
+        renewed = [letter for letter in ("R", AXES[normal]) if self.has(letter)]
+        keeps = True if self.polar is not None else self.dialect.keeps_heights
+        if len(renewed) == 2 or keeps is False:
+            return
+        if keeps is None or renewed:
+            raise self.fail(
+                None,
+                f"{code} after a change between G90 and G91: controls differ in whether the hole keeps its heights",
+                f"R and {AXES[normal]} in the block",
+                "" if renewed else "name the control with --dialect",
+            )
+        level = self.sticky["level"]
+        heights = (retract, bottom) if self.absolute else (retract - level, bottom - retract)
+        self.sticky["R"], self.sticky["Z"] = heights
+
+    def _seconds(self, letter: str) -> float | None:
+        """A time word in s; what its number counts is the dialect's."""
+        value = self.take(letter)
+        if value is None or self.dialect.dwell == SECONDS:
+            return value
+        written = next(word for word in self.block.words if word.letter == letter)
+        if "." not in written.text:
+            return written.value / 1e3
+        if letter == "P" and self.dialect.dwell == MILLISECONDS:
+            raise self.fail(written, f"has a decimal point, which {self.dialect.name} does not allow", "milliseconds")
+        return value
 
     def _repeats(self) -> int:
         value = self.take("L")
@@ -232,6 +279,11 @@ class Mover(Coordinates):
             dwell = self.sticky.get("P")
             if dwell is None or not 0.0 <= dwell <= SECONDS_PER_DAY:
                 raise self.fail(None, f"{code} without its dwell", "P with the seconds, 0 or more")
+
+    def _check_pecks(self, code: str, depth: float, repeats: int) -> None:
+        pecks = depth / self.sticky["Q"] if code in ("G73", "G83") else 1.0
+        if pecks * repeats > MOST_STROKES:
+            raise self.fail(None, f"{code} with more than {MOST_STROKES} strokes", "a larger Q, or fewer repeats")
 
     def _along_normal(self, normal: int, height: float, motion: int, dwell: float = 0.0) -> None:
         frames = self.frames

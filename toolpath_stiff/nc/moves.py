@@ -5,6 +5,7 @@ This is what the reader hands on: geometry with its line, feed and tool; no mach
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
@@ -89,12 +90,14 @@ class Unsupported:
 
 @dataclass(frozen=True)
 class ToolUse:
-    """A tool of the tool table: number, length and diameter in m (nan: not given), remark."""
+    """A tool of the tool table: number; length, diameter, stick-out in m (nan: not given); remark, material."""
 
     number: int
     length: float
     diameter: float
     remark: str = ""
+    stick_out: float = math.nan
+    material: str = ""
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,8 @@ class Program:
         The tools that the program used.
     interpreter
         Who read it: "builtin" or "linuxcnc".
+    dialect
+        How it was read: "generic", "linuxcnc", "fanuc", "haas", or one of them as a controller file changes it.
     """
 
     name: str
@@ -135,3 +140,4 @@ class Program:
     assumptions: tuple[str, ...] = ()
     tools: tuple[ToolUse, ...] = field(default=())
     interpreter: str = "builtin"
+    dialect: str = "generic"

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import ALL_SWITCHES, UNKNOWN_CONTROL, Controller, check_plain
+from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import Program
@@ -33,6 +35,7 @@ def read_program(
     block_delete: bool = False,
     interpreter: str = "builtin",
     rs274: str | None = None,
+    controller: Controller = UNKNOWN_CONTROL,
 ) -> Program:
     """Read an NC program file to its moves in the set-up frame.
 
@@ -53,6 +56,8 @@ def read_program(
         "builtin"; "linuxcnc", LinuxCNC's own (`rs274`); "auto", the first and, where it refuses, the second.
     rs274
         Path of the program `rs274`, if it is not on PATH.
+    controller
+        Dialect, block-delete switches, work offsets and tools of the control; the two files above win over its tables.
 
     Raises
     ------
@@ -65,11 +70,12 @@ def read_program(
         str(path),
         origin,
         default_origin,
-        read_offsets(offsets_file) if offsets_file else Offsets(),
-        read_tool_table(tool_table) if tool_table else None,
+        read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets(),
+        read_tool_table(tool_table) if tool_table else controller.tools,
         block_delete,
         interpreter,
         rs274,
+        controller,
     )
 
 
@@ -84,11 +90,12 @@ def parse_program(
     block_delete: bool = False,
     interpreter: str = "builtin",
     rs274: str | None = None,
+    controller: Controller = UNKNOWN_CONTROL,
 ) -> Program:
     """Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`."""
     lines = split_lines(text, name)
-    tables = (offsets or Offsets(), tools)
-    return _read(lines, name, "", origin, default_origin, *tables, block_delete, interpreter, rs274)
+    tables = (offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools)
+    return _read(lines, name, "", origin, default_origin, *tables, block_delete, interpreter, rs274, controller)
 
 
 def _read(
@@ -102,19 +109,27 @@ def _read(
     block_delete: bool,
     interpreter: str,
     rs274: str | None,
+    controller: Controller,
 ) -> Program:
     """Choose the interpreter: the built-in one, LinuxCNC's, or that where the first refuses."""
     if interpreter not in INTERPRETERS:
         raise InputError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in lines):
         raise InputError("the program is empty", expected="an NC program", file=name)
+    foreign = foreign_program(lines, name)
+    if foreign is not None:
+        raise foreign
     given = (lines, name, path, origin, default_origin, offsets, tools, block_delete)
     if interpreter == "linuxcnc":
+        check_plain(controller)
         return _read_by_linuxcnc(*given, rs274)
     try:
-        return _read_built_in(*given)
+        return _read_built_in(*given, controller)
     except InputError as error:
-        if interpreter == "builtin":
+        foreign = foreign_program(lines, name, error.line)
+        if foreign is not None:
+            raise foreign from None
+        if interpreter == "builtin" or not controller.plain:
             raise
         return _second_opinion(error, given, rs274)
 
@@ -180,10 +195,11 @@ def _read_built_in(
     offsets: Offsets,
     tools: dict[int, ToolEntry] | None,
     block_delete: bool,
+    controller: Controller,
 ) -> Program:
     frames = Frames(copy.deepcopy(offsets), None if origin is None else _to_mm(origin), _to_mm(default_origin))
-    interpreter = Interpreter(name, frames, copy.deepcopy(tools))
-    warnings = ProgramRun(interpreter, lines, name, block_delete).run()
+    interpreter = Interpreter(name, frames, copy.deepcopy(tools), controller.dialect)
+    warnings = ProgramRun(interpreter, lines, name, ALL_SWITCHES if block_delete else controller.switches).run()
     if not interpreter.recorder.cuts:
         raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)
     g54 = offsets.table[0].given or frames.offsets.table[0].given
@@ -202,6 +218,7 @@ def _read_built_in(
         warnings=(*warnings, *interpreter.warnings),
         assumptions=(START, *interpreter.assumptions),
         tools=tuple(interpreter.used_tools.values()),
+        dialect=controller.label,
     )
 
 

@@ -40,13 +40,13 @@ class ProgramRun:
         Executes them.
     lines, name
         The file.
-    block_delete
-        Whether blocks that begin with a slash are left out.
+    switches
+        The block-delete switches that are on, 1 to 9: blocks that begin with their slash are left out.
     """
 
-    def __init__(self, interpreter: Interpreter, lines: tuple[str, ...], name: str, block_delete: bool) -> None:
+    def __init__(self, interpreter: Interpreter, lines: tuple[str, ...], name: str, switches: frozenset[int]) -> None:
         self.interpreter, self.lines, self.name = interpreter, lines, name
-        self.block_delete = block_delete
+        self.switches = switches
         self._levels: list[_Level] = []
         self._programs: dict[int, int] | None = None
         self._called: dict[int, Block] = {}  # blocks of subprograms by line, from 0: each is read once
@@ -66,7 +66,7 @@ class ProgramRun:
                 if block.words[0].letter == "O":
                     self._check_head(block, numbered)
                     numbered = True
-                if not (block.optional and self.block_delete):
+                if not (block.optional and block.switch in self.switches):
                     if not self.interpreter.execute(block):
                         return self._end(at, "the program's end", ended=True)
                     if self.interpreter.call is not None:
@@ -86,14 +86,17 @@ class ProgramRun:
 
     def _block(self, at: int) -> Block:
         if not self._levels:
-            return read_block(self.lines[at], at + 1, self.name)
+            return self._read(at)
         self._blocks += 1
         if self._blocks > MOST_BLOCKS:
             raise self._fail(at, f"the subprograms run more than {MOST_BLOCKS} blocks", "fewer repeats")
         block = self._called.get(at)
         if block is None:
-            block = self._called[at] = read_block(self.lines[at], at + 1, self.name)
+            block = self._called[at] = self._read(at)
         return block
+
+    def _read(self, at: int) -> Block:
+        return read_block(self.lines[at], at + 1, self.name, self.interpreter.dialect.semicolon)
 
     def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
         return InputError(found, expected=expected, hint=hint, file=self.name, line=at + 1, column=column)
@@ -102,7 +105,7 @@ class ProgramRun:
         """A program number within a program: the next one begins where this one did not end."""
         if self._levels:
             raise self._unended(block.line - 1)
-        if numbered or self.interpreter.recorder.line:
+        if (numbered or self.interpreter.recorder.line) and self.interpreter.dialect.name != "linuxcnc":
             raise self._fail(
                 block.line - 1,
                 f"{block.words[0].text} begins another program before the first one has ended",
@@ -154,9 +157,10 @@ class ProgramRun:
         """Program number and repeats of a call."""
         heads = self._heads()
         meanings = {(call.number, call.repeats or 1)}
-        if call.repeats is None and call.number >= REPEATS_IN_P:
+        style = self.interpreter.dialect.repeats_in_p
+        if call.repeats is None and call.number >= REPEATS_IN_P and style is not False:
             repeats, number = divmod(call.number, REPEATS_IN_P)
-            meanings.add((number, repeats))
+            meanings = {(number, repeats)} if style else meanings | {(number, repeats)}
         known = [meaning for meaning in sorted(meanings) if meaning[0] in heads]
         if not known:
             names = " or ".join(f"O{number}" for number, _ in sorted(meanings))

@@ -20,12 +20,14 @@ HOME_G28, HOME_G30 = 5161, 5181
 
 @dataclass
 class ToolEntry:
-    """A tool: length and diameter in mm, nan where the table does not say."""
+    """A tool: length, diameter and stick-out (out of its holder) in mm, nan where the table does not say."""
 
     number: int
     length: float = math.nan
     diameter: float = math.nan
     remark: str = ""
+    stick_out: float = math.nan
+    material: str = ""
 
 
 @dataclass
@@ -85,7 +87,7 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
 
 
 def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
-    columns = ("tool", "length_mm", "diameter_mm", "remark")
+    columns = ("tool", "length_mm", "diameter_mm", "remark", "stick_out_mm", "material")
     heading = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
     unknown = [name for name in heading if name not in columns]
     missing = [name for name in columns[:2] if name not in heading]
@@ -99,18 +101,12 @@ def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int
         if number != int(number) or number < 0:
             raise InputError(f"tool = {cells['tool']!r}", expected="a whole number", file=str(path), line=line)
         length = _number(cells.get("length_mm", ""), "length_mm", path, line)
-        diameter = cells.get("diameter_mm", "")
-        rows.append(
-            (
-                line,
-                ToolEntry(
-                    int(number),
-                    length,
-                    _number(diameter, "diameter_mm", path, line) if diameter else math.nan,
-                    cells.get("remark", ""),
-                ),
-            )
+        diameter, stick_out = (
+            _number(cells[name], name, path, line) if cells.get(name) else math.nan
+            for name in ("diameter_mm", "stick_out_mm")
         )
+        tool = ToolEntry(int(number), length, diameter, cells.get("remark", ""), stick_out, cells.get("material", ""))
+        rows.append((line, tool))
     return rows
 
 
@@ -160,7 +156,7 @@ def read_offsets(path: str | Path) -> Offsets:
                 raise InputError(
                     f"{name} has {len(values)} numbers", expected=f"1 to {most}", file=str(path), line=line
                 )
-            _set_offset(offsets, name, values)
+            set_offset(offsets, name, values)
         else:
             raise InputError(
                 f"{text!r} is not an offset",
@@ -171,7 +167,8 @@ def read_offsets(path: str | Path) -> Offsets:
     return offsets
 
 
-def _set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
+def set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
+    """Set G54 to G59.3 from x, y, z, a, b, c, r, or the reference points G28 and G30; missing ones are 0."""
     axes = [*values[:6], *[0.0] * (6 - len(values[:6]))]
     if name == "G28":
         offsets.home_g28 = axes

@@ -37,32 +37,47 @@ class Word(NamedTuple):
 class Block:
     """One line of a program, read.
 
-    `optional`: it begins with the block-delete slash. `percent`: it holds the tape mark alone.
+    `optional`: it begins with the block-delete slash; `switch`: the number of the slash, 1 to 9 (`/` is `/1`).
+    `percent`: it holds the tape mark alone.
     """
 
     line: int
     words: tuple[Word, ...]
     optional: bool = False
     percent: bool = False
+    switch: int = 1
 
 
-def read_block(text: str, line: int, name: str) -> Block:
-    """Read the words of one line. Raises `InputError` with line and column."""
-    compact, columns = _strip(text, line, name)
+def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block:
+    """Read the words of one line. Raises `InputError` with line and column.
+
+    `semicolon`: whether `;` begins a comment; else it ends the block, and nothing but blanks may follow it.
+    """
+    compact, columns = _strip(text, line, name, semicolon)
     if not compact:
         return Block(line, ())
     if compact == "%":
         return Block(line, (), percent=True)
     start = 0
     optional = compact[0] == "/"
+    switch = 1
     if optional:
         start = 1
-        while start < len(compact) and compact[start].isdigit():  # /1 to /9: numbered switches
+        while start < len(compact) and "0" <= compact[start] <= "9":
             start += 1
+        switch = int(compact[1:start] or 1)
+        if not 1 <= switch <= 9:
+            raise InputError(
+                f"block-delete switch {compact[:start]!r}",
+                expected="/ or /1 to /9",
+                file=name,
+                line=line,
+                column=columns[0],
+            )
     if compact.startswith(("O", ":"), start):  # `:` is O on ISO tape
         return _program_number(compact[start:], columns[start], line, name)
     words = _tokens(compact, columns, start, text, line, name)
-    return Block(line, _through_pygcode(words, line, name), optional=optional)
+    return Block(line, _through_pygcode(words, line, name), optional=optional, switch=switch)
 
 
 def _program_number(compact: str, column: int, line: int, name: str) -> Block:
@@ -79,7 +94,7 @@ def _program_number(compact: str, column: int, line: int, name: str) -> Block:
     )
 
 
-def _strip(text: str, line: int, name: str) -> tuple[str, Sequence[int]]:
+def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Sequence[int]]:
     """Upper-case text without comments and blanks, and the column of each of its characters."""
     if text.isascii() and not COMMENT.search(text):  # the bulk of a big program
         compact = "".join(text.split()).upper()
@@ -104,6 +119,14 @@ def _strip(text: str, line: int, name: str) -> tuple[str, Sequence[int]]:
         elif character == "(":
             inside = column
         elif character == ";":
+            if not semicolon and text[column:].strip():
+                raise InputError(
+                    f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect",
+                    expected="comments in parentheses, one block a line",
+                    file=name,
+                    line=line,
+                    column=column,
+                )
             break
         elif character == ")":
             raise InputError("`)` without `(`", file=name, line=line, column=column)

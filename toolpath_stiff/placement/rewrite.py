@@ -34,6 +34,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 LINE_END = re.compile("\r\n|\n|\r")
 FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # 0.01 mm is no machining; beyond nine a double has no more to say
 FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_per_mm"}
+PLAIN_DIALECTS = ("generic", "linuxcnc")
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
@@ -92,6 +93,13 @@ def rewrite_program(
         A block cannot be expressed at the placement, with its line and the reason.
     """
     check_decimals(decimals)
+    if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
+        raise InputError(
+            "a program is rewritten by the words of the built-in interpreter in the dialects "
+            f"{' and '.join(PLAIN_DIALECTS)}; this one was read by {program.interpreter!r} as {program.dialect!r}",
+            hint="place it without --write",
+            file=program.name,
+        )
     text, encoding = _text_of(program)
     placement, original = _in_shop_units(placement_origin), _in_shop_units(original_origin)
 

@@ -1,0 +1,199 @@
+"""The controller file: what belongs to the control and not to the machine. TOML; mm and degrees.
+
+Its keys are `dialect`, `block_delete`, `arc_centers`, `inch_metric`, `offsets` (a table, or a file), `tools` (a list of
+tables, or a file). LinuxCNC's own parameter file (.var) and tool table (.tbl) are read as controller files too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes import WORK_OFFSETS
+from toolpath_stiff.nc.dialects import DIALECTS, GENERIC, Dialect, dialect_named
+from toolpath_stiff.nc.tables import LARGEST_MM, Offsets, ToolEntry, read_offsets, read_tool_table, set_offset
+
+ALL_SWITCHES = frozenset(range(1, 10))
+TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")
+KEYS = ("dialect", "block_delete", "arc_centers", "inch_metric", "offsets", "tools")
+HOMES = ("G28", "G30")
+G70_UNITS, G20_UNITS = "G70 G71", "G20 G21"
+OTHER_KINEMATICS = ("kinematics", "posted_kinematics", "posted")
+
+
+@dataclass(frozen=True)
+class Controller:
+    """What is known of the control.
+
+    Attributes
+    ----------
+    dialect
+        The meaning of words in which controls differ.
+    switches
+        Block-delete switches that are on.
+    offsets, tools
+        Work offsets and tool table; None where the file has none.
+    """
+
+    dialect: Dialect = GENERIC
+    switches: frozenset[int] = field(default_factory=frozenset)
+    offsets: Offsets | None = None
+    tools: dict[int, ToolEntry] | None = None
+
+    @property
+    def plain(self) -> bool:
+        """Whether LinuxCNC's interpreter reads numbers, switches and codes in the same way."""
+        return self.dialect in (GENERIC, DIALECTS["linuxcnc"]) and self.switches in (frozenset(), ALL_SWITCHES)
+
+    @property
+    def label(self) -> str:
+        """The dialect's name, and whether a controller file changes it."""
+        name = self.dialect.name
+        unchanged = self.dialect == DIALECTS[name] and not self.switches
+        return name if unchanged else f"{name}, changed by the controller file"
+
+
+UNKNOWN_CONTROL = Controller()
+
+
+def check_plain(controller: Controller) -> None:
+    """Raise `InputError` if LinuxCNC's interpreter would read the program otherwise than the control."""
+    if not controller.plain:
+        raise InputError(
+            f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {controller.dialect.name!r}, "
+            "or it has single block-delete switches",
+            hint="use the built-in interpreter (--interpreter builtin)",
+        )
+
+
+def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
+    """Read a controller file; .var and .tbl files are LinuxCNC's. `dialect`, if given, is in place of the file's.
+
+    Raises `InputError` that names file and key.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".var", ".tbl"):
+        return _Reader(path, dialect).controller()
+    base = Controller(dialect_named(dialect or "linuxcnc"))
+    if suffix == ".var":
+        return replace(base, offsets=read_offsets(path))
+    return replace(base, tools=read_tool_table(path))
+
+
+class _Reader:
+    """One controller file."""
+
+    def __init__(self, path: str | Path, dialect: str | None) -> None:
+        import tomllib
+
+        self.path, self.dialect = Path(path), dialect
+        try:
+            self.data: dict[str, Any] = tomllib.loads(self.path.read_text(encoding="utf-8-sig"))
+        except OSError as error:
+            raise InputError(f"cannot read the controller file {str(path)!r}: {error.strerror}") from None
+        except UnicodeDecodeError:
+            raise InputError("the controller file is not a text file", file=str(path)) from None
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"the controller file is not TOML: {error}", file=str(path)) from None
+
+    def fail(self, found: str, expected: str = "", hint: str = "") -> InputError:
+        return InputError(found, expected=expected, hint=hint, file=str(self.path))
+
+    def controller(self) -> Controller:
+        for key in self.data:
+            if key in OTHER_KINEMATICS:
+                raise self.fail(
+                    f"{key}: programs posted for another kinematics are not read",
+                    hint="post X, Y, Z of the tool tip and A, B, C as roll, pitch, yaw of the platform",
+                )
+            if key not in KEYS:
+                raise self.fail(f"{key!r} is not known", ", ".join(KEYS))
+        return Controller(self._dialect(), self._switches(), self._offsets(), self._tools())
+
+    def _dialect(self) -> Dialect:
+        name = self._choice("dialect", tuple(DIALECTS), "generic")
+        dialect = dialect_named(self.dialect or name)
+        changes: dict[str, Any] = {}
+        if self._choice("arc_centers", ("incremental", "absolute"), "incremental") == "absolute":
+            changes["arc_absolute"] = True
+        if self._choice("inch_metric", (G70_UNITS, G20_UNITS), G20_UNITS) == G70_UNITS:
+            changes["inch_metric"] = True
+        return replace(dialect, **changes) if changes else dialect
+
+    def _choice(self, key: str, choices: tuple[str, ...], otherwise: str) -> str:
+        value = self.data.get(key, otherwise)
+        if not isinstance(value, str) or value not in choices:
+            raise self.fail(f"{key} = {value!r}", " or ".join(choices))
+        return value
+
+    def _switches(self) -> frozenset[int]:
+        value = self.data.get("block_delete", False)
+        if isinstance(value, bool):
+            return ALL_SWITCHES if value else frozenset()
+        if isinstance(value, list) and all(type(v) is int and v in ALL_SWITCHES for v in value):
+            return frozenset(value)
+        raise self.fail(f"block_delete = {value!r}", "true, false, or a list of switches 1 to 9")
+
+    def _offsets(self) -> Offsets | None:
+        given = self.data.get("offsets")
+        if given is None:
+            return None
+        if isinstance(given, str):
+            return read_offsets(self.path.parent / given)
+        if not isinstance(given, dict):
+            raise self.fail(f"offsets = {given!r}", "a table G54 = [x, y, z, a, b, c, r], or the name of a file")
+        offsets = Offsets()
+        for name, values in given.items():
+            most = 6 if name in HOMES else 7
+            if name not in (*WORK_OFFSETS, *HOMES):
+                raise self.fail(f"offsets.{name} is not an offset", f"{', '.join((*WORK_OFFSETS, *HOMES))}")
+            if not isinstance(values, list) or not 1 <= len(values) <= most:
+                raise self.fail(f"offsets.{name} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r")
+            set_offset(offsets, name, [self._number(f"offsets.{name}", value) for value in values])
+        return offsets
+
+    def _tools(self) -> dict[int, ToolEntry] | None:
+        given = self.data.get("tools")
+        if given is None:
+            return None
+        if isinstance(given, str):
+            return read_tool_table(self.path.parent / given)
+        if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
+            raise self.fail(
+                "tools is no list of tables", "[[tools]] with number, length_mm, ..., or the name of a file"
+            )
+        tools: dict[int, ToolEntry] = {}
+        for place, tool in enumerate(given, 1):
+            entry = self._tool(f"tools[{place}]", tool)
+            if entry.number in tools:
+                raise self.fail(f"tools[{place}]: tool {entry.number} appears twice")
+            tools[entry.number] = entry
+        return tools
+
+    def _tool(self, where: str, tool: Mapping[str, Any]) -> ToolEntry:
+        unknown = [key for key in tool if key not in TOOL_KEYS]
+        if unknown:
+            raise self.fail(f"{where}.{unknown[0]} is not known", ", ".join(TOOL_KEYS))
+        number = tool.get("number")
+        if type(number) is not int or number < 0:
+            raise self.fail(f"{where}.number = {number!r}", "a whole number")
+        lengths = [
+            self._number(f"{where}.{key}", tool[key]) if key in tool else math.nan
+            for key in ("length_mm", "diameter_mm", "stick_out_mm")
+        ]
+        for key, value in zip(("diameter_mm", "stick_out_mm"), lengths[1:], strict=True):
+            if value <= 0.0:
+                raise self.fail(f"{where}.{key} = {value:g}", "more than 0")
+        texts = [tool.get(key, "") for key in ("remark", "material")]
+        if not all(isinstance(text, str) for text in texts):
+            raise self.fail(f"{where}: remark and material are texts")
+        return ToolEntry(number, lengths[0], lengths[1], texts[0], lengths[2], texts[1])
+
+    def _number(self, where: str, value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_MM:
+            raise self.fail(f"{where} = {value!r}", f"a number within +-{LARGEST_MM:g}")
+        return float(value)
