@@ -18,6 +18,7 @@ PYTHON = re.compile(r"\s*p\s*y(?:\s*(?:[^\w\s]|$|r\s*u\s*n|r\s*e\s*l\s*o\s*a\s*d
 # Of all functions, operators and O words only MOD has an M in it.
 M_WORD = re.compile(r"M(?!OD)([+-]?[0-9.]+)?", re.ASCII)
 SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
+OPENS_OR_ENDS = re.compile(r"O(<[^<>]*>|\d+)(END)?(SUB|IF|WHILE|REPEAT)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
 
 
@@ -86,6 +87,18 @@ def _check_calls(lines: list[Line], name: str) -> None:
                 file=name,
                 line=number,
             )
+
+
+def unclosed(lines: Iterable[Line]) -> int | None:
+    """The line of the first O word whose end is missing."""
+    opened: dict[str, int] = {}
+    for line in lines:
+        match = OPENS_OR_ENDS.match(line.words)
+        if match and match[2]:
+            opened.pop(_key(match[1]), None)
+        elif match:
+            opened.setdefault(_key(match[1]), line.number)
+    return min(opened.values(), default=None)
 
 
 def _key(name: str) -> str:

@@ -94,7 +94,8 @@ class _Session:
         run, follower = self._run(offsets, shift)
         # G54 as it stood at the first motion is the zero of the set-up frame.
         axes, given = self._first_g54(run, follower, offsets, shift)
-        follower = self._follow(run, (axes[0], axes[1], axes[2]))
+        if any(axes[:3]):
+            follower = self._follow(run, (axes[0], axes[1], axes[2]))
         g54 = (axes[0], axes[1], axes[2], 0.0, 0.0, 0.0)
         if origin is not None:
             place, says = origin, "option"
@@ -204,6 +205,8 @@ class _Session:
         if seeking:
             line = int(seeking[2]) - lines_before
             text = f"the end of O word {seeking[1]} is missing"
+        elif "File ended" in text:  # it did not see the M2 that the copy ends with
+            line, text = fence.unclosed(self.lines), "the end of an O word is missing"
         return InputError(
             f"LinuxCNC's interpreter refuses: {text or 'it broke off without a message'}",
             file=self.name,
