@@ -31,8 +31,18 @@ def test_an_ellipsis_stands_for_lines_and_nothing_else():
     assert make.agrees(["a", "...", "d"], ["a", "d"])
     assert not make.agrees(["a", "d"], ["a", "b", "d"])
     assert not make.agrees(["a", "...", "d"], ["a", "b", "c"])
-    assert not make.agrees(["a 1"], ["a 2"])
+    assert not make.agrees(["a", "...", "b", "...", "c"], ["a", "c", "b"])
+    assert not make.agrees(["a", "...", "a"], ["a"])
     assert make.agrees([], ["anything"])
+
+
+def test_numbers_agree_to_one_in_the_last_place():
+    assert make.alike("error 2.32 %", "error 2.33 %")
+    assert not make.alike("error 2.32 %", "error 2.34 %")
+    assert not make.alike("error 2.32 %", "Error 2.32 %")
+    assert not make.alike("bias +0.6", "bias -0.6")
+    assert make.alike("bar 1.03e9 N/m", "bar 1.04e9 N/m")
+    assert not make.alike("bar 1.03e9 N/m", "bar 1.03e8 N/m")
 
 
 def test_outputs_renewed_agree():

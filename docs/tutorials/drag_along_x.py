@@ -18,5 +18,6 @@ class DragAlongX(Effect):
     parameters = (Parameter("scale", "%", 0.01, (-50.0, 50.0), (-20.0, 20.0), SOURCE, meaning="change at x = 300 mm"),)
 
     def reading(self, stiffness, path, p):
+        """What the gauge shows for a true stiffness, N/m."""
         along_x = np.abs(path.direction[:, 0])
         return stiffness * (1.0 + p["scale"] * along_x * path.position[:, 0] / 0.3)
