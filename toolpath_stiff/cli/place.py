@@ -295,6 +295,11 @@ def _table(summary: dict[str, Any]) -> str:
             f"{name:<16}mean {row['mean_N_per_mm']:.0f}, range {row['range_N_per_mm']:.0f}, "
             f"min {row['min_N_per_mm']:.0f} N/mm, deflection {row['mean_deflection_um']:.1f} um"
         )
+    if best["extrapolated_share"]:
+        lines.append(
+            f"  strut law     extrapolated at {100.0 * best['extrapolated_share']:.0f} % of the samples: outside the "
+            "lengths that it was measured at"
+        )
     for goal, cost in summary["costs"].items():
         lines.append(
             f"  best {goal:<9} {cost['best_on_front_N_per_mm']:.0f} on the front, "

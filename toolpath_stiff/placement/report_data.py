@@ -82,7 +82,9 @@ def figures_of(analysis: Analysis) -> dict[str, Any]:
     """Placement and figures of one analysis."""
     found = stiffness_figures(analysis, analysis.counted)
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "mean_deflection_um")
-    return {**placement_row(np.array(analysis.origin)), **{key: found[key] for key in keys}}
+    extrapolated = share(analysis.at.extrapolated, analysis.samples.cutting)
+    row = placement_row(np.array(analysis.origin))
+    return {**row, **{key: found[key] for key in keys}, "extrapolated_share": extrapolated}
 
 
 def analyse_before(
