@@ -35,6 +35,7 @@ class Command:
 COMMANDS = (
     Command("analyze", "stiffness along the path of NC programs: samples, summary, pictures, page", "A program"),
     Command("path", "the sampled path alone, without a machine", "A program"),
+    Command("check", "what a program uses, what is not understood, extents, times, reach", "A program"),
     Command("pose", "stiffness, softest and stiffest direction, strut lengths at single poses", "A machine"),
     Command("map", "stiffness over planes of the workspace: picture, table, 3-D page", "A machine"),
     Command("machine", "list, show, check, make and import machine files", "A machine"),

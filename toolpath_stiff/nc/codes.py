@@ -46,6 +46,7 @@ G_HARMLESS = {
     "G96": "constant surface speed: the spindle speed does not enter",
 }
 
+CENTRE_PATH = "post the path of the tool centre, or give --interpreter linuxcnc"
 # G codes that change the path, or what a force does to it, in a way that is not supported.
 G_REFUSED = {
     "G5": ("a spline", "post the program with arcs and lines"),
@@ -64,10 +65,10 @@ G_REFUSED = {
     "G38.3": ("probing", "leave probing out"),
     "G38.4": ("probing", "leave probing out"),
     "G38.5": ("probing", "leave probing out"),
-    "G41": ("cutter compensation", "post the path of the tool centre"),
-    "G41.1": ("cutter compensation", "post the path of the tool centre"),
-    "G42": ("cutter compensation", "post the path of the tool centre"),
-    "G42.1": ("cutter compensation", "post the path of the tool centre"),
+    "G41": ("cutter compensation", CENTRE_PATH),
+    "G41.1": ("cutter compensation", CENTRE_PATH),
+    "G42": ("cutter compensation", CENTRE_PATH),
+    "G42.1": ("cutter compensation", CENTRE_PATH),
     "G43.2": ("an added tool length", "put the whole length into the tool table"),
     "G43.4": ("tool centre point control of one control", "post X, Y, Z, A, B, C of the tool tip"),
     "G51": ("scaling", "post the program at its size"),
@@ -119,3 +120,63 @@ M_REFUSED = {
 def code_name(letter: str, value: float) -> str:
     """`G` and 59.3 to "G59.3", `G` and 1.0 to "G1"."""
     return f"{letter}{value:g}"
+
+
+MEANINGS = {
+    "G0": "rapid", "G1": "feed", "G2": "clockwise arc", "G3": "counter-clockwise arc", "G4": "dwell",
+    "G10": "set offsets", "G15": "Cartesian words", "G16": "polar words", "G17": "plane XY", "G18": "plane ZX",
+    "G19": "plane YZ", "G20": "inch", "G21": "mm", "G28": "to the first reference point",
+    "G30": "to the second reference point", "G40": "cutter compensation off", "G43": "tool length",
+    "G43.1": "tool length in the block", "G49": "tool length off", "G52": "local shift", "G53": "machine coordinates",
+    "G68": "rotated coordinates", "G69": "rotation off", "G73": "chip-breaking drilling", "G80": "motion mode off",
+    "G81": "drilling", "G82": "drilling with dwell", "G83": "peck drilling", "G85": "boring, feed out",
+    "G89": "boring with dwell, feed out", "G90": "absolute", "G91": "incremental", "G90.1": "absolute arc centres",
+    "G91.1": "incremental arc centres", "G92": "shift", "G93": "inverse-time feed", "G94": "feed per minute",
+    "G95": "feed per revolution", "G98": "cycles return to their level", "G99": "cycles return to R",
+    "M0": "stop", "M1": "optional stop", "M2": "end", "M30": "end", "M60": "stop", "M3": "spindle on",
+    "M4": "spindle on, reversed", "M5": "spindle off", "M6": "tool change", "M61": "tool number",
+    "M98": "subprogram call", "M99": "subprogram end",
+}  # fmt: skip
+# What a code that is not acted upon would change, by its beginning.
+CHANGES = (
+    (("G41", "G42"), "the whole path, by the tool's radius"),
+    (("G5 ", "G5.", "G05"), "the path between its points"),
+    (("G43.4", "G43.5"), "the path of the tip wherever a rotary axis moves"),
+    (("G43.2",), "the height of the tip"),
+    (("G51",), "the size of the path"),
+    (("G68.2",), "the whole path: it is turned in space"),
+    (("G65", "G66", "M97", "M98", "O word"), "the path by whatever is called"),
+    (("G33", "G74", "G76", "G84"), "the path by the thread's moves"),
+    (("G86", "G87", "G88", "G12", "G13", "G70", "G71", "G72"), "the path by the cycle's moves"),
+    (("G38",), "where the tool stops, which only the machine knows"),
+    (("G61", "G64"), "corners, which a control rounds or stops at, and so the time"),
+    (("G7 ",), "the size of X"),
+    (("G96", "M48", "M49", "M50", "M51", "M52", "M53"), "speeds and times"),
+    (("variables", "expressions"), "every coordinate that depends on them"),
+)
+QUIET_M = ("M7", "M8", "M9", "M19")
+
+
+def code_meaning(code: str) -> str:
+    """What a code is taken for, in a few words."""
+    if code in MEANINGS:
+        return MEANINGS[code]
+    if code in G_REFUSED or code in M_REFUSED:
+        return (G_REFUSED.get(code) or M_REFUSED[code])[0] + ": not supported"
+    if code in G_HARMLESS or code in M_HARMLESS:
+        return (G_HARMLESS.get(code) or M_HARMLESS[code]) + ": not acted upon"
+    group = G_GROUPS.get(code)
+    if group is not None:
+        return group
+    return "not known" if code.startswith("G") else "an M code of one control: not acted upon"
+
+
+def would_change(text: str) -> str:
+    """What the word at the beginning of `text` would change of the path or its time; "" if nothing is known."""
+    for beginnings, changes in CHANGES:
+        if (text + " ").startswith(beginnings):
+            return changes
+    word = text.split(" ", maxsplit=1)[0]
+    if word.startswith("M") and word[1:].isdigit() and f"M{int(word[1:])}" not in (*QUIET_M, *M_GROUPS):
+        return "what is not known: it may run anything on its control"
+    return ""

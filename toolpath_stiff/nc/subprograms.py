@@ -67,7 +67,7 @@ class ProgramRun:
                     self._check_head(block, numbered)
                     numbered = True
                 if not (block.optional and block.switch in self.switches):
-                    if not self.interpreter.execute(block):
+                    if not self._execute(block):
                         return self._end(at, "the program's end", ended=True)
                     if self.interpreter.call is not None:
                         at = self._enter(at, self.interpreter.call)
@@ -94,6 +94,9 @@ class ProgramRun:
         if block is None:
             block = self._called[at] = self._read(at)
         return block
+
+    def _execute(self, block: Block) -> bool:
+        return self.interpreter.execute(block)
 
     def _read(self, at: int) -> Block:
         return read_block(self.lines[at], at + 1, self.name, self.interpreter.dialect.semicolon)

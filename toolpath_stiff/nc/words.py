@@ -193,10 +193,10 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
             found, expected = f"the word {character!r} has no number", f"a number after {character}"
     if character == "#" or follower == "#" or character == "=":
         found, expected = "variables (#) are not supported", "numbers"
-        hint = "post the program without variables, or expand it on the control first"
+        hint = "post the program without variables, or give --interpreter linuxcnc"
     elif character == "[" or follower == "[":
         found, expected = "expressions ([...]) are not supported", "numbers"
-        hint = "post the program without expressions"
+        hint = "post the program without expressions, or give --interpreter linuxcnc"
     elif character in "@^":
         found, expected = f"polar coordinates ({character}) are not supported", "X, Y, Z words"
         hint = "post the program in Cartesian coordinates"

@@ -35,6 +35,12 @@ def move_lengths(moves: Moves) -> FloatArray:
     return np.asarray(chord)
 
 
+def move_durations(moves: Moves, rapid_feed: float = RAPID_FEED) -> FloatArray:
+    """(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s."""
+    turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0)
+    return _durations(moves, move_lengths(moves), turn, rapid_feed)
+
+
 class _ArcFrame:
     """Plane, radii and climb of some arcs: position(u) = c + r(u) (cos e1 + sin e2) + u climb n."""
 

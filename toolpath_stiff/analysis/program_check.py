@@ -1,0 +1,186 @@
+"""A program before any stiffness: extents, lengths, times, radii of arcs; on a machine reach and strut speeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.machine import Machine
+from toolpath_stiff.machine.kinematics import solve_struts
+from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.machine.model import Pose
+from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding
+from toolpath_stiff.nc.moves import RAPID, Moves
+from toolpath_stiff.path import move_lengths, place, sample_moves
+from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.path.sampling import RAPID_FEED, move_durations
+from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+RADII_APART = m_from_mm(2e-3)  # what rounding I, J, K, X, Y to 0.001 mm explains, and a little more
+MOST_NAMED = 20  # lines named for one kind of finding
+Extents = dict[str, list[float]]
+
+
+@dataclass(frozen=True)
+class Figures:
+    """mm, degrees, s. Extents are those of the tip in program coordinates of G54; `cutting` leaves rapids out."""
+
+    cutting_extents: Extents
+    all_extents: Extents
+    lengths: dict[str, float]
+    times: dict[str, float]
+
+
+def figures(moves: Moves, rapid_feed: float = RAPID_FEED) -> Figures:
+    """Extents, lengths and times of moves; rapids at `rapid_feed`, m/s."""
+    cutting = moves.motion != RAPID
+    length, duration = move_lengths(moves), move_durations(moves, rapid_feed)
+    lengths = {
+        "cutting": mm_from_m(float(length[cutting].sum())),
+        "rapid": mm_from_m(float(length[~cutting].sum())),
+    }
+    times = {
+        "cutting": float(duration[cutting].sum()),
+        "rapid": float(duration[~cutting].sum()),
+        "dwell": float(moves.dwell.sum()),
+    }
+    return Figures(
+        extents(moves.take(cutting)),
+        extents(moves),
+        {**lengths, "total": sum(lengths.values())},
+        {**times, "total": sum(times.values())},
+    )
+
+
+def extents(moves: Moves) -> Extents:
+    """Smallest and largest x, y, z (mm) and a, b, c (degrees) on the way, the bulges of arcs included."""
+    if not len(moves):
+        return {}
+    ends = np.stack([moves.start, moves.end])
+    low, high = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
+    bulges = _arc_extremes(moves.take(moves.arc_sweep != 0.0))
+    if len(bulges):
+        low[:3], high[:3] = np.minimum(low[:3], bulges.min(axis=0)), np.maximum(high[:3], bulges.max(axis=0))
+    scale = np.array([mm_from_m(1.0)] * 3 + [deg_from_rad(1.0)] * 3)
+    return {name: [float(lo), float(hi)] for name, lo, hi in zip("xyzabc", low * scale, high * scale, strict=True)}
+
+
+def _arc_extremes(arcs: Moves) -> FloatArray:
+    """(m, 3) m, points of arcs where a coordinate turns; climbs and growing radii as far along as the angle is."""
+    if not len(arcs):
+        return np.empty((0, 3))
+    normal = arcs.arc_normal
+    outward = arcs.start[:, :3] - arcs.arc_center
+    outward = outward - np.einsum("ni,ni->n", outward, normal)[:, None] * normal
+    leave = arcs.end[:, :3] - arcs.arc_center
+    climb = np.einsum("ni,ni->n", arcs.end[:, :3] - arcs.start[:, :3], normal)
+    lift = np.einsum("ni,ni->n", arcs.start[:, :3] - arcs.arc_center, normal)
+    leave = leave - np.einsum("ni,ni->n", leave, normal)[:, None] * normal
+    first, last = np.linalg.norm(outward, axis=1), np.linalg.norm(leave, axis=1)
+    e1 = outward / first[:, None]
+    e2 = np.cross(normal, e1) * np.sign(arcs.arc_sweep)[:, None]  # along the motion: angles count up
+    sweep = np.abs(arcs.arc_sweep)
+    points = []
+    for axis in range(3):
+        turning = np.arctan2(e2[:, axis], e1[:, axis])
+        for opposite in (0.0, np.pi):
+            angle = np.mod(turning + opposite, 2.0 * np.pi)
+            last_turn = angle + 2.0 * np.pi * np.floor(np.maximum(sweep - angle, 0.0) / (2.0 * np.pi))
+            for at in (angle, last_turn):
+                inside = at < sweep
+                u = (at / sweep)[inside, None]
+                radius = first[inside, None] + u * (last - first)[inside, None]
+                circle = np.cos(at[inside, None]) * e1[inside] + np.sin(at[inside, None]) * e2[inside]
+                height = lift[inside, None] + u * climb[inside, None]
+                points.append(arcs.arc_center[inside] + radius * circle + height * normal[inside])
+    return np.concatenate(points)
+
+
+def radii_findings(moves: Moves) -> list[Finding]:
+    """Arcs whose end lies off the circle of their start by more than rounding."""
+    arcs = moves.take(moves.arc_sweep != 0.0)
+    if not len(arcs):
+        return []
+    radii = []
+    for ends in (arcs.start, arcs.end):
+        out = ends[:, :3] - arcs.arc_center
+        radii.append(
+            np.linalg.norm(out - np.einsum("ni,ni->n", out, arcs.arc_normal)[:, None] * arcs.arc_normal, axis=1)
+        )
+    apart = np.abs(radii[1] - radii[0])
+    bad = apart > RADII_APART
+    return [
+        Finding(
+            int(arcs.line[i]),
+            0,
+            "arc radii",
+            f"the arc's radius is {mm_from_m(float(radii[0][i])):.4f} mm at its start and "
+            f"{mm_from_m(float(radii[1][i])):.4f} mm at its end",
+            WARNING,
+        )
+        for i in np.flatnonzero(bad)[:MOST_NAMED]
+    ] + _rest("arc radii", int(bad.sum()))
+
+
+def machine_findings(
+    checked: Checked, machine: Machine, origin: Pose, step: float, speed_limit: float | None
+) -> tuple[list[Finding], dict[str, float]]:
+    """Moves beyond reach, and the struts' speeds (m/s) at the programmed feeds.
+
+    Parameters
+    ----------
+    checked
+        With moves.
+    machine, origin
+        The machine, and where program zero sits on it, m and rad.
+    step
+        Distance of the samples, m.
+    speed_limit
+        m/s that no strut may exceed in a cut; None: none is known.
+
+    Returns
+    -------
+    findings, and the largest speed of a strut in a cut with its line.
+    """
+    assert checked.moves is not None
+    samples = sample_moves(place(checked.moves, origin), step=step, rapid_feed=machine.rapid_feed, origin=origin)
+    rotation = rotation_matrices(samples.abc)
+    struts = solve_struts(machine, samples.position, rotation, samples.tool_length)
+    within = reach(machine, samples.position, struts, rotation)
+    cutting = samples.motion != RAPID
+    findings = []
+    for line in np.unique(samples.line[~within.reachable])[:MOST_NAMED]:
+        there = np.flatnonzero((samples.line == line) & ~within.reachable)
+        worst = int(there[np.argmin(within.margin[there])])
+        cuts = bool(cutting[there].any())
+        text = f"{'a cutting move' if cuts else 'a rapid'} leaves the machine's reach: {within.describe(worst)}"
+        findings.append(Finding(int(line), 0, "reach", text, ERROR if cuts else WARNING))
+    findings += _rest("reach", len(np.unique(samples.line[~within.reachable])))
+    same = (samples.move[1:] == samples.move[:-1]) & cutting[1:] & (np.diff(samples.t) > 0.0)
+    speed = np.abs(np.diff(struts.lengths, axis=0)[same]) / np.diff(samples.t)[same, None]
+    if not len(speed):
+        return findings, {}
+    fastest, lines = speed.max(axis=1), samples.line[1:][same]
+    top = int(np.argmax(fastest))
+    if speed_limit is not None:
+        over = np.unique(lines[fastest > speed_limit])
+        for line in over[:MOST_NAMED]:
+            most = mm_per_min_from_m_per_s(float(fastest[lines == line].max()))
+            text = (
+                f"a strut moves at {most:.0f} mm/min at the programmed feed, beyond "
+                f"{mm_per_min_from_m_per_s(speed_limit):.0f} mm/min"
+            )
+            findings.append(Finding(int(line), 0, "strut speed", text, WARNING))
+        findings += _rest("strut speed", len(over))
+    return findings, {"mm_per_min": mm_per_min_from_m_per_s(float(fastest[top])), "line": int(lines[top])}
+
+
+def _rest(code: str, count: int) -> list[Finding]:
+    if count <= MOST_NAMED:
+        return []
+    return [Finding(0, 0, code, f"and {count - MOST_NAMED} more of the kind {code!r}", WARNING)]

@@ -1,0 +1,155 @@
+"""`tps check`: what a program uses, what is not understood, extents, times, and what a machine says to it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.cli.arguments import add_json_option, add_program_options, controller_for, positive_number
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.units import m_per_s_from_mm_per_min
+
+if TYPE_CHECKING:
+    from toolpath_stiff.analysis.program_check import Figures
+    from toolpath_stiff.nc.checking import Checked, Finding
+
+EPILOG = """\
+examples:
+  tps check part.nc
+  tps check part.nc --dialect fanuc --json
+  tps check part.nc --strut-speed 5000         warn of cuts in which a strut is faster, mm/min
+  tps check part.nc --machine none             the program alone, no reach and no strut speeds
+
+Where the reader would refuse the program, the check says so and goes on with the next block; what it says of extents,
+lengths and times is then that of the blocks that could be read. Extents are those of the tool tip in program
+coordinates of G54, mm and degrees. Exit code 1 if there is any error.
+"""
+NO_MACHINE = "none"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument("program", metavar="PROGRAM", help="NC program")
+    add_program_options(parser)
+    parser.add_argument(
+        "--machine",
+        default="nist",
+        metavar="NAME|FILE",
+        help="machine whose reach and strut speeds are checked; none: no machine (default: nist)",
+    )
+    parser.add_argument(
+        "--strut-speed", type=positive_number("mm/min", 1e6), metavar="MM/MIN", help="largest speed of a strut"
+    )
+    add_json_option(parser, "print JSON: used, unsupported, findings, extents_mm, lengths_mm, times_s, modal state")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check and print."""
+    from pathlib import Path
+
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.nc.checking import ERROR, check_lines
+    from toolpath_stiff.nc.source import read_lines
+
+    if args.interpreter != "builtin":
+        raise InputError(
+            f"--interpreter {args.interpreter}: the check is that of the built-in interpreter",
+            hint="leave the option out; tps path --interpreter linuxcnc reads the program by LinuxCNC's",
+        )
+    machine = None if args.machine == NO_MACHINE else load_machine(args.machine)
+    if machine is None and args.strut_speed is not None:
+        raise InputError("--strut-speed without a machine", hint="name one with --machine")
+    controller = controller_for(args)
+    name = Path(args.program).name
+    checked = check_lines(
+        read_lines(args.program),
+        name,
+        origin=args.origin,
+        default_origin=machine.default_origin if machine else (0.0,) * 6,
+        block_delete=args.block_delete,
+        controller=controller,
+    )
+    document = {"program": name, "dialect": controller.label, **_document(args, checked, machine)}
+    if args.json:
+        json.dump(document, sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
+        sys.stdout.write("\n")
+    else:
+        sys.stdout.write(_text(document))
+    return 1 if any(finding["severity"] == ERROR for finding in document["findings"]) else 0
+
+
+def _document(args: argparse.Namespace, checked: Checked, machine: Any) -> dict[str, Any]:
+    """What `--json` prints."""
+    from toolpath_stiff.analysis.program_check import Figures, figures, machine_findings, radii_findings
+
+    findings: list[Finding] = list(checked.findings)
+    found = Figures({}, {}, {}, {})
+    speed: dict[str, float] = {}
+    if checked.moves is not None:
+        found = figures(checked.moves, *([machine.rapid_feed] if machine else []))
+        findings += radii_findings(checked.moves)
+        if machine is not None:
+            limit = None if args.strut_speed is None else m_per_s_from_mm_per_min(args.strut_speed)
+            more, speed = machine_findings(checked, machine, checked.origin, args.step, limit)
+            findings += more
+    findings.sort(key=lambda finding: (finding.line, finding.column))
+    return {
+        "complete": checked.complete,
+        "used": [asdict(code) for code in checked.used],
+        "unsupported": [asdict(word) for word in checked.unsupported],
+        "findings": [asdict(finding) for finding in findings],
+        **_figures(found),
+        "fastest_strut": speed,
+        "modal_start": checked.start,
+        "modal_end": checked.end,
+    }
+
+
+def _figures(found: Figures) -> dict[str, Any]:
+    return {
+        "extents_mm": {axis: found.cutting_extents[axis] for axis in "xyz" if found.cutting_extents},
+        "extents_deg": {axis: found.cutting_extents[axis] for axis in "abc" if found.cutting_extents},
+        "extents_with_rapids_mm": {axis: found.all_extents[axis] for axis in "xyz" if found.all_extents},
+        "lengths_mm": found.lengths,
+        "times_s": found.times,
+    }
+
+
+def _text(document: dict[str, Any]) -> str:
+    """The same for people."""
+    lines = [f"{document['program']}, read as {document['dialect']}"]
+    if not document["complete"]:
+        lines.append("NOT READ TO ITS END AS IT STANDS: figures are those of the blocks that could be read")
+    lines.append("\nfindings:")
+    for finding in document["findings"]:
+        place = f"{finding['line']}:{finding['column']}" if finding["column"] else f"{finding['line'] or '-'}"
+        lines.append(f"  {finding['severity']:<7} {place:>9}  {finding['text']}")
+    lines += ["  none"] if not document["findings"] else []
+    lines.append("\nnot acted upon:")
+    for word in document["unsupported"]:
+        lines.append(f"  {word['code']:<7} {word['line']}:{word['column']}  {word['text']}")
+    lines += ["  nothing"] if not document["unsupported"] else []
+    lines.append("\ncodes used (times, first line):")
+    lines += [f"  {code['code']:<6} {code['count']:>7}  {code['line']:>7}  {code['text']}" for code in document["used"]]
+    lines.append("\nextents of cuts:")
+    for unit, key in (("mm", "extents_mm"), ("deg", "extents_deg")):
+        lines += [
+            f"  {axis.upper()}  {low:10.3f} to {high:10.3f} {unit}" for axis, (low, high) in document[key].items()
+        ]
+    lines.append("\nlengths and times:")
+    for key, length in document["lengths_mm"].items():
+        lines.append(f"  {key:<8} {length:12.1f} mm {document['times_s'][key]:10.1f} s")
+    if "dwell" in document["times_s"]:
+        lines.append(f"  dwell    {'':12}    {document['times_s']['dwell']:10.1f} s")
+    if document["fastest_strut"]:
+        speed = document["fastest_strut"]
+        lines.append(f"  fastest strut in a cut: {speed['mm_per_min']:.0f} mm/min, line {speed['line']}")
+    lines.append("\nmodal state at the start, at the end:")
+    for key, value in document["modal_start"].items():
+        lines.append(f"  {key:<18} {value:<10} {document['modal_end'][key]}")
+    return "\n".join(lines) + "\n"

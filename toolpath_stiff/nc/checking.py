@@ -1,0 +1,220 @@
+"""What a program uses, and what the reader has to say about it: it goes on where `read_program` would stop."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes import code_meaning, would_change
+from toolpath_stiff.nc.controller import ALL_SWITCHES, UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.foreign import foreign_program
+from toolpath_stiff.nc.frames import Frames, Pose
+from toolpath_stiff.nc.interpreter import Interpreter
+from toolpath_stiff.nc.moves import Moves, Unsupported
+from toolpath_stiff.nc.reader import ZERO
+from toolpath_stiff.nc.subprograms import ProgramRun
+from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.nc.words import Block
+from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
+
+ERROR, WARNING, NOTE = "error", "warning", "note"
+MOST_ERRORS = 100  # beyond, a file is no program for this reader
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing to say of a program.
+
+    Attributes
+    ----------
+    line, column
+        Where, from 1; 0: of the program as a whole.
+    code
+        What kind of finding it is, a short word; of used and unsupported words the word itself.
+    text
+        A sentence for people.
+    severity
+        "error": the program is refused for it; "warning": have a look; "note": for the record.
+    """
+
+    line: int
+    column: int
+    code: str
+    text: str
+    severity: str
+
+
+@dataclass(frozen=True)
+class UsedCode:
+    """A G or M code of the program: where it stands first, how often, and what it is taken for."""
+
+    line: int
+    column: int
+    code: str
+    text: str
+    severity: str
+    count: int
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found without a machine.
+
+    Attributes
+    ----------
+    used
+        Codes in the order of their first appearance.
+    unsupported
+        Words that were read and not acted upon, with what they would change.
+    findings
+        In the order of lines.
+    start, end
+        Modal state before the first block and after the last one, names to words.
+    moves
+        In the set-up frame; after an error the moves of the blocks that could be read, None if there are none.
+    origin
+        Where program zero sits, m and rad.
+    complete
+        Whether the whole program was read.
+    """
+
+    used: tuple[UsedCode, ...]
+    unsupported: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
+    start: dict[str, str]
+    end: dict[str, str]
+    moves: Moves | None
+    origin: Pose
+    complete: bool
+
+
+class _CheckingRun(ProgramRun):
+    """A run that notes the codes of each block, and notes an error and goes on with the next block."""
+
+    def __init__(self, interpreter: Interpreter, lines: tuple[str, ...], name: str, switches: frozenset[int]) -> None:
+        super().__init__(interpreter, lines, name, switches)
+        self.errors: list[InputError] = []
+        self.first: dict[str, tuple[int, int]] = {}
+        self.count: dict[str, int] = {}
+
+    def _read(self, at: int) -> Block:
+        try:
+            return super()._read(at)
+        except InputError as error:
+            self._add(error)
+            return Block(at + 1, ())
+
+    def _execute(self, block: Block) -> bool:
+        for word in block.words:
+            if word.letter in "GM":
+                code = f"{word.letter}{word.value:g}"
+                self.first.setdefault(code, (block.line, word.column))
+                self.count[code] = self.count.get(code, 0) + 1
+        try:
+            return super()._execute(block)
+        except InputError as error:
+            self._add(error)
+            self.interpreter.call, self.interpreter.returns = None, False
+            return True
+
+    def _add(self, error: InputError) -> None:
+        self.errors.append(error)
+        if len(self.errors) >= MOST_ERRORS:
+            raise error
+
+
+def check_lines(
+    lines: tuple[str, ...],
+    name: str,
+    *,
+    origin: Iterable[float] | None = None,
+    default_origin: Iterable[float] = ZERO,
+    block_delete: bool = False,
+    controller: Controller = UNKNOWN_CONTROL,
+) -> Checked:
+    """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone."""
+    if not any(line.strip() for line in lines):
+        raise InputError("the program is empty", expected="an NC program", file=name)
+    place, default = None if origin is None else _to_mm(origin), _to_mm(default_origin)
+    frames = Frames(copy.deepcopy(controller.offsets or Offsets()), place, default)
+    interpreter = Interpreter(name, frames, copy.deepcopy(controller.tools), controller.dialect)
+    switches = ALL_SWITCHES if block_delete else controller.switches
+    run = _CheckingRun(interpreter, lines, name, switches)
+    start = modal_state(interpreter)
+    warnings: list[str] = []
+    foreign = foreign_program(lines, name)
+    if foreign is None:
+        try:
+            warnings = run.run()
+        except InputError as error:
+            if error not in run.errors:
+                run.errors.append(error)
+        foreign = next((f for e in run.errors if (f := foreign_program(lines, name, e.line)) is not None), None)
+    errors = run.errors if foreign is None else [foreign]
+    if not errors and not interpreter.recorder.cuts:
+        errors = [InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)]
+    findings = [_of_error(error) for error in errors]
+    findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in (*warnings, *interpreter.warnings)]
+    findings += [Finding(0, 0, "assumption", text, NOTE) for text in interpreter.assumptions]
+    x, y, z, a, b, c = frames.origin
+    return Checked(
+        used=tuple(UsedCode(*run.first[code], code, code_meaning(code), NOTE, run.count[code]) for code in run.first),
+        unsupported=tuple(_of_unsupported(word) for word in interpreter.unsupported),
+        findings=tuple(sorted(findings, key=lambda f: (f.line, f.column))),
+        start=start,
+        end=modal_state(interpreter),
+        moves=interpreter.recorder.moves() if interpreter.recorder.line else None,
+        origin=(m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c)),
+        complete=not errors,
+    )
+
+
+def _of_error(error: InputError) -> Finding:
+    """What could not be read, and what it would change."""
+    text = error.found + (f"; expected {error.expected}" if error.expected else "")
+    changes = would_change(error.found)
+    text += f"; it would change {changes}" if changes else ""
+    text += f". {error.hint[0].upper()}{error.hint[1:]}" if error.hint else ""
+    return Finding(error.line or 0, error.column or 0, "not read", text, ERROR)
+
+
+def _of_unsupported(word: Unsupported) -> Finding:
+    text = f"{word.reason}; it would change {would_change(word.word) or 'nothing of the path'}"
+    return Finding(word.line, word.column, word.word, text, NOTE)
+
+
+def _line_in(text: str) -> int:
+    """The line that a warning names; 0 if it names none."""
+    _, found, rest = text.partition("line ")
+    digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
+    return int(digits) if found and digits else 0
+
+
+def modal_state(interpreter: Interpreter) -> dict[str, str]:
+    """What is in force, as codes and words."""
+    frames, feed = interpreter.frames, interpreter.feed
+    offset = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")[frames.active]
+    return {
+        "motion": interpreter.motion or "none",
+        "plane": interpreter.plane,
+        "distance": "G90" if interpreter.absolute else "G91",
+        "arc centres": "G90.1" if interpreter.arc_absolute else "G91.1",
+        "units": "G20" if interpreter.inch else "G21",
+        "feed mode": interpreter.feed_mode,
+        "feed": "none" if feed is None else f"F{feed / interpreter.feed_scale:g}",
+        "spindle": f"S{interpreter.speed:g}",
+        "tool": f"T{interpreter.tool}",
+        "tool length": "G49" if interpreter.tool_length != interpreter.tool_length else f"{frames.tool:g} mm",
+        "work offset": offset,
+        "cycle return": interpreter.retract or "none",
+        "polar": "G15" if interpreter.polar is None else "G16",
+        "rotation": "G69" if frames.rotation is None else f"G68 R{frames.rotation[2]:g}",
+        "shift (G92, G52)": "none" if not any(frames.g92) else " ".join(f"{v:g}" for v in frames.g92),
+    }
+
+
+def _to_mm(origin: Iterable[float]) -> Pose:
+    x, y, z, a, b, c = origin
+    return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))
