@@ -1,0 +1,216 @@
+"""`python -m benchmarks.conformance [FILE|FOLDER ...]`: the built-in reader against LinuxCNC's interpreter.
+
+Without arguments: every sample program that Debian's `linuxcnc-uspace` installs. The built-in reader must give the feed
+path that `rs274` gives, within 0.01 mm and 0.01 degrees in both directions, or refuse with file and line; never another
+path. Exit code 1 if one differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.files import write_atomically
+from toolpath_stiff.nc import Moves, Program, read_program
+from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.tables import read_tool_table
+from toolpath_stiff.path import sample_moves
+
+PACKAGE = "linuxcnc-uspace"
+TOLERANCE = 0.01  # mm and degrees
+PRINTED = 0.005  # two digits of 0.0001 inch: a move shorter than that may be lost in print
+SUFFIXES = (".ngc", ".nc")
+SAME, NONE, REFUSED, UNCHECKED, OTHER = "same path", "no feed path", "refused", "not checked", "OTHER PATH"
+# The programs name tools without saying how long they are: any length will do, and both readers get the same.
+TOOL_TABLE = "tool,length_mm,diameter_mm\n" + "".join(f"{n},{50 + n},6\n" for n in range(1, 100))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One program: what became of it, what LinuxCNC's interpreter and what the built-in reader said."""
+
+    name: str
+    verdict: str
+    linuxcnc: str
+    builtin: str
+
+    @property
+    def runs(self) -> bool:
+        """Whether LinuxCNC's interpreter ran it to the end."""
+        return self.linuxcnc in ("read", NONE)
+
+
+def installed_programs() -> list[Path]:
+    """The sample programs of the Debian package, in order."""
+    listing = subprocess.run(["dpkg", "-L", PACKAGE], capture_output=True, text=True, check=False).stdout
+    return [path for path in map(Path, listing.splitlines()) if path.suffix in SUFFIXES and path.is_file()]
+
+
+def programs_of(arguments: Iterable[str]) -> Iterator[Path]:
+    """Files as named, and those in folders."""
+    for argument in map(Path, arguments):
+        yield from sorted(p for p in argument.rglob("*") if p.suffix in SUFFIXES) if argument.is_dir() else [argument]
+
+
+def feed_path(program: Program) -> Moves:
+    """Its cutting moves, less those that vanish in rs274's digits."""
+    moves = program.moves
+    length = np.abs(in_mm(moves.end) - in_mm(moves.start)).max(axis=1)
+    return moves.take((moves.motion != RAPID) & ((length > PRINTED) | (moves.arc_sweep != 0.0)))
+
+
+def in_mm(poses: np.ndarray) -> np.ndarray:
+    """Poses (n, 6) in mm and degrees."""
+    return np.column_stack([poses[:, :3] * 1e3, np.rad2deg(poses[:, 3:])])
+
+
+def move_by_move(one: Moves, two: Moves) -> float:
+    """Largest difference of ends and arcs, mm or degrees; infinite where the moves do not correspond."""
+    if len(one) != len(two) or ((one.arc_sweep != 0.0) != (two.arc_sweep != 0.0)).any():
+        return np.inf
+    radius = np.linalg.norm(one.start[:, :3] - one.arc_center, axis=1) * (one.arc_sweep != 0.0)
+    if (np.abs(one.arc_sweep - two.arc_sweep) > 1.0).any() or (np.abs(one.arc_normal - two.arc_normal) > 1e-3).any():
+        return np.inf
+    differences = [
+        in_mm(one.start) - in_mm(two.start),
+        in_mm(one.end) - in_mm(two.end),
+        (one.arc_sweep - two.arc_sweep) * radius * 1e3,
+    ]
+    return max(float(np.abs(d).max(initial=0.0)) for d in differences)
+
+
+def polyline(moves: Moves) -> np.ndarray:
+    """Segments (n, 2, 6) along the moves, mm and degrees, fine enough for the tolerance."""
+    lengths = np.linalg.norm(moves.end[:, :3] - moves.start[:, :3], axis=1)
+    samples = sample_moves(moves, step=float(np.clip(lengths.sum() / 20_000, 1e-4, 5e-4)))
+    points = in_mm(np.column_stack([samples.position, samples.abc]))
+    within = samples.move[1:] == samples.move[:-1]
+    return np.stack([points[:-1], points[1:]], axis=1)[within]
+
+
+def farthest(one: np.ndarray, two: np.ndarray) -> float:
+    """How far the ends of the segments of one path are from the other, at most."""
+    start, along = two[:, 0], two[:, 1] - two[:, 0]
+    squared = np.maximum((along**2).sum(axis=1), 1e-30)
+    worst = 0.0
+    for point in one.reshape(-1, 6)[:: max(1, len(one) // 5000)]:
+        share = np.clip(((point - start) * along).sum(axis=1) / squared, 0.0, 1.0)
+        worst = max(worst, float(np.abs(start + share[:, None] * along - point).max(axis=1).min()))
+    return worst
+
+
+def difference(one: Program, two: Program) -> float:
+    """How far two feed paths are apart, mm or degrees, in both directions."""
+    first, second = feed_path(one), feed_path(two)
+    if not len(first) or not len(second):
+        return 0.0 if len(first) == len(second) else np.inf
+    apart = move_by_move(first, second)
+    if apart <= TOLERANCE:
+        return apart
+    there, back = polyline(first), polyline(second)
+    return max(farthest(there, back), farthest(back, there))
+
+
+def held_against(file: Path, table: Path, rs274: str | None = None) -> Row:
+    """Read one program by both."""
+    name = f"{file.parent.name}/{file.name}"
+    theirs, said = read(file, table, "linuxcnc", rs274)
+    ours, answer = read(file, table, "builtin", rs274)
+    verdict = _without_a_path(file, theirs, said, ours, answer)
+    if verdict or ours is None or theirs is None:
+        return Row(name, verdict, said.removeprefix(f"{file.name}:"), answer.removeprefix(f"{file.name}:"))
+    apart = difference(ours, theirs)
+    cuts = len(feed_path(ours))
+    detail = f"{cuts} moves, {apart:.4f} apart" if np.isfinite(apart) else f"{cuts} moves, another path"
+    return Row(name, SAME if apart <= TOLERANCE else OTHER, said, detail)
+
+
+def _without_a_path(file: Path, theirs: Program | None, said: str, ours: Program | None, answer: str) -> str:
+    """The verdict where one of them has no path to compare; "" if both have."""
+    if ours is not None and theirs is not None:
+        return ""
+    if ours is None and answer != NONE:
+        return REFUSED if answer.startswith(f"{file.name}:") else OTHER
+    if ours is None and said == NONE:
+        return NONE
+    # One has a path; without one the other must have refused, not run to the end.
+    return OTHER if theirs is not None or said == NONE else UNCHECKED
+
+
+def read(file: Path, table: Path, interpreter: str, rs274: str | None) -> tuple[Program | None, str]:
+    """The program, or why not; no cutting move is told apart, since it is an answer of its own."""
+    try:
+        return read_program(file, tool_table=table, interpreter=interpreter, rs274=rs274), "read"
+    except InputError as error:
+        return None, NONE if error.found == "no cutting move" else str(error)
+    except TpsError as error:
+        return None, str(error)
+
+
+def table(rows: list[Row]) -> str:
+    """The document."""
+    ran = [row for row in rows if row.runs]
+    counts = Counter(row.verdict for row in ran)
+    lines = [
+        "# Conformance with LinuxCNC's interpreter",
+        "",
+        f"{len(rows)} programs, of which `rs274` runs {len(ran)} to the end: "
+        f"{counts[SAME]} same feed path, {counts[NONE]} without a feed path for both, {counts[REFUSED]} refused by the "
+        f"built-in reader, {counts[OTHER]} with another path. Within {TOLERANCE} mm and degrees, in both directions.",
+        "",
+        "| program | verdict | LinuxCNC's interpreter | built-in reader |",
+        "| --- | --- | --- | --- |",
+        *(f"| {row.name} | {row.verdict} | {cell(row.linuxcnc)} | {cell(row.builtin)} |" for row in rows),
+        "",
+        "Made by `python -m benchmarks.conformance --out benchmarks/conformance.md`. *Not checked*: LinuxCNC's "
+        "interpreter refuses what the built-in reader takes (user M codes, which that lists with a warning).",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def cell(text: str) -> str:
+    """Text for a cell: one line, not too long, no bars."""
+    text = " ".join(text.replace("|", "/").split())
+    return text if len(text) <= 110 else f"{text[:107]}..."
+
+
+def measure(files: Iterable[Path], folder: Path, rs274: str | None = None) -> list[Row]:
+    """Hold every file against LinuxCNC's interpreter; the tool table is written into `folder`."""
+    tools = folder / "tools.csv"
+    tools.write_text(TOOL_TABLE, encoding="utf-8")
+    read_tool_table(tools)
+    return [held_against(file, tools, rs274) for file in files]
+
+
+def main() -> int:
+    """Print the table; the exit code is 1 if a path differs."""
+    import tempfile
+
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.conformance", description=__doc__)
+    parser.add_argument("programs", nargs="*", metavar="FILE|FOLDER", help="default: those of Debian's linuxcnc-uspace")
+    parser.add_argument("--rs274", metavar="PATH", help="LinuxCNC's interpreter, if it is not on PATH")
+    parser.add_argument("--out", help="write the table to this file as well")
+    args = parser.parse_args()
+    files = list(programs_of(args.programs)) if args.programs else installed_programs()
+    if not files:
+        parser.error(f"no programs; install {PACKAGE}, or name files")
+    with tempfile.TemporaryDirectory() as folder:
+        rows = measure(files, Path(folder), args.rs274)
+    text = table(rows)
+    print(text)
+    if args.out:
+        write_atomically(args.out, text)
+    return 1 if any(row.verdict == OTHER for row in rows) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
