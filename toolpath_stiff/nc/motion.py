@@ -231,7 +231,7 @@ class Mover(Coordinates):
     def _keep_heights(self, code: str, normal: int) -> None:
         """G90 or G91 since Z and R were given: Fanuc's hole stays where it is, LinuxCNC reads the numbers anew."""
         absolute, retract, bottom = self._heights
-        if absolute == self.absolute or not {"R", "Z"} <= self.sticky.keys():
+        if absolute == self.absolute or not {"R", "Z", "level"} <= self.sticky.keys():
             return
         renewed = [letter for letter in ("R", AXES[normal]) if self.has(letter)]
         keeps = True if self.polar is not None else self.dialect.keeps_heights
