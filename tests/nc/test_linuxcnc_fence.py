@@ -29,6 +29,8 @@ RUNS_PYTHON = [
     "(PyRun, {0})",
     "( p y r u n ,{0})",
     ";pyreload",
+    "; (py,{0})",
+    "(;py,{0})",
     "(pyreload)",
     ";py {0}",
     "(first) G1 X2 F5 (py,{0})",

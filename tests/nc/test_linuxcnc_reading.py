@@ -258,3 +258,14 @@ def test_without_bubblewrap_it_reads_the_same(monkeypatch):
     confined = linuxcnc(text).moves
     monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
     assert_same(confined, linuxcnc(text).moves)
+
+
+@needs_rs274
+def test_a_placement_is_found_but_no_program_rewritten(tmp_path, capsys):
+    """Blocks with variables cannot be turned; the offset that does the same is told."""
+    program, out = tmp_path / "part.nc", tmp_path / "out"
+    program.write_text("#1 = 5\nG21 G90 F500\nG1 X#1 Y20\nY0\nX0\n")
+    common = ["place", str(program), "--interpreter", "auto", "--points", "2", "--rotate", "0", "--out", str(out)]
+    assert main([*common, "--write", str(tmp_path / "placed.nc")]) == 2
+    assert "cannot be rewritten" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [program]

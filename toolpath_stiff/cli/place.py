@@ -133,6 +133,11 @@ def run(args: argparse.Namespace) -> int:
     _check_write(args)
     model = build_model(load_machine(args.machine), args.effects)
     program = read_program_for(args, args.program, model.machine)
+    if args.write and program.interpreter != "builtin":
+        raise InputError(
+            f"--write {args.write}: {program.name} was read by LinuxCNC's interpreter; its blocks cannot be rewritten",
+            hint="leave --write out and set the work offset",
+        )
     load = parse_load(args.load)
     origin = args.origin or (program.origin if program.origin_source == "program" else model.machine.default_origin)
     options = {"load": load, "step": args.step, "force": args.force}

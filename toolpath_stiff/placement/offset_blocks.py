@@ -6,10 +6,12 @@ nothing else; for the rest the program itself has to be rewritten.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.codes import WORK_OFFSETS, code_name
 from toolpath_stiff.nc.moves import Program
@@ -80,13 +82,23 @@ def _not_g54_alone(program: Program) -> str:
     for number, text in enumerate(program.source, 1):
         if "5" not in text and "10" not in text:
             continue  # neither a work offset nor G10
-        for word in read_block(text, number, program.name).words:
-            code = code_name(word.letter, word.value)
+        for code in _codes(text, number, program):
             if code in OTHER_OFFSETS:
                 return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"
             if code == "G10":
                 return f"the program sets offsets itself (G10, line {number}): {USE_WRITE}"
     return ""
+
+
+def _codes(text: str, number: int, program: Program) -> list[str]:
+    """G codes of a line, and its other words; what LinuxCNC's interpreter read holds words that ours does not know."""
+    try:
+        words = read_block(text, number, program.name).words
+    except InputError:
+        if program.interpreter == "builtin":
+            raise
+        return [code_name("G", float(digits)) for digits in re.findall(r"[Gg]\s*(\d+(?:\.\d)?)", text)]
+    return [code_name(word.letter, word.value) for word in words]
 
 
 def _number(value: float, decimals: int) -> str:

@@ -22,7 +22,7 @@ from toolpath_stiff.nc.recorder import Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.units import MM_PER_INCH
 
-CALL = re.compile(r"\s*\d+\s+N(?:\.+|(\d+))\s*([A-Z][A-Z0-9_]*)\((.*)\)\s*$")
+CALL = re.compile(r"^ *\d+ +N(?:\.+|(\d+)) *([A-Z][A-Z0-9_]*)\((.*)\) *$", re.MULTILINE)
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
 PLANES = {"XY": (0, 1, 2), "XZ": (2, 0, 1), "YZ": (1, 2, 0)}
 MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")
@@ -83,10 +83,7 @@ class Follower:
         actions: dict[str, Callable[[str], None]] = {
             name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
         }
-        for raw in text.splitlines():
-            match = CALL.match(raw)
-            if match is None:
-                continue
+        for match in CALL.finditer(text):
             number, name, inner = match.groups()
             action = actions.get(name)
             if action is None:

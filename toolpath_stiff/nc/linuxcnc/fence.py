@@ -13,8 +13,9 @@ from collections.abc import Iterable
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.linuxcnc.copy import NAMED, Line
 
-# `py,`, `pyrun`, `pyreload`, and `py` alone or before anything but a letter or digit, whatever blanks are in between.
-PYTHON = re.compile(r"\s*p\s*y(?:\s*(?:[^\w\s]|$|r\s*u\s*n|r\s*e\s*l\s*o\s*a\s*d)|\s)", re.IGNORECASE)
+# `py,`, `pyrun`, `pyreload`, and `py` alone or before anything but a letter or digit, whatever blanks are in between;
+# a comment within a comment counts, though LinuxCNC does not look there.
+PYTHON = re.compile(r"[\s(;]*p\s*y(?:\s*(?:[^\w\s]|$|r\s*u\s*n|r\s*e\s*l\s*o\s*a\s*d)|\s)", re.IGNORECASE)
 # Of all functions, operators and O words only MOD has an M in it.
 M_WORD = re.compile(r"M(?!OD)([+-]?[0-9.]+)?", re.ASCII)
 SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
