@@ -183,6 +183,7 @@ def _read_by_linuxcnc(
         assumptions=reading.assumptions,
         tools=reading.tools,
         interpreter="linuxcnc",
+        dialect="linuxcnc",
     )
 
 

@@ -361,10 +361,10 @@ class Follower:
             machine = self.moves_of_line > 0
             named = named or (set(range(6)) if machine else set())
         self.moves_of_line += 1
-        if self.cycle:  # down to R before the first hole, the other axes have not moved yet
+        if self.cycle:  # to the hole at the height of before, or along the normal
             normal = PLANES[self.plane][2]
-            if all(start[axis] == end[axis] for axis in range(6) if axis != normal):
-                named = {normal}
+            along = all(start[axis] == end[axis] for axis in range(6) if axis != normal)
+            named = {normal} if along else named - {normal}
         for axis in named:
             self.from_machine[axis] = machine
         return (was, any(self.from_machine))

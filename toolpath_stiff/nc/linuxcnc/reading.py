@@ -232,7 +232,14 @@ class _Session:
 
     def _tool_use(self, number: int) -> ToolUse:
         entry = (self.tools or {}).get(number, ToolEntry(number))
-        return ToolUse(number, m_from_mm(entry.length), m_from_mm(entry.diameter), entry.remark)
+        return ToolUse(
+            number,
+            m_from_mm(entry.length),
+            m_from_mm(entry.diameter),
+            entry.remark,
+            m_from_mm(entry.stick_out),
+            entry.material,
+        )
 
     def _unsupported(self) -> list[Unsupported]:
         """Words that change nothing in a path, and comments that would write files."""
