@@ -91,6 +91,13 @@ def test_cycles_start_at_the_initial_level_on_fanuc_and_keep_their_heights():
     assert min(z for _, _, z in ends_mm(bolts)) == -3
 
 
+def test_fanuc_counts_holes_with_k():
+    text = "G91 G99 G81 X5. Z-3. R-2. {} F100.\nG80"
+    assert ends_mm(text.format("K3"), FANUC) == ends_mm(text.format("L3"))
+    with pytest.raises(InputError, match="not used"):
+        moves_of(text.format("K3"))
+
+
 def test_g70_and_g71():
     assert ends_mm("G70 G1 F1. X1.", FANUC) == [[25.4, 0, 0]]
     for controller, words in ((PLAIN, "on some controls"), (LINUXCNC, "lathe"), (HAAS, "pattern of holes")):

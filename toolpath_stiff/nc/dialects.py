@@ -43,12 +43,16 @@ class Dialect:
         None: refused.
     repeats_in_p
         `M98 P21000` is two runs of O1000 (True), O21000 (False), or whichever the file has (None).
+    cycle_repeats
+        The words that say how often a cycle's block drills.
     semicolon
         Whether `;` begins a comment; else it ends the block, and nothing may follow it.
     arc_absolute
         Whether I, J, K are absolute at the start (G90.1).
     g70, inch_metric
         Why G70 and G71 are refused; whether they are inch and metric units.
+    feed_needs_point
+        Units in which F without a decimal point hangs on a parameter, and is refused.
     """
 
     name: str
@@ -57,11 +61,12 @@ class Dialect:
     retract: str | None = None
     keeps_heights: bool | None = None
     repeats_in_p: bool | None = None
+    cycle_repeats: str = "L"
     semicolon: bool = True
     arc_absolute: bool = False
     g70: tuple[str, str] = UNITS_OR_CYCLE
     inch_metric: bool = False
-    feed_needs_point: tuple[str, ...] = ()  # units in which F without a decimal point hangs on a parameter
+    feed_needs_point: tuple[str, ...] = ()
 
 
 GENERIC = Dialect("generic")
@@ -77,6 +82,7 @@ DIALECTS = {
             retract="G98",
             keeps_heights=True,
             repeats_in_p=True,
+            cycle_repeats="KL",
             semicolon=False,
             inch_metric=True,
             feed_needs_point=("inch",),

@@ -261,12 +261,14 @@ class Mover(Coordinates):
         return value
 
     def _repeats(self) -> int:
-        value = self.take("L")
-        if value is None:
+        letter = next((letter for letter in self.dialect.cycle_repeats if self.has(letter)), None)
+        if letter is None:
             return 1
-        if value != int(value) or not 1 <= value <= 10000:
-            raise self.fail(self.values["L"], "is no number of repeats", "a whole number from 1")
-        return int(value)
+        self.take(letter)
+        word = next(word for word in self.block.words if word.letter == letter)  # a count, whatever a bare K length is
+        if word.value != int(word.value) or not 1 <= word.value <= 10000:
+            raise self.fail(word, "is no number of repeats", "a whole number from 1")
+        return int(word.value)
 
     def _check_cycle(self, code: str, normal: int) -> None:
         axis = AXES[normal]
