@@ -29,6 +29,8 @@ RANK = {
     "report": 8,
     "cli": 9,
 }
+# The same within `updating`.
+UPDATING_RANK = {"readings": 0, "inference": 1, "comparison": 2, "planning": 2, "diagnosis": 3, "update": 4}
 RIG_MAY_IMPORT = {"units", "errors", "files", "rig"}
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
 
@@ -80,6 +82,19 @@ def test_no_module_imports_a_higher_room(path):
     assert trespasses((PACKAGE / path).read_text("utf-8"), room, package) == []
 
 
+@pytest.mark.parametrize("path", [path for path in modules() if path.parts[0] == "updating"], ids=str)
+def test_updating_has_its_own_order(path):
+    if len(path.parts) == 2:
+        assert path.name == "__init__.py"
+        return
+    room = path.parts[1]
+    package = ".".join(("toolpath_stiff", *path.parts[:-1]))
+    used = {
+        name.split(".")[2] for name in imports((PACKAGE / path).read_text("utf-8"), package) if ".updating." in name
+    }
+    assert all(other == room or UPDATING_RANK[other] < UPDATING_RANK[room] for other in used), used
+
+
 @pytest.mark.parametrize(
     ("source", "room"),
     [
@@ -89,7 +104,7 @@ def test_no_module_imports_a_higher_room(path):
         ("import toolpath_stiff.cli.main", "report"),
         ("from ..stiffness import exact", "machine"),
         ("from toolpath_stiff.machine import load_machine", "rig"),
-        ("from toolpath_stiff.updating import fit", "placement"),
+        ("from toolpath_stiff.updating.inference import fit", "placement"),
     ],
 )
 def test_the_check_finds_a_trespass(source, room):

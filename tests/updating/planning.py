@@ -14,10 +14,10 @@ from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.candidates import Component
-from toolpath_stiff.updating.measurements import Measurements, read_measurements
-from toolpath_stiff.updating.plan_rivals import Rival
-from toolpath_stiff.updating.predict import Predictor
+from toolpath_stiff.updating.inference.candidates import Component
+from toolpath_stiff.updating.inference.predict import Predictor
+from toolpath_stiff.updating.planning.plan_rivals import Rival
+from toolpath_stiff.updating.readings.measurements import Measurements, read_measurements
 
 FloatArray = NDArray[np.float64]
 

@@ -13,11 +13,11 @@ from tests.effects.cases import all_effects
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.stiffness.effects.contract import Parameter
-from toolpath_stiff.updating import diagnose
-from toolpath_stiff.updating.candidates import Candidate, Component, Table, candidates_of, tabulate
-from toolpath_stiff.updating.evidence import Problem
-from toolpath_stiff.updating.predict import Predictor
-from toolpath_stiff.updating.size_prior import EXPECTED, VISIBLE, SizePrior
+from toolpath_stiff.updating.diagnosis import diagnose
+from toolpath_stiff.updating.inference.candidates import Candidate, Component, Table, candidates_of, tabulate
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.predict import Predictor
+from toolpath_stiff.updating.inference.size_prior import EXPECTED, VISIBLE, SizePrior
 
 EFFECTS = all_effects()
 REAL = [(name, p.name) for name, effect in EFFECTS.items() for p in effect.parameters if not p.discrete]

@@ -15,7 +15,8 @@ from tests.updating.test_evidence import COUNT, by_hand, logs_by_hand, one_table
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.confounding import (
+from toolpath_stiff.updating.diagnosis.diagnose import make_problem
+from toolpath_stiff.updating.inference.confounding import (
     CONFOUNDED,
     Confounding,
     Detectable,
@@ -23,10 +24,9 @@ from toolpath_stiff.updating.confounding import (
     confounding,
     detectable_sizes,
 )
-from toolpath_stiff.updating.diagnose import make_problem
-from toolpath_stiff.updating.evidence import Problem
-from toolpath_stiff.updating.measurements import Measurements
-from toolpath_stiff.updating.ranking import Family, score_families
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.ranking import Family, score_families
+from toolpath_stiff.updating.readings.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from scipy.stats import ttest_1samp
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.candidates import candidates_of
-from toolpath_stiff.updating.diagnose import make_problem
-from toolpath_stiff.updating.evidence import Problem
-from toolpath_stiff.updating.fit import Fit, fit_effects
-from toolpath_stiff.updating.held_out import _inverse_without, gain_in_standard_errors, held_out
-from toolpath_stiff.updating.scatter import Scatter
+from toolpath_stiff.updating.diagnosis.diagnose import make_problem
+from toolpath_stiff.updating.inference.candidates import candidates_of
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.fit import Fit, fit_effects
+from toolpath_stiff.updating.inference.held_out import _inverse_without, gain_in_standard_errors, held_out
+from toolpath_stiff.updating.inference.scatter import Scatter
 
 DATA = campaign(21, "paper", "weak_strut", 0.06)[0]
 NOISE = simple_noise(len(DATA), 0.02, 0.01, 0.01, 0.5e-3)
@@ -27,7 +27,7 @@ def fit(problem: Problem, name: str | None = "weak_strut") -> Fit:
     if name is None:
         return fit_effects(problem, (), (), (), np.zeros(2))
     base = problem.score_base()
-    from toolpath_stiff.updating.ranking import score_family
+    from toolpath_stiff.updating.inference.ranking import score_family
 
     best = score_family(problem, find_effect(name), base).best
     return fit_effects(problem, best.candidates, best.sizes, best.free, best.law)

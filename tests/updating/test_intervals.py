@@ -11,13 +11,13 @@ from scipy.stats import norm
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.averaged_interval import averaged_interval
-from toolpath_stiff.updating.diagnose import make_problem
-from toolpath_stiff.updating.diagnosis_document import parameters
-from toolpath_stiff.updating.fit import refine
-from toolpath_stiff.updating.noise import noise_models
-from toolpath_stiff.updating.ranking import score_family
-from toolpath_stiff.updating.size_prior import likely_interval
+from toolpath_stiff.updating.diagnosis.diagnose import make_problem
+from toolpath_stiff.updating.diagnosis.diagnosis_document import parameters
+from toolpath_stiff.updating.inference.averaged_interval import averaged_interval
+from toolpath_stiff.updating.inference.fit import refine
+from toolpath_stiff.updating.inference.noise import noise_models
+from toolpath_stiff.updating.inference.ranking import score_family
+from toolpath_stiff.updating.inference.size_prior import likely_interval
 
 
 def normal_scan(mean: float, sd: float, low: float, high: float) -> np.ndarray:

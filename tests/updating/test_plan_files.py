@@ -20,12 +20,12 @@ from toolpath_stiff.machine import load_machine
 from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.stiffness.effects import known_effects
-from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.noise import repeat_groups
-from toolpath_stiff.updating.plan import plan_measurements
-from toolpath_stiff.updating.plan_campaign import Campaign, first_campaign
-from toolpath_stiff.updating.plan_files import plan_csv, plan_rows
-from toolpath_stiff.updating.plan_menu import Menu
+from toolpath_stiff.updating.inference.noise import repeat_groups
+from toolpath_stiff.updating.planning.plan import plan_measurements
+from toolpath_stiff.updating.planning.plan_campaign import Campaign, first_campaign
+from toolpath_stiff.updating.planning.plan_files import plan_csv, plan_rows
+from toolpath_stiff.updating.planning.plan_menu import Menu
+from toolpath_stiff.updating.readings.measurements import read_measurements
 
 MACHINES = ("nist", "genhexkins", "nategh_agheli")
 

@@ -15,13 +15,13 @@ from scipy.stats import binom
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, judged, table_1
-from toolpath_stiff.updating.diagnose import common_verdict, diagnose
-from toolpath_stiff.updating.discrepancy import discrepancy_forms
-from toolpath_stiff.updating.evidence import Problem
-from toolpath_stiff.updating.gates import Simulator, absolute_gate
-from toolpath_stiff.updating.noise import covariance
-from toolpath_stiff.updating.scatter import Scatter
-from toolpath_stiff.updating.verdict import FALSE_ALARM, NONE, _smallest_set
+from toolpath_stiff.updating.diagnosis.diagnose import common_verdict, diagnose
+from toolpath_stiff.updating.inference.discrepancy import discrepancy_forms
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate
+from toolpath_stiff.updating.inference.noise import covariance
+from toolpath_stiff.updating.inference.scatter import Scatter
+from toolpath_stiff.updating.inference.verdict import FALSE_ALARM, NONE, _smallest_set
 
 STRONG = 0.1
 SEEDS = tuple(range(100, 112))

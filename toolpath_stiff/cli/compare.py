@@ -47,8 +47,8 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.report.compare_text import residuals_csv, terminal_text
     from toolpath_stiff.report.write import write_folder
-    from toolpath_stiff.updating.compare import compare
-    from toolpath_stiff.updating.measurements import read_measurements
+    from toolpath_stiff.updating.comparison.compare import compare
+    from toolpath_stiff.updating.readings.measurements import read_measurements
 
     machine = load_machine(args.machine)
     found = compare(

@@ -16,7 +16,7 @@ from toolpath_stiff.cli.measurement_arguments import (
 )
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.diagnose import Diagnosis
+    from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
 
 EPILOG = """\
 examples:
@@ -56,9 +56,9 @@ def run(args: argparse.Namespace) -> int:
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.report.write import write_folder
-    from toolpath_stiff.updating.diagnose import diagnose
-    from toolpath_stiff.updating.diagnosis_document import document
-    from toolpath_stiff.updating.measurements import read_measurements
+    from toolpath_stiff.updating.diagnosis.diagnose import diagnose
+    from toolpath_stiff.updating.diagnosis.diagnosis_document import document
+    from toolpath_stiff.updating.readings.measurements import read_measurements
 
     machine = load_machine(args.machine)
     data = read_measurements(args.data, machine)
@@ -96,7 +96,7 @@ def _say(text: str) -> None:
 
 def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namespace) -> None:
     """Add what needs other rooms: the next measurements, and the choice's weight on a tool path."""
-    from toolpath_stiff.updating.next_measurements import choice_on_path, next_measurements
+    from toolpath_stiff.updating.diagnosis.next_measurements import choice_on_path, next_measurements
 
     if diagnosis.verdict != "ambiguous":
         return

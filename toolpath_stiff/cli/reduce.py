@@ -12,7 +12,7 @@ from toolpath_stiff.cli.arguments import add_json_option
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.raw_records import Loop, LoopFigures
+    from toolpath_stiff.updating.readings.raw_records import Loop, LoopFigures
 
 EPILOG = """\
 columns of RAW.csv:
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
     from toolpath_stiff.files import read_text, write_atomically
-    from toolpath_stiff.updating.raw_records import measurement_csv, read_raw, reduce_loops
+    from toolpath_stiff.updating.readings.raw_records import measurement_csv, read_raw, reduce_loops
 
     loops = read_raw(read_text(args.raw, "raw records"), args.raw)
     figures = reduce_loops(loops, args.raw)
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 def describe(loops: list[Loop], figures: list[LoopFigures]) -> list[dict[str, Any]]:
     """One dictionary a loop in the shop's units; what a loop cannot say is null."""
     from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
-    from toolpath_stiff.updating.raw_records import shop_figures
+    from toolpath_stiff.updating.readings.raw_records import shop_figures
 
     found = []
     for loop, one in zip(loops, figures, strict=True):

@@ -12,12 +12,12 @@ from toolpath_stiff.report.compare_pictures import heading, in_percent, near_row
 from toolpath_stiff.report.figure import GRID, INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
 from toolpath_stiff.units import mm_from_m
-from toolpath_stiff.updating.residual_variables import directions, planes
+from toolpath_stiff.updating.comparison.residual_variables import directions, planes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from toolpath_stiff.updating.compare import Comparison
+    from toolpath_stiff.updating.comparison.compare import Comparison
 
 FloatArray = NDArray[np.float64]
 Place = tuple[float, float, float, float]  # x, y, width, height

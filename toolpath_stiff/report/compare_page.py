@@ -14,7 +14,7 @@ from toolpath_stiff.report.compare_variables import load_path_png, variables_png
 from toolpath_stiff.report.sections import bullets, escaped, figures, page, picture, section, text_table
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.compare import Comparison
+    from toolpath_stiff.updating.comparison.compare import Comparison
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {

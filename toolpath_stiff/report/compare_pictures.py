@@ -11,13 +11,13 @@ from toolpath_stiff.report.figure import INK, MUTED, UNREACHABLE_RED, house_styl
 from toolpath_stiff.report.update_pictures import BAND, DIRECTION_COLOURS, RESIDUAL_MAP
 from toolpath_stiff.report.wording import number, plain, shortened
 from toolpath_stiff.units import n_per_mm_from_n_per_m
-from toolpath_stiff.updating.residual_variables import directions, planes
+from toolpath_stiff.updating.comparison.residual_variables import directions, planes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.updating.compare import Comparison
+    from toolpath_stiff.updating.comparison.compare import Comparison
 
 FloatArray = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from toolpath_stiff.report.wording import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
-from toolpath_stiff.updating.compare import Comparison
-from toolpath_stiff.updating.residual_variables import directions, planes
+from toolpath_stiff.updating.comparison.compare import Comparison
+from toolpath_stiff.updating.comparison.residual_variables import directions, planes
 
 MOST_NAMED = 5  # readings far off, on the terminal
 

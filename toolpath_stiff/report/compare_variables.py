@@ -12,14 +12,14 @@ from toolpath_stiff.report.compare_pictures import RESIDUAL_AXIS, count_of, head
 from toolpath_stiff.report.figure import INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
 from toolpath_stiff.report.wording import plain, shortened
-from toolpath_stiff.updating.residual_structure import SIGNIFICANT
-from toolpath_stiff.updating.residual_variables import directions
+from toolpath_stiff.updating.comparison.residual_structure import SIGNIFICANT
+from toolpath_stiff.updating.comparison.residual_variables import directions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from toolpath_stiff.updating.compare import Comparison
-    from toolpath_stiff.updating.residual_variables import Label, Variable
+    from toolpath_stiff.updating.comparison.compare import Comparison
+    from toolpath_stiff.updating.comparison.residual_variables import Label, Variable
 
 FloatArray = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.report.wording import number, plain
-from toolpath_stiff.updating.candidates import choice_text
+from toolpath_stiff.updating.inference.candidates import choice_text
 
 # Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
 MEAN_OVER_SD = math.sqrt(2.0 / math.pi)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.updating.measurements import Measurements
+    from toolpath_stiff.updating.readings.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
 

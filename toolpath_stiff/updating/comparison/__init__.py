@@ -1,0 +1,1 @@
+"""Where the model fails: errors, structure in residuals, checks without a model."""

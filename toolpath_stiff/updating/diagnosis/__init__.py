@@ -1,0 +1,1 @@
+"""Which physical effect is missing, in figures and words."""

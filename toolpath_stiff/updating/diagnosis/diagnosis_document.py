@@ -1,0 +1,333 @@
+"""A diagnosis as a document: the content of diagnose.json, in shop units."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
+from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
+from toolpath_stiff.updating.diagnosis.diagnosis_words import next_steps, verdict_text, why
+from toolpath_stiff.updating.inference.averaged_interval import averaged_interval
+from toolpath_stiff.updating.inference.candidates import Component
+from toolpath_stiff.updating.inference.confounding import CONFOUNDED
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
+from toolpath_stiff.updating.inference.fit import NORMAL_95, Fit
+from toolpath_stiff.updating.inference.held_out import gain_in_standard_errors
+from toolpath_stiff.updating.inference.ranking import Family
+from toolpath_stiff.updating.inference.size_prior import EXPECTED
+from toolpath_stiff.updating.inference.verdict import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, Judgement
+
+FloatArray = NDArray[np.float64]
+
+TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
+
+
+def document(diagnosis: Diagnosis, command: str = "") -> dict[str, Any]:
+    """Everything that `diagnose.json` holds but the next measurements, which `plan` works out."""
+    main = diagnosis.main
+    return {
+        "verdict": diagnosis.verdict,
+        "text": verdict_text(diagnosis),
+        "baseline": _baseline(diagnosis),
+        "candidates": _candidates(diagnosis),
+        "pairs": _pairs(diagnosis),
+        "plausible": list(diagnosis.plausible),
+        "best": diagnosis.best,
+        "why": why(diagnosis),
+        "cannot_test": [
+            {"effect": name, "missing": list(columns)} for name, columns in sorted(diagnosis.cannot_test.items())
+        ],
+        "next_measurements": [],
+        "next": next_steps(diagnosis),
+        "by_noise": {name: _in_short(judgement) for name, judgement in diagnosis.judgements.items()},
+        "noise": _noise(main),
+        "gates": _gates(main),
+        "detectable": [
+            {
+                "effect": one.effect,
+                "parameter": one.parameter.name,
+                "unit": one.parameter.unit,
+                "size": _number(one.value / one.parameter.si) if one.seen else None,
+                "rms_percent": _number(100.0 * one.rms),
+                "detectable": one.seen,
+            }
+            for one in diagnosis.detectable
+        ],
+        "confounding": {
+            "effects": list(diagnosis.confounding.names),
+            "matrix": [[_number(x, 3) for x in row] for row in diagnosis.confounding.matrix.tolist()],
+            "sets": [list(group) for group in diagnosis.confounding.sets],
+            "threshold": CONFOUNDED,
+        },
+        "path": None,
+        "assumptions": assumptions(diagnosis),
+        "warnings": list(diagnosis.data.warnings),
+        "notes": list(diagnosis.data.notes),
+        "seed": diagnosis.seed,
+        "machine": diagnosis.machine.name,
+        "data": list(diagnosis.files),
+        "readings": len(diagnosis.data),
+        "command": command,
+    }
+
+
+def _number(value: float, digits: int = 5) -> float | None:
+    """A float of some significant digits; None for what JSON cannot hold."""
+    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
+
+
+def _errors(fit: Fit) -> dict[str, Any]:
+    return {"mean_abs_error_percent": _number(100.0 * float(fit.errors.mean()))}
+
+
+def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
+    relative = np.expm1(-diagnosis.base.residual)
+    as_given = np.expm1(diagnosis.predictor.log_stiffness() - diagnosis.main.problem.observed)
+    held = diagnosis.held_out_base
+    law = diagnosis.machine.strut_law
+    factors = np.exp(diagnosis.base.law)
+    deviations = np.sqrt(np.diag(diagnosis.base.covariance)[:2])
+    return {
+        "mean_abs_error_percent": _number(100.0 * float(np.abs(relative).mean())),
+        "bias_percent": _number(100.0 * float(relative.mean())),
+        "rms_percent": _number(100.0 * float(np.sqrt(np.mean(relative**2)))),
+        "held_out_error_percent": _number(100.0 * held.mean_error),
+        "held_out_rms_percent": _number(100.0 * held.rms),
+        "noise_percent": _number(100.0 * diagnosis.noise.typical),
+        "noise_floor_percent": _number(80.0 * diagnosis.noise.typical),
+        "probability": _number(diagnosis.main.probability.get(NONE, 0.0)),
+        "probability_outside": _number(diagnosis.main.probability.get(OUTSIDE, 0.0)),
+        "adequate": bool(diagnosis.main.base_gate.probability > FALSE_ALARM),
+        "as_given": {
+            "mean_abs_error_percent": _number(100.0 * float(np.abs(as_given).mean())),
+            "bias_percent": _number(100.0 * float(as_given.mean())),
+        },
+        "law": [
+            {
+                "length_mm": _number(float(mm_from_m(length)), 7),
+                "stiffness_N_per_um": _number(stiffness * factor / 1e6),
+                "machine_file_N_per_um": _number(stiffness / 1e6),
+                "sd_percent": _number(100.0 * deviation, 3),
+            }
+            for length, stiffness, factor, deviation in zip(
+                (law.length_1, law.length_2), (law.stiffness_1, law.stiffness_2), factors, deviations, strict=True
+            )
+        ],
+    }
+
+
+def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    main = diagnosis.main
+    best = max((f.log_evidence for f in main.families), default=0.0)
+    best = max(best, main.base.log_evidence)
+    ranked = sorted(main.families, key=lambda f: (-main.probability.get(f.name, 0.0), -f.log_evidence, f.name))
+    return [_candidate(diagnosis, family, best) for family in ranked]
+
+
+def _candidate(diagnosis: Diagnosis, family: Family, best: float) -> dict[str, Any]:
+    main = diagnosis.main
+    fit = diagnosis.fits.get(family.name)
+    gate = main.gates.get(family.name)
+    base_passes = main.base_gate.probability > FALSE_ALARM
+    common = {
+        "effect": family.name,
+        "title": family.effect.title,
+        "link": family.effect.link,
+        "probability": _number(main.probability.get(family.name, 0.0)),
+        "log_evidence": _number(family.log_evidence - main.base.log_evidence),
+        "words": words(2.0 * (best - family.log_evidence)),
+    }
+    if fit is None or not any(size.any() for size in fit.sizes):
+        return common | {
+            "parameters": {},
+            "choice": {},
+            "mean_abs_error_percent": _number(100.0 * float(diagnosis.base.errors.mean())),
+            "held_out_error_percent": _number(100.0 * diagnosis.held_out_base.mean_error),
+            "held_out_rms_percent": _number(100.0 * diagnosis.held_out_base.rms),
+            "held_out_gain_in_se": 0.0,
+            "adequate": base_passes,
+            "offered": False,
+            "remark": "fits best when it is absent",
+        }
+    held = diagnosis.held_out[family.name]
+    adequate = gate.probability > ADEQUATE if gate is not None else base_passes
+    bounded = fit.at_upper_bound()
+    remark = f"{', '.join(bounded)} at its bound" if bounded else ""
+    if not remark and gate is None and not base_passes:
+        remark = "others explain the data far better"
+    return common | {
+        "parameters": parameters(fit, family),
+        "choice": dict(fit.candidates[0].choice),
+        **_errors(fit),
+        "held_out_error_percent": _number(100.0 * held.mean_error),
+        "held_out_rms_percent": _number(100.0 * held.rms),
+        "held_out_gain_in_se": _number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
+        "adequate": bool(adequate),
+        "adequate_probability": None if gate is None else _number(gate.probability, 3),
+        "offered": not bounded,
+        "remark": remark,
+    }
+
+
+def words(twice_log_ratio: float) -> str:
+    """How a hypothesis stands against the best, by twice the log ratio of their evidences (RadVel's wording)."""
+    if twice_log_ratio <= 1e-9:
+        return "best"
+    for limit, text in (
+        (2.0, "nearly indistinguishable"),
+        (4.0, "somewhat disfavoured"),
+        (10.0, "strongly disfavoured"),
+    ):
+        if twice_log_ratio < limit:
+            return text
+    return "ruled out"
+
+
+def parameters(fit: Fit, family: Family | None = None) -> dict[str, Any]:
+    """Key -> value, unit, 95 % interval, of all effects of a fit; None stands for an infinite value."""
+    found: dict[str, Any] = {}
+    index = 0
+    for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
+        for component, size in zip(candidate.components, sizes, strict=True):
+            low, high = interval(fit, index, component, float(size), family)
+            si = component.parameter.si
+            ends = sorted((component.value(low) / si, component.value(high) / si))
+            found[component.parameter.key] = {
+                "value": _number(component.value(float(size)) / si),
+                "unit": component.parameter.unit,
+                "interval": [_number(ends[0]), _number(ends[1])],
+            }
+            index += 1
+    return found
+
+
+def interval(
+    fit: Fit, index: int, component: Component, size: float, family: Family | None = None
+) -> tuple[float, float]:
+    """95 % interval of a size, within the bounds.
+
+    From its profile where that was scanned, averaged over subsets of components where there are several, else normal.
+    """
+    low_bound, high_bound = component.bounds
+    best = family.best if family is not None else None
+    if best is not None and best.interval is not None and index == 0:
+        # The scan ran on the table; the final fit with the model itself may sit a little beside it. What reached to a
+        # bound does so still.
+        shift, near = size - float(best.sizes[0][0]), TOUCHES * float(np.ptp(best.interval))
+        low, high = (float(end) for end in best.interval)
+        low = low_bound if low - low_bound < near else max(min(low + shift, size), low_bound)
+        high = high_bound if high_bound - high < near else min(max(high + shift, size), high_bound)
+        return low, high
+    averaged = None if family is None else averaged_interval(family, index)
+    if index in fit.free:
+        reach = NORMAL_95 * fit.deviation(index)
+        low, high = (-reach, reach) if averaged is None or best is None else averaged - float(best.sizes[0][index])
+        return max(size + min(float(low), 0.0), low_bound), min(size + max(float(high), 0.0), high_bound)
+    pull, deviation = fit.absent.get(index, (0.0, 0.0))
+    upper = max(pull, 0.0) + NORMAL_95 * deviation
+    if averaged is not None:
+        upper = max(upper, float(averaged[1]))
+    return max(0.0, low_bound), min(upper, high_bound)
+
+
+def _pairs(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    found = []
+    for pair in diagnosis.main.pairs:
+        name = " + ".join(pair.names)
+        fit = diagnosis.fits.get(name)
+        gate = diagnosis.main.gates.get(name)
+        if fit is None or gate is None:
+            continue
+        held = diagnosis.held_out[name]
+        found.append(
+            {
+                "effects": list(pair.names),
+                "probability": _number(diagnosis.main.probability.get(name, 0.0)),
+                "log_evidence": _number(pair.log_evidence - diagnosis.main.base.log_evidence),
+                "parameters": pair_parameters(fit),
+                **_errors(fit),
+                "held_out_error_percent": _number(100.0 * held.mean_error),
+                "held_out_rms_percent": _number(100.0 * held.rms),
+                "held_out_gain_in_se": _number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
+                "adequate": bool(gate.probability > ADEQUATE),
+                "adequate_probability": _number(gate.probability, 3),
+            }
+        )
+    return sorted(found, key=lambda pair: (-(pair["probability"] or 0.0), -(pair["log_evidence"] or 0.0)))
+
+
+def pair_parameters(fit: Fit) -> dict[str, Any]:
+    """Effect -> its parameters and choice."""
+    flat = list(parameters(fit).items())
+    found, start = {}, 0
+    for candidate in fit.candidates:
+        count = len(candidate.components)
+        found[candidate.name] = dict(flat[start : start + count]) | dict(candidate.choice)
+        start += count
+    return found
+
+
+def _noise(judgement: Judgement) -> dict[str, Any]:
+    noise = judgement.noise
+    return {
+        "name": noise.name,
+        "repeat_percent": _number(100.0 * float(np.sqrt(np.mean(noise.repeat**2))), 4),
+        "clamping_percent": _number(100.0 * noise.clamping, 4),
+        "strut_spread_percent": _number(100.0 * noise.strut_spread, 4),
+        "joint_error_mm": _number(float(mm_from_m(noise.joint_error)), 4),
+        "origin": noise.origin,
+    }
+
+
+def _gates(judgement: Judgement) -> dict[str, Any]:
+    gate = judgement.base_gate
+    return {
+        "baseline_probability": _number(gate.probability, 3),
+        "squares": _number(gate.squares),
+        "squares_probability": _number(gate.squares_probability, 3),
+        "simulated_squares": [_number(x) for x in np.sort(gate.simulated).tolist()],
+        "structure_probability": _number(gate.structure_probability, 3),
+        "structure": gate.worst,
+        "gain_probability": _number(gate.gain_probability, 3),
+        "gain_threshold": _number(gate.gain_threshold),
+    }
+
+
+def _in_short(judgement: Judgement) -> dict[str, Any]:
+    return {
+        "verdict": judgement.verdict,
+        "plausible": list(judgement.plausible),
+        "noise_percent": _number(100.0 * judgement.noise.typical, 4),
+        "origin": judgement.noise.origin,
+        "probability": {
+            name: _number(weight, 4)
+            for name, weight in sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0]))
+            if weight > 1e-4
+        },
+        "baseline_gate_probability": _number(judgement.base_gate.probability, 3),
+        "structure": judgement.base_gate.worst,
+    }
+
+
+def assumptions(diagnosis: Diagnosis) -> list[str]:
+    """What was assumed, in sentences."""
+    noise = diagnosis.noise
+    found = [
+        f"noise: {noise.origin}",
+        f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
+        f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
+        f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: assumed",
+        f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
+        "(sd) of the machine file: effective values, which absorb part of every other effect",
+        f"sizes of effects: flat in the logarithm between {100 * EXPECTED[0]:g} and {100 * EXPECTED[1]:g} % change of "
+        "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
+        f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
+        f"the plausible set holds {100 * HELD:g} %",
+    ]
+    if "force_N" in diagnosis.data.missing:
+        found.append(f"load of every reading: {DEFAULT_FORCE:g} N, assumed because force_N is missing")
+    return found

@@ -1,0 +1,1 @@
+"""What readings say of a model: noise, candidates, evidence, gates, fits, a verdict."""

@@ -1,0 +1,297 @@
+"""The candidates: each effect of the catalogue with what it may act on, and its compliance as a function of its size.
+
+A candidate is an effect with a choice (which strut, which set-up). Its compliance is added to that of the base model,
+c = c_0(law) + delta(size): exact for whatever gives way in series, a good local description of the rest. The model
+itself is evaluated at some sizes only; the searches and bootstraps run on the interpolated `delta`. What is reported is
+refitted with the model itself afterwards.
+
+Sizes count from the neutral value: `value - neutral`, or `1 / value` where neutral is an infinite stiffness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.inference.predict import Predictor
+from toolpath_stiff.updating.readings.measurements import Measurements
+
+FloatArray = NDArray[np.float64]
+
+SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
+POINTS = 9  # sizes a sign
+CROWDED = 2.5  # power by which they crowd towards large ones: delta / size is constant first and bends at the end
+MOST_COMPONENTS = 4  # effects with more real parameters are tried in full and one by one only
+INVISIBLE = 1e-7  # rms change of ln stiffness below which a choice does nothing to these data
+
+
+@dataclass(frozen=True)
+class Component:
+    """One real parameter of an effect, as a size from its neutral value.
+
+    Attributes
+    ----------
+    parameter
+        The parameter; values are its SI values.
+    inverse
+        Whether the size is 1 / value.
+    bounds
+        (low, high) of the size, one of them 0 or 0 between them.
+    """
+
+    parameter: Parameter
+    inverse: bool
+    bounds: tuple[float, float]
+
+    @classmethod
+    def of(cls, parameter: Parameter) -> Component:
+        """The component of a real parameter."""
+        low, high = (value * parameter.si for value in parameter.bounds)
+        if np.isinf(parameter.neutral):
+            return cls(parameter, True, (0.0 if np.isinf(high) else 1.0 / high, 1.0 / low if low > 0.0 else np.inf))
+        neutral = parameter.neutral * parameter.si
+        return cls(parameter, False, (low - neutral, high - neutral))
+
+    def value(self, size: float) -> float:
+        """SI value of the parameter."""
+        if self.inverse:
+            return np.inf if size == 0.0 else 1.0 / size
+        return self.parameter.neutral * self.parameter.si + size
+
+    @property
+    def signs(self) -> tuple[float, ...]:
+        """Directions in which the size may go from 0."""
+        return tuple(sign for sign, bound in zip((-1.0, 1.0), self.bounds, strict=True) if sign * bound > 0.0)
+
+    def reach(self, sign: float) -> float:
+        """Largest size in that direction, as a positive number."""
+        return abs(self.bounds[0] if sign < 0.0 else self.bounds[1])
+
+    def allows(self, size: float) -> bool:
+        """Whether a size that is not 0 lies within its bounds."""
+        sign = float(np.sign(size))
+        return sign in self.signs and abs(size) <= self.reach(sign)
+
+    def typical(self) -> tuple[float, float]:
+        """Usual sizes as positive numbers, smallest and largest; 0 and inf where nothing is said."""
+        ends = []
+        for end in self.parameter.typical:
+            value = end * self.parameter.si
+            if self.inverse:
+                ends.append(1.0 / value if value > 0.0 else np.inf)
+            else:
+                ends.append(abs(value - self.parameter.neutral * self.parameter.si))
+        low, high = self.parameter.typical
+        if low < self.parameter.neutral < high:
+            return 0.0, max(ends)
+        return min(ends), max(ends)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect with what it acts on.
+
+    Attributes
+    ----------
+    effect, choice
+        The effect; values of its discrete parameters.
+    components
+        Its real parameters.
+    """
+
+    effect: Effect
+    choice: tuple[tuple[str, Any], ...]
+    components: tuple[Component, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+    def active(self, sizes: Sequence[float] | FloatArray) -> ActiveEffect:
+        """The effect with these sizes (p,)."""
+        values = {c.parameter.name: c.value(float(s)) for c, s in zip(self.components, sizes, strict=True)}
+        return ActiveEffect(self.effect, dict(self.choice) | values)
+
+    @property
+    def label(self) -> str:
+        """For people: the effect's name and its choice."""
+        chosen = ", ".join(choice_text(key, value) for key, value in self.choice if value not in ("", 0))
+        return f"{self.name} ({chosen})" if chosen else self.name
+
+    def subsets(self) -> Iterator[tuple[int, ...]]:
+        """Sets of components that are not neutral."""
+        count = len(self.components)
+        sizes = range(1, count + 1) if count <= MOST_COMPONENTS else (1, count)
+        for size in sizes:
+            yield from combinations(range(count), size)
+
+
+def choice_text(key: str, value: Any) -> str:
+    """A choice for people: "strut 3", "direction Z"; the catalogue numbers directions 1, 2, 3."""
+    if key == "direction" and value in (1, 2, 3):
+        return f"direction {'XYZ'[value - 1]}"
+    return f"{key} {value}"
+
+
+def candidates_of(effect: Effect, data: Measurements) -> list[Candidate]:
+    """The candidates of an effect: one a choice. Of several discrete parameters one at a time leaves its default."""
+    real = tuple(Component.of(p) for p in effect.parameters if not p.discrete)
+    discrete = [p for p in effect.parameters if p.discrete]
+    if not discrete:
+        return [Candidate(effect, (), real)] if real else []
+    defaults: dict[str, Any] = {p.name: "" if p.kind == "text" else 0 for p in discrete}
+    found = []
+    for parameter in discrete:
+        for value in _choices(parameter, data, alone=len(discrete) == 1):
+            choice = tuple((defaults | {parameter.name: value}).items())
+            found.append(Candidate(effect, choice, real))
+    return found
+
+
+def _choices(parameter: Parameter, data: Measurements, alone: bool) -> list[Any]:
+    if parameter.kind == "text":
+        names = sorted(set(data.setup.tolist()) - {""})
+        # One of several means to act: a single set-up is all readings, which other choices cover.
+        return names if alone or len(names) > 1 else []
+    low, high = (int(bound) for bound in parameter.bounds)
+    return [value for value in range(low, high + 1) if alone or value != 0]
+
+
+class Table:
+    """`delta`, (n,) m/N that a candidate adds to the compliance of each reading, as a function of its sizes.
+
+    One component: tabulated over its size and interpolated (delta / size over ln size, which is almost constant).
+    Several: linear in each, from one size of each.
+    """
+
+    def __init__(self, candidate: Candidate, columns: FloatArray, knots: dict[float, tuple[FloatArray, FloatArray]]):
+        self.candidate = candidate
+        self.columns = columns  # (n, p) m/N per unit of size, small sizes
+        self.knots = knots  # sign -> (ln size (g,), delta / size (g, n))
+
+    @cached_property
+    def _splines(self) -> dict[float, Any]:
+        from scipy.interpolate import CubicSpline
+
+        return {sign: CubicSpline(logs, ratio) for sign, (logs, ratio) in self.knots.items()}
+
+    def reach(self, sign: float) -> float:
+        """Largest size tabulated in that direction."""
+        return float(np.exp(self.knots[sign][0][-1]))
+
+    def delta(self, sizes: FloatArray) -> FloatArray:
+        """(..., n) for sizes (..., p)."""
+        if not self.knots:
+            return np.asarray(sizes @ self.columns.T)
+        size = sizes[..., 0]
+        out = np.zeros((*size.shape, len(self.columns)))
+        for sign, spline in self._splines.items():
+            logs = self.knots[sign][0]
+            where = size * sign > 0.0
+            if where.any():
+                position = np.clip(np.log(np.abs(size[where])), logs[0], logs[-1])
+                out[where] = spline(position) * size[where][..., None]
+        return out
+
+    def slope(self, sizes: FloatArray) -> FloatArray:
+        """(n, p) d delta / d size at sizes (p,)."""
+        if not self.knots:
+            return self.columns
+        size = float(sizes[0])
+        step = 1e-4 * max(abs(size), 1e-12)
+        if size == 0.0:
+            return self.columns
+        ends = self.delta(np.array([[size + step], [size - step]]))
+        return np.asarray((ends[0] - ends[1])[:, None] / (2.0 * step))
+
+
+def tabulate(
+    candidate: Candidate, predictor: Predictor, law: FloatArray, beside: Sequence[ActiveEffect] = ()
+) -> Table | None:
+    """The candidate's table at a strut law, beside other effects; None where it does nothing to these data."""
+    base = predictor.log_stiffness(law, beside)
+    compliance = np.exp(-base)
+
+    def delta(sizes: Iterable[float]) -> FloatArray | None:
+        logs = predictor.log_stiffness(law, [*beside, candidate.active(list(sizes))])
+        return None if np.isnan(logs).any() else np.asarray(np.exp(-logs) - compliance)
+
+    count = len(candidate.components)
+    columns, knots = np.zeros((len(base), count)), {}
+    for j, component in enumerate(candidate.components):
+        for sign in component.signs:
+            unit = np.zeros(count)
+            unit[j] = sign
+            start = _size_for(component, sign, SMALLEST, delta, compliance, unit)
+            if start is None:
+                continue
+            found = delta(start * unit)
+            if found is None:
+                continue
+            columns[:, j] = found / (start * sign)
+            if count == 1:
+                knots[sign] = _knots(component, sign, start, delta, compliance)
+    if not columns.any():
+        return None
+    return Table(candidate, columns, knots)
+
+
+def _rms(delta: FloatArray, compliance: FloatArray) -> float:
+    """Rms change of ln stiffness."""
+    return float(np.sqrt(np.mean(np.log1p(np.maximum(delta / compliance, -0.999)) ** 2)))
+
+
+def _size_for(
+    component: Component, sign: float, wanted: float, delta: Any, compliance: FloatArray, unit: FloatArray
+) -> float | None:
+    """A size at which ln stiffness changes by about `wanted`, or the largest possible; None if nothing changes."""
+    reach = component.reach(sign)
+    size = min(max(component.typical()), reach)
+    if not np.isfinite(size) or size <= 0.0:
+        size = reach if np.isfinite(reach) else 1.0
+    for _ in range(12):
+        found = delta(size * unit)
+        if found is None:
+            size *= 0.1
+            continue
+        rms = _rms(found, compliance)
+        if rms < INVISIBLE:
+            return None
+        if 0.3 * wanted < rms < 3.0 * wanted or (rms < wanted and size == reach):
+            return size
+        size = min(size * wanted / rms, reach)
+    return size
+
+
+def _knots(
+    component: Component, sign: float, start: float, delta: Any, compliance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Ln sizes and delta / size from a small size to a large effect or the bound."""
+    end = min(start * LARGEST / SMALLEST, component.reach(sign))
+    while end > 1.001 * start:
+        found = delta([sign * end])
+        if found is not None and _rms(found, compliance) < 2.0:
+            break
+        end = max(0.7 * end, start)
+    share = 1.0 - (1.0 - np.linspace(0.0, 1.0, POINTS)) ** CROWDED
+    sizes = start * (max(end, 1.01 * start) / start) ** share
+    sizes[-1] = min(sizes[-1], component.reach(sign))
+    logs, ratios = [], []
+    for size in sizes:
+        found = delta([sign * size])
+        if found is None:
+            break
+        logs.append(np.log(size))
+        ratios.append(found / (sign * size))
+    if len(logs) < 2:
+        logs, ratios = [np.log(start), np.log(1.01 * start)], [ratios[0], ratios[0]]
+    return np.array(logs), np.array(ratios)

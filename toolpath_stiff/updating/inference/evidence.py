@@ -1,0 +1,398 @@
+"""How well candidates explain the data: bounded fits under the noise model, and their marginal likelihoods.
+
+Residuals of ln k are multivariate normal with the covariance of `noise`; a wild reading has its own scatter widened, at
+the price of its rarity. The strut law's two logarithms are refitted along with every candidate (prior sd
+`LAW_PRIOR`), so that they can neither hide nor fake an effect. Sizes carry a prior that is flat in the logarithm of
+the change that they make to the stiffness; the marginal likelihood follows by quadrature over the size of an effect of
+one parameter, by Laplace's approximation otherwise (MacKay, Information Theory, Inference and Learning Algorithms,
+chapters 27 and 28). An effect of several parameters is tried with each subset of them: one component at zero is normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.updating.inference.candidates import Candidate, Table
+from toolpath_stiff.updating.inference.predict import Predictor
+from toolpath_stiff.updating.inference.scatter import Scatter
+from toolpath_stiff.updating.inference.size_prior import Sight, SizePrior, likely_interval, log_comparable
+
+FloatArray = NDArray[np.float64]
+
+LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
+GRID = 24  # sizes a sign
+ZOOMS = 3
+MOST_ROUNDS = 3  # searches for wild readings
+BEYOND = 0.05  # share of a bound by which a search may overshoot it
+
+
+@dataclass(frozen=True)
+class Score:
+    """One fit: a set of candidates with their sizes, and how likely it makes the data.
+
+    Attributes
+    ----------
+    tables
+        The candidates' tables; none for the base model.
+    sizes
+        One array (p,) a candidate.
+    law
+        (2,) logarithms of the factors on the strut law.
+    residual
+        (n,) ln measured - ln modelled.
+    scatter
+        With the wild readings of this fit.
+    log_likelihood, log_evidence
+        At the fit; integrated over sizes and law under their priors.
+    jacobian
+        (n, 2 + p) derivatives of the modelled ln k to law and to the free sizes.
+    covariance
+        (2 + p, 2 + p) of law and free sizes.
+    free
+        Indices of the free sizes, counted over all candidates.
+    interval
+        (2,) 95 % interval of the size of a single parameter from its profile; None otherwise.
+    possible
+        Whether the sizes lie within their bounds; if not, only `log_evidence` means anything.
+    """
+
+    tables: tuple[Table, ...]
+    sizes: tuple[FloatArray, ...]
+    law: FloatArray
+    residual: FloatArray
+    scatter: Scatter
+    log_likelihood: float
+    log_evidence: float
+    jacobian: FloatArray
+    covariance: FloatArray
+    free: tuple[int, ...] = ()
+    interval: FloatArray | None = None
+    possible: bool = True
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The candidates."""
+        return tuple(table.candidate for table in self.tables)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(table.candidate.name for table in self.tables)
+
+    @property
+    def log_posterior(self) -> float:
+        """Log likelihood with the law's prior: what the fit has made largest."""
+        return self.log_likelihood - 0.5 * float(self.law @ self.law) / LAW_PRIOR**2
+
+
+@dataclass
+class Problem:
+    """The data, the model as a function of strut law and added compliance, and the scatter.
+
+    Attributes
+    ----------
+    predictor
+        The model's answers.
+    scatter, covariance
+        Without wild readings; (n, n) of ln readings.
+    observed
+        (n,) ln k as measured.
+    """
+
+    predictor: Predictor
+    scatter: Scatter
+    covariance: FloatArray
+    observed: FloatArray = field(init=False)
+    sight: Sight = field(init=False)
+    rest: FloatArray = field(init=False)  # (n,) m/N of the machine file's own effects
+    base_compliance: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.observed = np.log(self.predictor.data.stiffness)
+        self.base_compliance = np.exp(-self.predictor.log_stiffness())
+        self.rest = self.base_compliance - self.predictor.strut_part()
+        self._priors: dict[tuple[int, int], tuple[Table, SizePrior]] = {}
+        jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
+        self.sight = Sight(self.base_compliance, self.projected(jacobian))
+
+    def projected(self, jacobian: FloatArray) -> FloatArray:
+        """(n, n) P = A - A J (J^T A J + prior)^-1 J^T A: the inverse covariance of what a refit leaves.
+
+        `jacobian` (n, 2 + p) of ln k to the strut law and p sizes.
+        """
+        weighted = self.scatter.inverse @ jacobian
+        information = jacobian.T @ weighted
+        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        inner = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+        return np.asarray(self.scatter.inverse - weighted @ inner @ weighted.T)
+
+    def prior(self, table: Table, j: int) -> SizePrior:
+        """Prior of a component's size, worked out once."""
+        key = (id(table), j)
+        if key not in self._priors:
+            self._priors[key] = (table, SizePrior.of(table, j, self.sight))
+        return self._priors[key][1]
+
+    def compliance(self, law: FloatArray, delta: FloatArray) -> FloatArray:
+        """(..., n) for laws (..., 2) and added compliances (..., n); held above a tenth of the base model's."""
+        return np.maximum(self.predictor.strut_part(law) + self.rest + delta, 0.1 * self.base_compliance)
+
+    def law_jacobian(self, law: FloatArray, compliance: FloatArray) -> FloatArray:
+        """(..., n, 2) of ln k."""
+        return np.asarray(-self.predictor.strut_slopes(law) / compliance[..., None])
+
+    def fit_law(
+        self, delta: FloatArray, inverse: FloatArray, start: FloatArray, steps: int = 3
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Laws (g, 2), residuals (g, n), information matrices (g, 2, 2) for added compliances (g, n)."""
+        count, n = delta.shape
+        law = np.broadcast_to(start, (count, 2)).copy()
+        compliance = self.compliance(law, delta)
+        residual = self.observed + np.log(compliance)
+        for _ in range(steps):
+            jacobian = self.law_jacobian(law, compliance)
+            weighted = (np.swapaxes(jacobian, 1, 2).reshape(2 * count, n) @ inverse).reshape(count, 2, n)
+            information = weighted @ jacobian + np.eye(2) / LAW_PRIOR**2
+            gradient = (weighted @ residual[..., None])[..., 0] - law / LAW_PRIOR**2
+            law = law + np.clip(np.linalg.solve(information, gradient[..., None])[..., 0], -0.5, 0.5)
+            compliance = self.compliance(law, delta)
+            residual = self.observed + np.log(compliance)
+        return law, residual, information
+
+    # -- scores ----------------------------------------------------------------------------------------------------
+
+    def score_base(self) -> Score:
+        """The model without any further effect."""
+        scatter, law = self.scatter, np.zeros(2)
+        none = np.zeros((1, len(self.observed)))
+        for _ in range(3):
+            laws, residuals, information = self.fit_law(none, scatter.inverse, law)
+            law, residual = laws[0], residuals[0]
+            scatter, wild = self.scatter.with_wild(residual), scatter.wild
+            if scatter.wild == wild:
+                break
+        likelihood = float(scatter.log_likelihood(residual))
+        return Score(
+            (), (), law, residual, scatter, likelihood,
+            likelihood + float(_law_terms(law[None], information)[0]),
+            self.law_jacobian(law, self.compliance(law, none[0])),
+            np.asarray(np.linalg.inv(information[0]), dtype=float),
+        )  # fmt: skip
+
+    def score_single(self, table: Table, start: Score) -> Score:
+        """A candidate of one parameter: quadrature over its size."""
+        sizes = np.sort(
+            np.concatenate([s * np.geomspace(np.exp(k[0][0]), table.reach(s), GRID) for s, k in table.knots.items()])
+        )
+        prior = self.prior(table, 0)
+        scatter, law = self.scatter, start.law
+        for last in range(MOST_ROUNDS, -1, -1):
+            scan = self._refined(table, self._scan(table, sizes, scatter.inverse, law), scatter.inverse)
+            peak = int(np.argmax(scan.profile))
+            residual, law = scan.residuals[peak], scan.laws[peak]
+            again = self.scatter.with_wild(residual)
+            if not last or set(again.wild) == set(scatter.wild):
+                break
+            scatter = again
+        log_integral = prior.integrate(scan.sizes, scan.profile)
+        interval = likely_interval(scan.sizes, scan.profile)
+        best = (np.array([scan.sizes[peak]]),)
+        jacobian = self._jacobian((table,), best, law)
+        information = jacobian.T @ scatter.inverse @ jacobian
+        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
+        constant = -0.5 * scatter.log_determinant - len(scatter.wild) * scatter.price
+        return Score(
+            (table,), best, law, residual, scatter, float(scatter.log_likelihood(residual)), log_integral + constant,
+            jacobian, np.asarray(np.linalg.pinv(information), dtype=float), (0,), interval,
+        )  # fmt: skip
+
+    def _scan(self, table: Table, sizes: FloatArray, inverse: FloatArray, law: FloatArray, steps: int = 3) -> _Scan:
+        laws, residuals, information = self.fit_law(table.delta(sizes[:, None]), inverse, law, steps)
+        squared = np.einsum("gi,gi->g", residuals @ inverse, residuals)
+        return _Scan(sizes, -0.5 * squared + _law_terms(laws, information), laws, residuals)
+
+    def _refined(self, table: Table, scan: _Scan, inverse: FloatArray) -> _Scan:
+        """With more sizes about the peak: zooms, then five standard deviations to each side."""
+        for _ in range(ZOOMS):
+            peak = int(np.argmax(scan.profile))
+            low, high = scan.sizes[max(peak - 1, 0)], scan.sizes[min(peak + 1, len(scan.sizes) - 1)]
+            low, high = (max(low, 0.0), high) if scan.sizes[peak] > 0.0 else (low, min(high, 0.0))
+            more = np.linspace(low, high, 8)[1:-1]
+            more = more[(more != 0.0) & (more != scan.sizes[peak])]
+            scan = scan.merged(self._scan(table, more, inverse, scan.laws[peak], steps=2))
+        peak = int(np.argmax(scan.profile))
+        size, sd = float(scan.sizes[peak]), scan.width()
+        more = size + sd * np.linspace(-4.5, 4.5, 14)
+        inside = (more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))
+        return scan.merged(self._scan(table, more[inside], inverse, scan.laws[peak], steps=2)) if inside.any() else scan
+
+    def _jacobian(self, tables: Sequence[Table], sizes: Sequence[FloatArray], law: FloatArray) -> FloatArray:
+        """(n, 2 + p) of the modelled ln k to law and all sizes."""
+        delta = sum((t.delta(s) for t, s in zip(tables, sizes, strict=True)), np.zeros(len(self.observed)))
+        compliance = self.compliance(law, delta)
+        slopes = [-t.slope(s) / compliance[:, None] for t, s in zip(tables, sizes, strict=True)]
+        return np.concatenate([self.law_jacobian(law, compliance), *slopes], axis=1)
+
+    def score_subset(self, tables: Sequence[Table], free: tuple[int, ...], start: Score) -> Score | None:
+        """Candidates with these components free (counted over all of them); None if one ends at zero or at its bound.
+
+        Gauss-Newton, then Laplace's approximation.
+        """
+        owners = [(t, j) for t in tables for j in range(len(t.candidate.components))]
+        chosen = [owners[i] for i in free]
+        sizes = {id(t): np.zeros(len(t.candidate.components)) for t in tables}
+        if len(start.free) > 0:
+            for table, old in zip(start.tables, start.sizes, strict=True):
+                if id(table) in sizes:
+                    sizes[id(table)] = old.copy()
+        law, scatter = start.law.copy(), self.scatter
+        for last in range(MOST_ROUNDS, -1, -1):
+            converged = self._gauss_newton(tables, chosen, sizes, law, scatter.inverse)
+            if converged is None:
+                return None
+            law, residual, information, jacobian = converged
+            again = self.scatter.with_wild(residual)
+            if not last or set(again.wild) == set(scatter.wild):
+                break
+            scatter = again
+        covariance = np.asarray(_scaled_inverse(information), dtype=float)
+        deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
+        held = _pull_back(chosen, sizes) if len(tables) > 1 else []
+        if held:  # the others once more beside them
+            settled = self._gauss_newton(tables, [c for c in chosen if c not in held], sizes, law, scatter.inverse)
+            law, residual = (law, residual) if settled is None else settled[:2]
+        own = [float(sizes[id(table)][j]) for table, j in chosen]
+        possible = all(t.candidate.components[j].allows(size) for (t, j), size in zip(chosen, own, strict=True))
+        if not possible and len(free) > 1:
+            return None
+        likelihood = float(scatter.log_likelihood(residual))
+        evidence = likelihood - 0.5 * float(law @ law) / LAW_PRIOR**2 - 2.0 * np.log(LAW_PRIOR)
+        if len(free) == 1:
+            evidence -= 0.5 * np.linalg.slogdet(information[:2, :2])[1]
+            # By quadrature, which holds for sizes next to nothing as well, with the profile as a parabola.
+            table, j = chosen[0]
+            evidence += self.prior(table, j).log_mean_likelihood(own[0], float(deviations[0]))
+        else:
+            evidence -= 0.5 * np.linalg.slogdet(information)[1]
+            evidence += 0.5 * len(free) * np.log(2.0 * np.pi)
+            for table in tables:
+                mine = [i for i, (owner, _) in enumerate(chosen) if owner is table]
+                evidence += self._log_prior(
+                    table, [chosen[i][1] for i in mine], [own[i] for i in mine], deviations[mine].tolist()
+                )
+        return Score(
+            tuple(tables), tuple(sizes[id(t)] for t in tables), law, residual, scatter, likelihood, float(evidence),
+            jacobian, covariance, free, possible=possible,
+        )  # fmt: skip
+
+    def _log_prior(self, table: Table, components: list[int], sizes: list[float], sds: list[float]) -> float:
+        """Log prior density of an effect's components: the strongest by itself, the others comparable to it."""
+        if not components:
+            return 0.0
+        around = np.array([np.sign(size) * max(abs(size), sd) for size, sd in zip(sizes, sds, strict=True)])
+        changes = np.array([self._rms_alone(table, j, size) for j, size in zip(components, around, strict=True)])
+        first = int(np.argmax(changes))
+        total = self.prior(table, components[first]).log_density_around(sizes[first], sds[first])
+        for k, size in enumerate(around):
+            if k != first:
+                total += log_comparable(changes[k] / changes[first]) - np.log(abs(size))
+        return total
+
+    def _rms_alone(self, table: Table, j: int, size: float) -> float:
+        """Rms change of ln stiffness by one component alone."""
+        unit = np.zeros(len(table.candidate.components))
+        unit[j] = size
+        return float(np.sqrt(np.mean(self.sight.change(table.delta(unit)) ** 2)))
+
+    def _gauss_newton(
+        self,
+        tables: Sequence[Table],
+        chosen: Sequence[tuple[Table, int]],
+        sizes: dict[int, FloatArray],
+        law: FloatArray,
+        inverse: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+        prior = np.zeros((2 + len(chosen), 2 + len(chosen)))
+        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        for _ in range(12):
+            delta = sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
+            compliance = self.compliance(law, delta)
+            residual = self.observed + np.log(compliance)
+            jacobian = np.empty((len(residual), 2 + len(chosen)))
+            jacobian[:, :2] = self.law_jacobian(law, compliance)
+            slopes = {id(t): t.slope(sizes[id(t)]) for t in tables}
+            for i, (table, j) in enumerate(chosen):
+                jacobian[:, 2 + i] = -slopes[id(table)][:, j] / compliance
+            information = jacobian.T @ inverse @ jacobian + prior
+            gradient = jacobian.T @ (inverse @ residual)
+            gradient[:2] -= law / LAW_PRIOR**2
+            scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+            try:
+                step = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(step).all():
+                return None
+            # A step may change no reading by more than half: beyond that the linearisation means nothing.
+            worst = float(np.abs(jacobian @ step).max())
+            step *= min(1.0, 0.5 / max(worst, 1e-12))
+            law = law + step[:2]
+            for i, (table, j) in enumerate(chosen):
+                sizes[id(table)][j] += step[2 + i]
+            if np.abs(step * scale).max() < 1e-4:
+                break
+        delta = sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
+        residual = self.observed + np.log(self.compliance(law, delta))
+        return law, residual, information, jacobian
+
+
+@dataclass(frozen=True)
+class _Scan:
+    """Sizes (g,) in rising order, their log posterior with the law integrated out, laws (g, 2), residuals (g, n)."""
+
+    sizes: FloatArray
+    profile: FloatArray
+    laws: FloatArray
+    residuals: FloatArray
+
+    def merged(self, other: _Scan) -> _Scan:
+        """Both, in order, each size once."""
+        sizes, first = np.unique(np.concatenate([self.sizes, other.sizes]), return_index=True)
+        parts = ((getattr(self, name), getattr(other, name)) for name in ("profile", "laws", "residuals"))
+        return _Scan(sizes, *(np.concatenate(pair)[first] for pair in parts))
+
+    def width(self) -> float:
+        """Standard deviation of the size from the curvature at the peak."""
+        peak = int(np.argmax(self.profile))
+        if not 0 < peak < len(self.sizes) - 1:
+            return 0.1 * abs(float(self.sizes[peak]))
+        x, y = self.sizes[peak - 1 : peak + 2], self.profile[peak - 1 : peak + 2]
+        curvature = 2.0 * ((y[2] - y[1]) / (x[2] - x[1]) - (y[1] - y[0]) / (x[1] - x[0])) / (x[2] - x[0])
+        return float(1.0 / np.sqrt(max(-curvature, 1e-2 / x[1] ** 2)))
+
+
+def _scaled_inverse(matrix: FloatArray) -> FloatArray:
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
+
+
+def _pull_back(chosen: Sequence[tuple[Table, int]], sizes: dict[int, FloatArray]) -> list[tuple[Table, int]]:
+    """Those a little beyond their bounds, put onto them: tables of two effects describe neither exactly."""
+    held = []
+    for table, j in chosen:
+        component, own = table.candidate.components[j], sizes[id(table)]
+        if not component.allows(own[j]) and component.allows(own[j] / (1.0 + BEYOND)):
+            own[j] = np.clip(own[j], *component.bounds)
+            held.append((table, j))
+    return held
+
+
+def _law_terms(laws: FloatArray, information: FloatArray) -> FloatArray:
+    """(g,) log prior of the laws and Laplace's term for integrating them out."""
+    penalty = -0.5 * (laws**2).sum(axis=-1) / LAW_PRIOR**2
+    return np.asarray(penalty - 0.5 * np.linalg.slogdet(information)[1] - 2.0 * np.log(LAW_PRIOR))

@@ -1,0 +1,277 @@
+"""The final fit, with the model itself: strut law and sizes of effects by generalised least squares on ln k.
+
+The searches run on tables of added compliance; what is reported and written to machine files is refined here.
+Everything is dimensionless or scaled: with constants in N/m the gradient would fall below any tolerance at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.inference.candidates import Candidate
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem, Score
+from toolpath_stiff.updating.inference.scatter import Scatter
+
+FloatArray = NDArray[np.float64]
+
+STEPS = 8
+TOLERANCE = 1e-3  # of a standard deviation
+NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Strut law and effects fitted to n readings.
+
+    Attributes
+    ----------
+    candidates, sizes
+        Effects with what they act on; their sizes, one array (p,) each, from the neutral value.
+    free
+        Indices of the free sizes, counted over all candidates; the others are neutral.
+    law
+        (2,) logarithms of the factors on the strut law's stiffnesses; kept at 0 if `law_free` is false.
+    residual
+        (n,) ln measured - ln modelled.
+    jacobian
+        (n, 2 + free) of ln modelled to law and free sizes.
+    covariance
+        (2 + free, 2 + free) of law and free sizes.
+    scatter
+        The noise with the readings that this fit takes for wild.
+    absent
+        Index of a size that is not free -> (where the data would pull it, sd of that), were all sizes free.
+    """
+
+    candidates: tuple[Candidate, ...]
+    sizes: tuple[FloatArray, ...]
+    free: tuple[int, ...]
+    law: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+    covariance: FloatArray
+    scatter: Scatter
+    law_free: bool = True
+    absent: dict[int, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def effects(self) -> tuple[ActiveEffect, ...]:
+        """The effects with their values."""
+        return tuple(c.active(s) for c, s in zip(self.candidates, self.sizes, strict=True))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(c.name for c in self.candidates)
+
+    @property
+    def errors(self) -> FloatArray:
+        """(n,) |modelled - measured| / measured."""
+        return np.abs(np.expm1(-self.residual))
+
+    def deviation(self, index: int) -> float:
+        """Standard deviation of a size (counted over all candidates); 0 if it is not free."""
+        if index not in self.free:
+            return 0.0
+        at = 2 + self.free.index(index)
+        return float(np.sqrt(max(self.covariance[at, at], 0.0)))
+
+    def at_upper_bound(self) -> list[str]:
+        """Parameters whose size has run into its bound: such a fit is no explanation."""
+        found = []
+        for candidate, sizes in zip(self.candidates, self.sizes, strict=True):
+            for component, size in zip(candidate.components, sizes, strict=True):
+                reach = component.reach(float(np.sign(size))) if size else np.inf
+                if np.isfinite(reach) and abs(size) >= 0.999 * reach:
+                    found.append(component.parameter.name)
+        return found
+
+
+def refine(problem: Problem, score: Score, law_free: bool = True) -> Fit:
+    """Gauss-Newton with the model itself from the searches' result, within the bounds."""
+    return fit_effects(problem, score.candidates, score.sizes, score.free, score.law, score.scatter, law_free)
+
+
+def fit_effects(
+    problem: Problem,
+    candidates: Sequence[Candidate],
+    sizes: Sequence[FloatArray],
+    free: Sequence[int],
+    law: FloatArray,
+    scatter: Scatter | None = None,
+    law_free: bool = True,
+) -> Fit:
+    """Fit the free sizes of the candidates and the strut law from a starting point.
+
+    Parameters
+    ----------
+    problem
+        Data and noise.
+    candidates, sizes
+        What to fit, and starting sizes, one array (p,) each.
+    free
+        Indices of the sizes to be fitted, counted over all candidates.
+    law
+        (2,) start of the strut law's logarithms.
+    scatter
+        Noise with wild readings; found at the starting point if not given.
+    law_free
+        Whether the strut law is refitted along.
+    """
+    search = _Search(problem, tuple(candidates), tuple(free), law_free)
+    law = np.array(law, dtype=float) if law_free else np.zeros(2)
+    flat = np.concatenate([np.asarray(s, dtype=float) for s in sizes]) if candidates else np.zeros(0)
+    flat = search.bounded(flat)
+    residual = search.residual(law, flat)
+    if scatter is None:
+        scatter = problem.scatter.with_wild(residual)
+    for _ in range(STEPS):
+        jacobian = search.jacobian(law, flat, residual)
+        information, gradient = _normal_equations(jacobian, residual, law, scatter, law_free)
+        step = search.newton_step(flat, information, gradient)
+        scale = np.sqrt(np.diag(information))
+        law, flat, new = search.step(law, flat, residual, step, scatter)
+        if new is None:
+            break
+        residual = new
+        if np.abs(step * scale).max() < TOLERANCE:
+            break
+    jacobian = search.jacobian(law, flat, residual)
+    information, _ = _normal_equations(jacobian, residual, law, scatter, law_free)
+    return Fit(
+        tuple(candidates),
+        tuple(search.split(flat)),
+        tuple(free),
+        law,
+        residual,
+        jacobian,
+        _scaled_inverse(information),
+        scatter,
+        law_free,
+        _pulls_on_absent(replace(search, free=tuple(range(len(flat)))), law, flat, residual, scatter, tuple(free)),
+    )
+
+
+def _pulls_on_absent(
+    search: _Search, law: FloatArray, flat: FloatArray, residual: FloatArray, scatter: Scatter, free: tuple[int, ...]
+) -> dict[int, tuple[float, float]]:
+    """See `Fit.absent`. `search` has all sizes free."""
+    absent = [index for index in range(len(flat)) if index not in free]
+    if not absent:
+        return {}
+    jacobian = search.jacobian(law, flat, residual)
+    information, gradient = _normal_equations(jacobian, residual, law, scatter, search.law_free)
+    inverse = _scaled_inverse(information)
+    step = inverse @ gradient
+    return {i: (float(flat[i] + step[2 + i]), float(np.sqrt(max(inverse[2 + i, 2 + i], 0.0)))) for i in absent}
+
+
+def _normal_equations(
+    jacobian: FloatArray, residual: FloatArray, law: FloatArray, scatter: Scatter, law_free: bool
+) -> tuple[FloatArray, FloatArray]:
+    weighted = scatter.inverse @ jacobian
+    information = jacobian.T @ weighted
+    gradient = weighted.T @ residual
+    prior = 1.0 / LAW_PRIOR**2 if law_free else 1e12
+    information[:2, :2] += prior * np.eye(2)
+    gradient[:2] -= prior * law
+    return information, gradient
+
+
+def _scaled_inverse(matrix: FloatArray) -> FloatArray:
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
+
+
+def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
+    return np.asarray(_scaled_inverse(information) @ gradient)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The model as a function of law and all sizes in one flat array."""
+
+    problem: Problem
+    candidates: tuple[Candidate, ...]
+    free: tuple[int, ...]
+    law_free: bool
+
+    def split(self, flat: FloatArray) -> list[FloatArray]:
+        counts = np.cumsum([len(c.components) for c in self.candidates])[:-1]
+        return [np.array(part) for part in np.split(flat, counts)] if self.candidates else []
+
+    def residual(self, law: FloatArray, flat: FloatArray) -> FloatArray:
+        effects = [c.active(s) for c, s in zip(self.candidates, self.split(flat), strict=True)]
+        return np.asarray(self.problem.observed - self.problem.predictor.log_stiffness(law, effects))
+
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Smallest and largest of all sizes."""
+        bounds = [component.bounds for c in self.candidates for component in c.components]
+        low, high = np.array(bounds, dtype=float).reshape(-1, 2).T
+        return low, high
+
+    def bounded(self, flat: FloatArray) -> FloatArray:
+        return np.asarray(np.clip(flat, *self.limits()))
+
+    def newton_step(self, flat: FloatArray, information: FloatArray, gradient: FloatArray) -> FloatArray:
+        """Step (2 + free,) of law and free sizes to the least quadratic model within the bounds.
+
+        By bounded-variable least squares (Stark and Parker 1995, Computational Statistics 10, 129) where the plain
+        step would leave them: cutting that off leads uphill where sizes trade off against each other.
+        """
+        step = _solve(information, gradient)
+        low, high = (limit[list(self.free)] - flat[list(self.free)] for limit in self.limits())
+        if ((step[2:] >= low) & (step[2:] <= high)).all():
+            return step
+        from scipy.optimize import lsq_linear
+
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+        kept = values > 1e-12 * values[-1]
+        root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+        target = vectors[:, kept].T @ (gradient / scale) / np.sqrt(values[kept])
+        free_law = np.full(2, np.inf)
+        bounds = (np.concatenate([-free_law, low * scale[2:]]), np.concatenate([free_law, high * scale[2:]]))
+        return np.asarray(lsq_linear(root, target, bounds, method="bvls").x / scale)
+
+    def jacobian(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> FloatArray:
+        columns = []
+        for j in range(2):
+            moved = law.copy()
+            moved[j] += 1e-4
+            columns.append((residual - self.residual(moved, flat)) / 1e-4)
+        components = [component for c in self.candidates for component in c.components]
+        for index in self.free:
+            size = flat[index]
+            step = 1e-4 * max(abs(size), 1e-2 * max(components[index].typical()[0], 1e-30))
+            # Towards zero where a step outwards would leave the bounds.
+            step = -step if size > 0.0 and size + step > components[index].bounds[1] else step
+            moved = flat.copy()
+            moved[index] += step
+            columns.append((residual - self.residual(law, moved)) / step)
+        return np.nan_to_num(np.stack(columns, axis=1))
+
+    def step(
+        self, law: FloatArray, flat: FloatArray, residual: FloatArray, step: FloatArray, scatter: Scatter
+    ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        """The step, halved until the fit gets no worse; None for the residual where nothing helps."""
+
+        def badness(at: FloatArray, logs: FloatArray) -> float:
+            return float(at @ scatter.inverse @ at + (logs @ logs) / LAW_PRIOR**2)
+
+        before = badness(residual, law)
+        for _ in range(10):
+            new_law = law + step[:2] if self.law_free else law
+            moved = flat.copy()
+            moved[list(self.free)] += step[2:]
+            moved = self.bounded(moved)
+            new = self.residual(new_law, moved)
+            if np.isfinite(new).all() and badness(new, new_law) <= before + 1e-9:
+                return new_law, moved, new
+            step = 0.5 * step
+        return law, flat, None

@@ -1,0 +1,212 @@
+"""Two gates: is a model good enough, and is a candidate better than the best of many would be by chance.
+
+Both by parametric bootstrap: readings are simulated from the noise model at the fit, wild ones and the uncertainty of
+the noise itself included, and go through the same linearised refit and the same search for wild readings as the real
+ones. Compared are
+
+- the weighted sum of squares, chi-square's place without its assumptions;
+- structure: the score statistic of each form of discrepancy (locally most powerful for a little of that form; Lin 1997,
+  Variance component testing in generalised linear models with random effects), the largest of all forms;
+- for the base model, the largest gain that any candidate achieves.
+
+The bootstrapped distribution of the smallest p value makes one test of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.noise import Noise
+
+FloatArray = NDArray[np.float64]
+
+DRAWS = 400
+WILD_SQUARED = 11.3  # squared deleted residual beyond which a reading is set aside; pays the price of `scatter`
+MOST_WILD = 0.05
+HOPELESS = 1.3  # times the largest simulated sum of squares
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Outcome of the absolute test of one fit.
+
+    Attributes
+    ----------
+    probability
+        Of a worse look than this if the model were right.
+    squares, simulated
+        Weighted sum of squares, and (DRAWS,) simulated ones.
+    structure_probability, worst
+        Of the structure alone; the form that sticks out most, in words.
+    gain_probability
+        Of the largest gain of any candidate; 1 where it was not asked.
+    gain_threshold
+        Gain that the best of all candidates reaches by chance in one campaign of twenty; 0 where it was not asked.
+    """
+
+    probability: float
+    squares: float
+    simulated: FloatArray
+    squares_probability: float
+    structure_probability: float
+    worst: str
+    gain_probability: float = 1.0
+    gain_threshold: float = 0.0
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Simulated scatter of ln readings, shared by all tests of one data set.
+
+    Attributes
+    ----------
+    draws
+        (DRAWS, n) scatter, each already divided by the error of its noise estimate.
+    """
+
+    draws: FloatArray
+
+    @classmethod
+    def of(cls, noise: Noise, covariance: FloatArray, seed: int, draws: int = DRAWS) -> Simulator:
+        """From a noise model and its covariance (n, n)."""
+        rng = np.random.default_rng(seed)
+        n = len(covariance)
+        rest = covariance - np.diag(noise.repeat**2)
+        values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
+        shared = rng.standard_normal((draws, n)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+        wide = np.where(rng.random((draws, n)) < noise.outliers, noise.outlier_width, 1.0)
+        scatter = shared + noise.repeat * wide * rng.standard_normal((draws, n))
+        if np.isfinite(noise.freedom):
+            scatter = scatter / np.sqrt(rng.chisquare(noise.freedom, draws) / noise.freedom)[:, None]
+        return cls(scatter)
+
+
+def set_wild_aside(pulls: FloatArray, projected: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Pulls P r (s, n) as if the wild readings were not there, and the number of these (s,)."""
+    diagonal = np.maximum(np.diag(projected), 1e-12)
+    squared = pulls**2 / diagonal
+    most = max(1, int(MOST_WILD * pulls.shape[1]))
+    out, count = pulls.copy(), np.zeros(len(pulls))
+    for s in np.flatnonzero((squared > WILD_SQUARED).any(axis=1)):
+        rows = np.flatnonzero(squared[s] > WILD_SQUARED)
+        rows = rows[np.argsort(-squared[s, rows])][:most]
+        block = projected[np.ix_(rows, rows)]
+        out[s] = pulls[s] - projected[:, rows] @ np.linalg.lstsq(block, pulls[s, rows], rcond=None)[0]
+        count[s] = len(rows)
+    return out, count
+
+
+class Structure:
+    """Score statistics of the forms of discrepancy for one fit, as surprises: -ln of a tail probability.
+
+    r^T P K P r is a weighted sum of chi-squares; its tail is that of one scaled chi-square with the same mean and
+    variance (Satterthwaite 1946). The bootstrap corrects what the approximation gets wrong.
+    """
+
+    def __init__(self, forms: dict[str, FloatArray], projected: FloatArray) -> None:
+        self.names = tuple(forms)
+        self.forms = tuple(forms.values())
+        self.means, self.variances = [], []
+        for form in self.forms:
+            product = projected @ form
+            self.means.append(float(np.trace(product)))
+            self.variances.append(float(max(2.0 * (product * product.T).sum(), 1e-300)))
+
+    def surprises(self, pulls: FloatArray) -> FloatArray:
+        """(s, forms) of pulls (s, n)."""
+        columns = []
+        for form, mean, variance in zip(self.forms, self.means, self.variances, strict=True):
+            value = np.einsum("si,si->s", pulls @ form, pulls)
+            columns.append(_surprise(value * 2.0 * mean / variance, 2.0 * mean**2 / variance))
+        return np.stack(columns, axis=1) if columns else np.zeros((len(pulls), 1))
+
+
+def _surprise(value: FloatArray, freedom: float) -> FloatArray:
+    """-ln P(chi-square of `freedom` > value), with the leading term of its asymptote where that underflows."""
+    from scipy.special import gammaincc, gammaln
+
+    half, x = 0.5 * freedom, np.maximum(0.5 * value, 1e-300)
+    tail = gammaincc(half, x)
+    far = x - (half - 1.0) * np.log(x) + gammaln(half)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.where(tail > 1e-290, -np.log(tail), far))
+
+
+def absolute_gate(
+    problem: Problem,
+    residual: FloatArray,
+    jacobian: FloatArray,
+    simulator: Simulator,
+    forms: dict[str, FloatArray],
+    signatures: Sequence[Sequence[FloatArray]] = (),
+    gain: float = 0.0,
+) -> Gate:
+    """Test a fit, its residual (n,) and jacobian (n, 2 + p), against its own noise.
+
+    `signatures`: for the base model, one-sided signatures (n, p) of the candidates, to judge `gain`, the largest
+    twice-log-likelihood gain of any of them.
+    """
+    projected = problem.projected(jacobian)
+    # What the linearised refit leaves of the data is their residual; the law's prior pulls as in the simulation.
+    observed, wild = set_wild_aside((residual @ projected)[None], projected)
+    pulls, count = set_wild_aside(simulator.draws @ projected, projected)
+    squares = _quadratic(problem, pulls) + WILD_SQUARED * count
+    observed_squares = float((_quadratic(problem, observed) + WILD_SQUARED * wild)[0])
+    structure = Structure(forms, projected)
+    seen = structure.surprises(observed)
+    # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
+    hopeless = not signatures and observed_squares > HOPELESS * squares.max()
+    simulated = np.zeros((len(pulls), seen.shape[1])) if hopeless else structure.surprises(pulls)
+    # Rows: the data, then every draw; columns: what may look bad, larger is worse.
+    looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
+    if signatures:
+        looks.append(np.concatenate([[gain], largest_gain(pulls, projected, signatures)]))
+    ranked = np.stack([_tail(look, look[1:]) for look in looks], axis=1)
+    smallest = ranked.min(axis=1)
+    probability = float(max((smallest[1:] <= smallest[0] + 1e-12).mean(), 0.5 / len(pulls)))
+    worst = structure.names[int(np.argmax(seen[0]))] if structure.names else ""
+    return Gate(
+        probability,
+        observed_squares,
+        np.asarray(squares),
+        float(ranked[0, 0]),
+        float(ranked[0, 1]),
+        worst,
+        float(ranked[0, 2]) if signatures else 1.0,
+        float(np.quantile(looks[2][1:], 0.95)) if signatures else 0.0,
+    )
+
+
+def _quadratic(problem: Problem, pulls: FloatArray) -> FloatArray:
+    """(s,) r^T P r from the pulls P r: P V P = P but for the law's prior, which is next to nothing."""
+    covariance = problem.covariance
+    return np.asarray(np.einsum("si,si->s", pulls @ covariance, pulls))
+
+
+def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:
+    """(s,) share of the simulated values at or above each value; half of one where none is."""
+    ordered = np.sort(simulated)
+    count = len(ordered) - np.searchsorted(ordered, values - 1e-12 * np.abs(values))
+    return np.asarray(np.maximum(count, 0.5) / len(ordered))
+
+
+def largest_gain(pulls: FloatArray, projected: FloatArray, signatures: Sequence[Sequence[FloatArray]]) -> FloatArray:
+    """(s,) largest likelihood-ratio gain over candidates; each a list of matrices (n, p) with sizes >= 0."""
+    best = np.zeros(len(pulls))
+    for subsets in signatures:
+        for columns in subsets:
+            slope = pulls @ columns
+            information = columns.T @ projected @ columns
+            scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+            try:
+                sizes = np.linalg.solve(information / np.outer(scale, scale), (slope / scale).T).T
+            except np.linalg.LinAlgError:
+                continue
+            gain = np.einsum("sp,sp->s", sizes, slope / scale)
+            best = np.maximum(best, np.where((sizes > 0.0).all(axis=1), gain, 0.0))
+    return best

@@ -1,0 +1,229 @@
+"""What the model says each reading should show, and how that hangs on strut law, struts and joints.
+
+Everything is on the logarithm of stiffness: effects are factors of a few to thirty per cent, and so is the noise. The
+strut law enters as the logarithms of the factors on its two stiffnesses, `law`, which are dimensionless: a
+least-squares fit of constants in N/m would stop at once, its gradient being tiny.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.effects.contract import LoadPath
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model
+from toolpath_stiff.updating.readings.measurements import Measurements, measured_path
+
+FloatArray = NDArray[np.float64]
+
+NO_CHANGE = (0.0, 0.0)  # of the strut law
+JOINT_STEP = 0.5e-3  # m, for differences: the size of the joint errors that the columns are used for
+
+
+def scaled_law(law: StrutLaw, logs: ArrayLike) -> StrutLaw:
+    """The strut law with its two stiffnesses multiplied by exp(logs)."""
+    first, second = np.exp(np.asarray(logs, dtype=float)).tolist()
+    return replace(law, stiffness_1=law.stiffness_1 * first, stiffness_2=law.stiffness_2 * second)
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """Rows without those that are mechanically the same, what effects see of them, the strut forces per unit load."""
+
+    data: Measurements
+    which: NDArray[np.int64]
+    path: LoadPath
+    forces: FloatArray
+
+
+class Predictor:
+    """The model's answer to a set of measurements, for any strut law and any effects.
+
+    Parameters
+    ----------
+    machine
+        The machine with the effects of its file.
+    data
+        n readings.
+    effect_files
+        A user's own effects.
+
+    Raises
+    ------
+    InputError
+        The machine's effects are wrong, or the strut law leaves a strut no stiffness at a measured pose.
+    """
+
+    def __init__(self, machine: Machine, data: Measurements, effect_files: Sequence[str | Path] = ()) -> None:
+        self.machine = machine
+        self.data = data
+        self.effect_files = tuple(effect_files)
+        self.base = build_model(machine, self.effect_files)
+        self._timeless = _prepare(self.base, data, timed=False)
+        self._timed = _prepare(self.base, data, timed=True)
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
+        """(n,) ln(N/m) that the readings should show; nan where the model has no answer.
+
+        `effects` come on top of those of the machine file; instruments among them change the readings only.
+        """
+        machine = self.machine.with_changes(strut_law=scaled_law(self.machine.strut_law, law))
+        model = build_model(machine, self.effect_files, effects)
+        prepared = self._timed if any("time_min" in a.effect.needs for a in model.effects) else self._timeless
+        try:
+            stiffness = self._mechanics(model, prepared)[prepared.which]
+        except InputError:  # no pose, or no stiffness left: a fit walks away from there
+            return np.full(len(self), np.nan)
+        if model.instruments:
+            path = replace(self._full_path(), machine=model.machine)
+            for active in model.instruments:
+                stiffness = active.effect.reading(stiffness, path, active.values)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.where(stiffness > 0.0, np.log(stiffness), np.nan))
+
+    def _mechanics(self, model: StiffnessModel, prepared: _Prepared) -> FloatArray:
+        """(m,) N/m at the distinct rows."""
+        same_geometry = (
+            model.machine.platform_joints is self.base.machine.platform_joints
+            and model.machine.frame_joints is self.base.machine.frame_joints
+        )
+        path = replace(prepared.path, machine=model.machine) if same_geometry else measured_path(model, prepared.data)
+        return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction))
+
+    def _full_path(self) -> LoadPath:
+        """What instruments see of every row."""
+        prepared = self._timeless
+        path = measured_path_rows(prepared.path, prepared.which)
+        missing = self.data.missing
+        return replace(
+            path,
+            time=None if "time_min" in missing else self.data.time,
+            temperature=None if "temperature_C" in missing else self.data.temperature,
+        )
+
+    def strut_lengths(self) -> FloatArray:
+        """(n, 6) m."""
+        return np.asarray(self._timeless.path.struts.lengths[self._timeless.which])
+
+    def strut_forces(self) -> FloatArray:
+        """(n, 6) force in each strut per unit load, tension positive."""
+        return np.asarray(self._timeless.forces[self._timeless.which])
+
+    def strut_columns(self) -> FloatArray:
+        """(n, 6) d ln k / d ln(stiffness of strut i) at the machine file's strut law: its share of the compliance."""
+        prepared = self._timeless
+        compliance = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
+        share = prepared.forces**2 * compliance * np.exp(self._base_log())[prepared_first(prepared)][:, None]
+        return np.asarray(share[prepared.which])
+
+    def law_columns(self, log_stiffness: FloatArray, law: ArrayLike = NO_CHANGE) -> FloatArray:
+        """(n, 2) d ln k / d law where the model says `log_stiffness` (n,).
+
+        The struts' forces are those of equilibrium, so this is exact unless a stiffness parallel to the struts
+        shares the load or the geometry differs; good enough there for a Gauss-Newton step.
+        """
+        prepared = self._timeless
+        rule = scaled_law(self.machine.strut_law, law)
+        lengths = prepared.path.struts.lengths
+        second = (lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        stiffness = rule.stiffness(lengths)
+        energy = prepared.forces**2 / stiffness**2
+        columns = [
+            (energy * rule.stiffness_1 * (1.0 - second)).sum(axis=1),
+            (energy * rule.stiffness_2 * second).sum(axis=1),
+        ]
+        return np.asarray(np.stack(columns, axis=1)[prepared.which] * np.exp(log_stiffness)[:, None])
+
+    def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
+        """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
+        prepared = self._timeless
+        logs = np.asarray(law, dtype=float)
+        rule = self.machine.strut_law
+        second = (prepared.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        first_term = rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * (1.0 - second)
+        stiffness = first_term + rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second
+        return np.asarray((prepared.forces**2 / stiffness).sum(axis=-1)[..., prepared.which])
+
+    def strut_slopes(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
+        """(..., n, 2) derivatives of `strut_part` to the law's logarithms."""
+        prepared = self._timeless
+        logs = np.asarray(law, dtype=float)
+        rule = self.machine.strut_law
+        second = (prepared.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        terms = [
+            rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * (1.0 - second),
+            rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second,
+        ]
+        energy = prepared.forces**2 / (terms[0] + terms[1]) ** 2
+        slopes = [-(energy * term).sum(axis=-1)[..., prepared.which] for term in terms]
+        return np.stack(slopes, axis=-1)
+
+    def joint_columns(self) -> FloatArray:
+        """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
+
+        The platform stands where struts of the commanded lengths put the true joints.
+        """
+        base, columns = self._base_log(), []
+        for name in ("frame_joints", "platform_joints"):
+            for strut in range(6):
+                for axis in range(3):
+                    joints = np.array(getattr(self.base.machine, name))
+                    joints[strut, axis] += JOINT_STEP
+                    true = self.base.machine.with_changes(**{name: joints})
+                    moved = replace(self.base, machine=true, control=self.base.control or self.base.machine)
+                    prepared = self._timeless
+                    path = measured_path(moved, prepared.data)
+                    stiffness = 1.0 / exact.compliance_along(moved, path, prepared.data.direction)
+                    columns.append((np.log(stiffness)[prepared.which] - base) / JOINT_STEP)
+        return np.stack(columns, axis=1)
+
+    def _base_log(self) -> FloatArray:
+        """(n,) ln k of the machine file's model, before instruments."""
+        prepared = self._timeless
+        return np.asarray(np.log(self._mechanics(self.base, prepared))[prepared.which])
+
+
+def prepared_first(prepared: _Prepared) -> NDArray[np.int64]:
+    """Index of one row for each distinct row."""
+    first = np.zeros(len(prepared.data), dtype=np.int64)
+    first[prepared.which[::-1]] = np.arange(len(prepared.which))[::-1]
+    return first
+
+
+def measured_path_rows(path: LoadPath, rows: NDArray[np.int64]) -> LoadPath:
+    """The load path of some rows, repeated as the index says."""
+    struts = replace(path.struts, **{k: getattr(path.struts, k)[rows] for k in _array_fields(path.struts)})
+    chosen: dict[str, Any] = {k: getattr(path, k)[rows] for k in _array_fields(path)}
+    return replace(path, struts=struts, **chosen)
+
+
+def _array_fields(thing: object) -> list[str]:
+    return [name for name, value in vars(thing).items() if isinstance(value, np.ndarray)]
+
+
+def _prepare(model: StiffnessModel, data: Measurements, timed: bool) -> _Prepared:
+    """Rows that differ in nothing that mechanics sees are solved once: repeats cost nothing."""
+    setups = np.unique(data.setup, return_inverse=True)[1].astype(float)
+    columns = [data.position, data.angles, data.direction, data.force[:, None], data.tool_extension[:, None]]
+    columns += [setups[:, None], np.nan_to_num(data.temperature, nan=-1e3)[:, None]]
+    if timed:
+        columns.append(np.nan_to_num(data.time, nan=-1.0)[:, None])
+    keys = np.concatenate(columns, axis=1)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    distinct = data.select(first)
+    path = measured_path(model, distinct)
+    wrenches = np.zeros((len(distinct), 6, 1))
+    wrenches[:, :3, 0] = distinct.direction
+    _, forces = exact.respond(path, exact.assemble_links(model, path), wrenches)
+    return _Prepared(distinct, which.reshape(-1).astype(np.int64), path, forces[..., 0])

@@ -1,0 +1,146 @@
+"""The rivals that a plan is to tell apart: as a diagnosis left them, as the user names them, or before any data."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.effects.contract import Effect
+from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.inference.candidates import Component
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
+from toolpath_stiff.updating.inference.fit import Fit, fit_effects, refine
+from toolpath_stiff.updating.inference.ranking import score_family
+from toolpath_stiff.updating.inference.verdict import NONE, Judgement
+from toolpath_stiff.updating.planning.plan_rivals import Rival
+
+LEAST_WEIGHT = 0.02  # probability below which an explanation is no rival
+UNKNOWN_SIZE = 0.5  # relative sd of a size that nothing has been measured of; assumed
+
+
+def rival_of_fit(name: str, fit: Fit, weight: float = 1.0) -> Rival:
+    """A rival as fitted to the data so far."""
+    return Rival(name, fit.law, fit.effects, fit.covariance, fit.free, weight)
+
+
+def rivals_of(judgement: Judgement) -> list[Rival]:
+    """The explanations that a diagnosis leaves standing, with their probabilities.
+
+    Where it leaves one or none standing, the most likely others beside it, at `LEAST_WEIGHT`: what a plan would
+    confirm the answer against.
+    """
+    found = []
+    for name, weight in sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0])):
+        fit = _fit_of(judgement, name) if weight >= LEAST_WEIGHT or name in judgement.explanations else None
+        if fit is not None:
+            found.append(rival_of_fit(name, fit, max(weight, LEAST_WEIGHT)))
+    for name in (NONE, *(family.name for family in judgement.families)):
+        if len(found) >= 2:
+            break
+        fit = _fit_of(judgement, name)
+        if fit is not None and name not in {rival.name for rival in found}:
+            found.append(rival_of_fit(name, fit, LEAST_WEIGHT))
+    return found
+
+
+def _fit_of(judgement: Judgement, name: str) -> Fit | None:
+    """The final fit of a hypothesis; None if there is none to be had."""
+    if name == NONE:
+        return fit_effects(judgement.problem, (), (), (), judgement.base.law)
+    if name in judgement.fits:
+        return judgement.fits[name]
+    best = next((family.best for family in judgement.families if family.name == name), None)
+    return None if best is None else refine(judgement.problem, best)
+
+
+def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, Effect]) -> list[Rival]:
+    """Effects by name, or `none`, fitted to the data, all of the same weight.
+
+    Raises
+    ------
+    InputError
+        An effect that does not exist, that the data lack a column for, or that the data leave at nothing.
+    """
+    _check(names, effects)
+    base = problem.score_base()
+    found = []
+    lacking = problem.predictor.data.cannot_test(effects[name] for name in names if name != NONE)
+    for name in names:
+        if name == NONE:
+            found.append(rival_of_fit(NONE, fit_effects(problem, (), (), (), base.law)))
+            continue
+        if name in lacking:
+            raise InputError(
+                f"the data cannot be fitted with {name}: column {lacking[name][0]} is missing",
+                hint="plan without data: leave the files out",
+            )
+        family = score_family(problem, effects[name], base)
+        if family is None or family.best is None:
+            raise InputError(
+                f"fitted to these data, {name} comes out at nothing: it is no other explanation than {NONE}",
+                hint="plan without data (leave the files out) for the size that it usually has",
+            )
+        found.append(rival_of_fit(name, refine(problem, family.best)))
+    return found
+
+
+def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: str = "") -> list[Rival]:
+    """Effects by name, or `none`, at their usual sizes, before any data; `setup` is what a set-up's own effect is of.
+
+    The size is the middle of the usual range on a logarithmic scale and known within `UNKNOWN_SIZE` of it; the strut
+    law within `LAW_PRIOR`.
+
+    Raises
+    ------
+    InputError
+        An effect that does not exist.
+    """
+    _check(names, effects)
+    found = []
+    for name in names:
+        if name == NONE:
+            found.append(Rival(NONE, (0.0, 0.0), (), np.diag([LAW_PRIOR**2] * 2)))
+            continue
+        effect = effects[name]
+        sizes = [usual_size(Component.of(p)) for p in effect.parameters if not p.discrete]
+        values: dict[str, Any] = {}
+        discrete = sum(parameter.discrete for parameter in effect.parameters)
+        for parameter in effect.parameters:
+            if parameter.kind == "real":
+                component = Component.of(parameter)
+                values[parameter.name] = component.value(usual_size(component))
+            elif parameter.kind == "integer":  # 0 means all: with other choices beside it that is no effect at all
+                values[parameter.name] = max(int(parameter.bounds[0]), int(discrete > 1))
+            else:
+                values[parameter.name] = setup if discrete == 1 else ""
+        covariance = np.diag([LAW_PRIOR**2] * 2 + [(UNKNOWN_SIZE * size) ** 2 for size in sizes])
+        found.append(Rival(name, (0.0, 0.0), (ActiveEffect(effect, values),), covariance))
+    return found
+
+
+def usual_size(component: Component) -> float:
+    """The middle of the usual sizes on a logarithmic scale, a fifth of the largest where the usual range holds 0."""
+    low, high = component.typical()
+    sign = component.signs[-1]
+    if not np.isfinite(high):
+        high = component.reach(sign)
+    if low <= 0.0:
+        low = 0.04 * high
+    return sign * float(np.sqrt(low * high))
+
+
+def _check(names: Sequence[str], effects: Mapping[str, Effect]) -> None:
+    if len(set(names)) != len(names) or len(names) < 2:
+        raise InputError(f"--between {','.join(names)}", expected="two or more different effects, or none")
+    for name in names:
+        if name != NONE and name not in effects:
+            near = difflib.get_close_matches(name, [*effects, NONE], n=1)
+            raise InputError(
+                f"unknown effect {name!r}",
+                expected=f"{NONE}, {', '.join(effects)}",
+                hint=f"did you mean {near[0]}?" if near else "",
+            )

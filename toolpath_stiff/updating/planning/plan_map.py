@@ -1,0 +1,127 @@
+"""How far two rivals would be apart at each place of the workspace: one visit there, X, Y and Z."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.updating.planning.plan import Plan, matters
+from toolpath_stiff.updating.planning.plan_menu import (
+    AXES,
+    READING_EVERY,
+    ROUND,
+    Menu,
+    Visits,
+    planned_readings,
+    reachable,
+)
+from toolpath_stiff.updating.planning.plan_rivals import ReadingNoise, forecast_all, pair_shares
+
+FloatArray = NDArray[np.float64]
+
+ACROSS = 11  # points of the grid a side
+TILTS = 6  # directions of tilt
+MOST_LEVELS = 3
+
+
+@dataclass(frozen=True)
+class GapMap:
+    """Gap in standard deviations of one visit, reference tool, the best of the set-ups.
+
+    Attributes
+    ----------
+    pair
+        Names of the two rivals.
+    x, y, levels
+        (g,) m, (g,) m, (h,) m.
+    vertical, tilted
+        (h, g, g) with y before x; with the spindle vertical, and tilted as far as planned in the best of six
+        directions; nan where the machine does not reach.
+    max_tilt
+        rad.
+    """
+
+    pair: tuple[str, str]
+    x: FloatArray
+    y: FloatArray
+    levels: FloatArray
+    vertical: FloatArray
+    tilted: FloatArray
+    max_tilt: float
+
+
+def top_pair(plan: Plan) -> tuple[str, str]:
+    """The two most probable rivals that can be told apart; if none can, the two most probable."""
+    weights = {rival.name: rival.weight for rival in plan.rivals}
+    best = max(plan.pairs, key=lambda pair: (pair.separable, weights[pair.first] * weights[pair.second]))
+    return best.first, best.second
+
+
+def levels_of(plan: Plan) -> FloatArray:
+    """Heights (h,) m that the plan visits most, at most `MOST_LEVELS`, rising."""
+    z = np.round(plan.visits.pose[list(plan.chosen), 2], 4)
+    levels, counts = np.unique(z, return_counts=True)
+    return np.sort(levels[np.argsort(-counts, kind="stable")[:MOST_LEVELS]])
+
+
+def gap_map(machine: Machine, plan: Plan, menu: Menu, effect_files: Sequence[str | Path] = ()) -> GapMap:
+    """Gaps of the plan's top pair over the menu's radius at the heights that the plan visits most."""
+    names = top_pair(plan)
+    rivals = [next(rival for rival in plan.rivals if rival.name == name) for name in names]
+    side = np.linspace(-menu.radius, menu.radius, ACROSS)
+    levels = levels_of(plan)
+    turns = np.linspace(0.0, 2.0 * np.pi, TILTS, endpoint=False)
+    tilts = np.stack([menu.max_tilt * np.cos(turns), menu.max_tilt * np.sin(turns)], axis=1)
+    angles = np.concatenate([np.zeros((1, 2)), tilts])
+    poses = np.array([[x, y, z, a, b, 0.0] for a, b in angles for z, y, x in product(levels, side, side)])
+    good = np.flatnonzero(reachable(machine, poses, 0.0, margin=0.0))
+    found = matters(rivals)
+    setups = menu.setups if found.setup else menu.setups[:1]
+    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads)))) if found.load else (menu.usual_load,)
+    gaps = np.full((len(setups), len(poses)), np.nan)
+    if len(good):
+        visits = _visits(poses[good], setups, loads, menu)
+        forecasts, answered, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
+        share = pair_shares(visits, forecasts[0], forecasts[1], ReadingNoise(*plan.noise, scatter))
+        usable = np.logical_and.reduceat(answered, visits.starts)
+        gaps[:, good] = np.where(usable, share.gaps_with(()), np.nan).reshape(len(setups), -1)
+    for k, setup in enumerate(setups):
+        gaps[k, poses[:, 2] < menu.floors.get(setup, -np.inf) - ROUND] = np.nan
+    best = np.fmax.reduce(gaps, axis=0).reshape(len(angles), len(levels), ACROSS, ACROSS)
+    return GapMap(names, side, side, levels, best[0], np.fmax.reduce(best[1:], axis=0), menu.max_tilt)
+
+
+def _visits(poses: FloatArray, setups: Sequence[str], loads: Sequence[float], menu: Menu) -> Visits:
+    """One visit to each pose in each set-up."""
+    jobs = list(product(AXES, loads))
+    count, v = len(jobs), len(poses) * len(setups)
+    pose, setup = np.tile(poses, (len(setups), 1)), np.repeat(np.array(setups, dtype=str), len(poses))
+    names = np.tile([name for name, _ in jobs], v)
+    time = max(menu.waits) + READING_EVERY * np.arange(1.0, count + 1.0)
+    readings = planned_readings(
+        np.repeat(pose, count, axis=0),
+        names,
+        np.tile([load for _, load in jobs], v),
+        np.zeros(v * count),
+        np.repeat(setup, count),
+        np.tile(time if menu.timed else np.full(count, np.nan), v),
+    )
+    members = np.arange(v * count)
+    return Visits(
+        pose,
+        np.zeros(v),
+        np.zeros(v),
+        setup,
+        np.full(v, ""),
+        readings,
+        names,
+        np.ones(v * count, dtype=np.int64),
+        members,
+        members[::count].copy(),
+    )

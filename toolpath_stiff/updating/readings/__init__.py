@@ -1,0 +1,1 @@
+"""Measured stiffnesses: files, rows, raw records of force and displacement."""

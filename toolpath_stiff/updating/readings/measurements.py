@@ -1,0 +1,340 @@
+"""Measured stiffnesses as columns, SI, with what the model says to each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.files import read_text
+from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
+from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath
+from toolpath_stiff.stiffness.model import StiffnessModel, load_path
+from toolpath_stiff.updating.readings.measurement_rows import LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
+
+FloatArray = NDArray[np.float64]
+TextArray = NDArray[np.str_]
+
+NIST_TABLE_1 = "nist-table1"
+RISER_ABOVE = 1.0  # m: of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
+SINGULAR = 1e-6  # singularity index: the tip would be a million times softer than at the neutral pose
+# Section of the machine file -> the word in its limits' names.
+LIMIT_WORDS = {
+    "limits.strut_length": "length",
+    "limits.joint_angle": "angle",
+    "limits.workspace": "workspace",
+    "limits.singularity": "singularity",
+}
+NAMED = 5  # so many poses are named in a warning
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """n measured stiffnesses. SI; nan or "" where a reading does not say.
+
+    Attributes
+    ----------
+    position
+        (n, 3) m, programmed tool tip.
+    angles
+        (n, 3) rad, roll, pitch, yaw.
+    direction
+        (n, 3) unit vectors of force and displacement.
+    stiffness
+        (n,) N/m; nan where a plan leaves it empty.
+    force
+        (n,) N, `DEFAULT_FORCE` where not given.
+    sd
+        (n,) N/m, total standard deviation of one reading.
+    tool_extension
+        (n,) m, longer than the machine's reference tool.
+    time, temperature
+        (n,) s since the indicator was zeroed; degrees C.
+    setup, loop, repeat
+        (n,) as in the file.
+    point
+        (n,) label of the point: as given, else one label a pose.
+    clamp
+        (n,) label of the clamping, whose rows move together: file and clamp as given, else point and set-up.
+    file, line
+        (n,) where each was read.
+    extra
+        Further numeric columns -> (n,).
+    missing
+        Optional columns that are absent, or empty in some row, so that nothing can be told from them.
+    notes, warnings
+        What was assumed or not used; what is doubtful. For the report.
+    """
+
+    position: FloatArray
+    angles: FloatArray
+    direction: FloatArray
+    stiffness: FloatArray
+    force: FloatArray
+    sd: FloatArray
+    tool_extension: FloatArray
+    time: FloatArray
+    temperature: FloatArray
+    setup: TextArray
+    loop: TextArray
+    repeat: TextArray
+    point: TextArray
+    clamp: TextArray
+    file: TextArray
+    line: NDArray[np.int64]
+    extra: Mapping[str, FloatArray]
+    missing: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @property
+    def rotation(self) -> FloatArray:
+        """(n, 3, 3) orientation of the platform."""
+        return rotation_matrices(self.angles)
+
+    def select(self, rows: NDArray[Any]) -> Measurements:
+        """Some of the rows, by mask or index."""
+        chosen = {
+            f.name: getattr(self, f.name)[rows] for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)
+        }
+        extra = {name: values[rows] for name, values in self.extra.items()}
+        return replace(self, **chosen, extra=extra)
+
+    def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
+        """Effects that these data cannot test -> the columns that they lack."""
+        lacking = {effect.name: tuple(c for c in effect.needs if c in self.missing) for effect in effects}
+        return {name: columns for name, columns in lacking.items() if columns}
+
+
+def read_measurements(
+    paths: str | Path | Iterable[str | Path], machine: Machine, planned: bool = False
+) -> Measurements:
+    """Read measurement files.
+
+    Parameters
+    ----------
+    paths
+        One or several CSV files; `nist-table1` is the paper's Table 1.
+    machine
+        The machine that was measured; its poses are checked against it.
+    planned
+        Whether the stiffness may be left empty.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, or has not the right columns.
+    InputErrors
+        Bad rows, all of them; poses that are singular or beyond what the machine can be.
+    """
+    names = [paths] if isinstance(paths, str | Path) else list(paths)
+    if not names:
+        raise InputError("no measurements", expected="a CSV file, or nist-table1")
+    seen: set[str] = set()
+    files = []
+    for name in map(str, names):
+        if name in seen:
+            raise InputError(f"{name!r} is given twice", hint="name it once")
+        seen.add(name)
+        files.append(_read_file(name, planned))
+    errors: list[InputError] = []
+    for parsed in files:
+        if isinstance(parsed, InputErrors):
+            errors += parsed.errors
+    good = [parsed for parsed in files if isinstance(parsed, RowFile)]
+    errors = errors or duplicates([row for parsed in good for row in parsed.rows], across_files=True)
+    if errors:
+        raise InputErrors(errors)
+    return _checked(_columns(good), machine)
+
+
+def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
+    """One file; its bad rows are handed back, so that those of all files are reported together."""
+    if name == NIST_TABLE_1:
+        text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
+        table = read_rows(text, NIST_TABLE_1)
+        rows = tuple(
+            replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
+            for row in table.rows
+        )
+        note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
+        return RowFile(rows, table.columns | {"setup"}, (*table.notes, note))
+    try:
+        return read_rows(read_text(name, "measurements"), name, planned)
+    except InputErrors as bad:
+        return bad
+
+
+def _columns(files: list[RowFile]) -> Measurements:
+    rows = [row for file in files for row in file.rows]
+    n = len(rows)
+
+    def numbers(name: str) -> FloatArray:
+        return np.array([getattr(row, name) for row in rows], dtype=float)
+
+    def texts(name: str) -> TextArray:
+        return np.array([row.labels[name] for row in rows], dtype=str)
+
+    force, time, temperature = numbers("force"), numbers("time"), numbers("temperature")
+    extension = numbers("tool_extension")
+    given = {
+        "force_N": ~np.isnan(force),
+        "sd_N_per_mm": ~np.isnan(numbers("sd")),
+        "time_min": ~np.isnan(time),
+        "tool_extension_mm": ~np.isnan(extension),
+        "temperature_C": ~np.isnan(temperature),
+        **{name: texts(name) != "" for name in LABELS},
+    }
+    notes = [note for file in files for note in file.notes]
+    if not given["force_N"].all():
+        lacking = n - int(given["force_N"].sum())
+        notes.append(f"{lacking} of {n} readings do not say at which force: {DEFAULT_FORCE:g} N assumed")
+    for name, there in given.items():
+        if name not in ("force_N", "setup", "loop") and there.any() and not there.all():
+            notes.append(f"column {name} is empty in {n - int(there.sum())} of {n} readings: treated as absent there")
+    setup, point = texts("setup"), _points(rows, texts("point"))
+    common = set.intersection(*(set(row.extra) for row in rows))
+    dropped = sorted({name for row in rows for name in row.extra} - common)
+    notes += [f"column {name} is not in every file and is not used" for name in dropped]
+    return Measurements(
+        position=numbers("position"),
+        angles=numbers("angles"),
+        direction=numbers("direction"),
+        stiffness=numbers("stiffness"),
+        force=np.where(given["force_N"], force, DEFAULT_FORCE),
+        sd=numbers("sd"),
+        tool_extension=np.where(given["tool_extension_mm"], extension, 0.0),
+        time=time,
+        temperature=temperature,
+        setup=setup,
+        loop=texts("loop"),
+        repeat=texts("repeat"),
+        point=point,
+        clamp=_clampings(rows, point, setup),
+        file=np.array([row.file for row in rows], dtype=str),
+        line=np.array([row.line for row in rows], dtype=np.int64),
+        extra={name: np.array([row.extra[name] for row in rows]) for name in sorted(common)},
+        # Set-ups and loops may go without a name; of the other columns every reading must have its own.
+        missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
+        notes=tuple(notes),
+    )
+
+
+def _points(rows: list[Row], labels: TextArray) -> TextArray:
+    """Labels of the points; readings without one share a label if they share the pose (to 1 um and 1e-6 rad)."""
+    poses: dict[tuple[float, ...], str] = {}
+    taken = set(labels.tolist())
+    found = []
+    for row, label in zip(rows, labels, strict=True):
+        pose = tuple(round(value, 6) + 0.0 for value in (*row.position, *row.angles))
+        if not label and pose not in poses:
+            number = len(poses) + 1
+            while f"P{number}" in taken:
+                number += 1
+            poses[pose] = f"P{number}"
+            taken.add(f"P{number}")
+        found.append(label or poses[pose])
+    return np.array(found, dtype=str)
+
+
+def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray:
+    """Labels of the clampings. Numbers start anew in every file; without a number, a point in a set-up is one."""
+    return np.array(
+        [
+            f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else f"point {p}, set-up {s}"
+            for row, p, s in zip(rows, point, setup, strict=True)
+        ],
+        dtype=str,
+    )
+
+
+def _checked(data: Measurements, machine: Machine) -> Measurements:
+    """The same with warnings about poses beyond limits; singular and impossible poses are errors."""
+    rotation = data.rotation
+    struts = solve_struts(machine, data.position, rotation, data.tool_extension + machine.reference_tool_length)
+    index = singularity_index(machine, struts)
+    stiffness = machine.strut_law.stiffness(struts.lengths)
+    errors = []
+    for i in range(len(data)):
+        where = f"pose {_shown(data, i)}"
+        if not index[i] >= SINGULAR:
+            found = f"{where} is singular: the struts cannot hold the platform"
+        elif stiffness[i].min() <= 0.0:
+            found = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
+        else:
+            continue
+        errors.append(InputError(found, hint="check the pose's unit", file=data.file[i], line=int(data.line[i])))
+    if errors:
+        raise InputErrors(errors)
+    stand = reach(machine, data.position, struts, rotation)
+    beyond: dict[str, list[int]] = {}
+    for row in np.flatnonzero(~stand.reachable).tolist():
+        beyond.setdefault(stand.limits[int(stand.limit[row])].name, []).append(row)
+    warnings = []
+    for name, those in beyond.items():
+        poses = list(dict.fromkeys(_shown(data, i) for i in those))
+        more = f" and {len(poses) - NAMED} more" if len(poses) > NAMED else ""
+        warnings.append(
+            f"measured beyond a limit of the machine file ({name}, {_origin(machine, name)}): "
+            f"{'; '.join(poses[:NAMED])}{more}. {stand.describe(those[0])}"
+        )
+    return replace(data, warnings=(*data.warnings, *warnings))
+
+
+def _origin(machine: Machine, limit: str) -> str:
+    """Where a limit comes from."""
+    quantity = next((q for q, word in LIMIT_WORDS.items() if word in limit), "")
+    return machine.origins.get(quantity, "origin not stated")
+
+
+def _shown(data: Measurements, i: int) -> str:
+    mm = ", ".join(f"{value * 1e3:g}" for value in data.position[i])
+    degrees = np.degrees(data.angles[i])
+    return f"({mm}) mm" + (f" at ({', '.join(f'{d:.4g}' for d in degrees)}) deg" if degrees.any() else "")
+
+
+def measured_path(model: StiffnessModel, data: Measurements) -> LoadPath:
+    """What the model's effects see of the measurements; a column that is missing is None there."""
+
+    def unless_missing(name: str, values: Any) -> Any:
+        return None if name in data.missing else values
+
+    return load_path(
+        model,
+        data.position,
+        data.rotation,
+        data.tool_extension + model.machine.reference_tool_length,
+        data.force,
+        setup=unless_missing("setup", data.setup),
+        time=unless_missing("time_min", data.time),
+        temperature=unless_missing("temperature_C", data.temperature),
+        direction=data.direction,
+    )
+
+
+def model_stiffness(model: StiffnessModel, data: Measurements) -> FloatArray:
+    """(n,) N/m that the model, its instruments included, says each reading should show.
+
+    Raises
+    ------
+    InputError
+        The strut law leaves a strut no stiffness at a measured pose.
+    """
+    path = measured_path(model, data)
+    stiffness = 1.0 / exact.compliance_along(model, path, data.direction)
+    for active in model.instruments:
+        stiffness = active.effect.reading(stiffness, path, active.values)
+    return np.asarray(stiffness)

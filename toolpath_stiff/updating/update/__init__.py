@@ -1,0 +1,1 @@
+"""The missing effect added: fitted, judged, written to a machine file with its origin."""

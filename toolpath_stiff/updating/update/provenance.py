@@ -1,0 +1,105 @@
+"""A fit as a machine: the fitted values, how well they are known, and where they come from."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty
+from toolpath_stiff.updating.inference.fit import Fit
+from toolpath_stiff.updating.inference.predict import scaled_law
+from toolpath_stiff.updating.readings.measurements import NIST_TABLE_1
+
+FloatArray = NDArray[np.float64]
+
+
+def data_hash(files: Sequence[str]) -> str:
+    """SHA-256 of the measurement files' bytes, one after the other."""
+    found = hashlib.sha256()
+    for file in files:
+        found.update(_bytes(file))
+    return found.hexdigest()
+
+
+def _bytes(file: str) -> bytes:
+    if file == NIST_TABLE_1:
+        return (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_bytes()
+    try:
+        return Path(file).read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {file!r}: {error.strerror}") from None
+
+
+def fitted_machine(machine: Machine, fit: Fit, provenance: Mapping[str, Any], widened: float = 1.0) -> Machine:
+    """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
+
+    Parameters
+    ----------
+    machine
+        What was fitted.
+    fit
+        Effects on top of the machine's own, and the strut law if that was free.
+    provenance
+        Keys and values for machine files, the same for every entry.
+    widened
+        Factor on the standard deviations.
+    """
+    effects, instruments = list(machine.effects), list(machine.instruments)
+    for candidate, active in zip(fit.candidates, fit.effects, strict=True):
+        values = {p.key: _in_file(p, active.values[p.name]) for p in candidate.effect.parameters}
+        entry = EffectEntry(candidate.name, values, dict(provenance))
+        (instruments if candidate.effect.is_instrument else effects).append(entry)
+    changes: dict[str, Any] = {"effects": tuple(effects), "instruments": tuple(instruments)}
+    if fit.law_free:
+        remark = f"fitted: {provenance['command']}; data sha256 {provenance['data_sha256']}"
+        changes |= {
+            "strut_law": scaled_law(machine.strut_law, fit.law),
+            "origins": {**machine.origins, "strut_law": "fitted"},
+            "remarks": {**machine.remarks, "strut_law": remark},
+        }
+    return machine.with_changes(**changes, uncertainty=_uncertainty(machine, fit, widened))
+
+
+def _in_file(parameter: Any, value: Any) -> Any:
+    return value if parameter.discrete else float(value) / parameter.si
+
+
+def _uncertainty(machine: Machine, fit: Fit, widened: float) -> Uncertainty | None:
+    """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already."""
+    law = scaled_law(machine.strut_law, fit.law)
+    names, slopes, rows = [], [], []
+    if fit.law_free:
+        names += list(STRUT_LAW)
+        slopes += [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6]
+        rows += [0, 1]
+    index = 0
+    for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
+        for component, size in zip(candidate.components, sizes, strict=True):
+            if index in fit.free:
+                names.append(f"{candidate.name}.{component.parameter.key}")
+                # value = 1 / size for a stiffness whose neutral value is infinite.
+                slope = -1.0 / float(size) ** 2 if component.inverse else 1.0
+                slopes.append(slope / component.parameter.si)
+                rows.append(2 + fit.free.index(index))
+            index += 1
+    if not names:
+        return machine.uncertainty
+    scale = widened * np.array(slopes)
+    covariance = np.outer(scale, scale) * fit.covariance[np.ix_(rows, rows)]
+    return _beside(machine.uncertainty, Uncertainty.of(names, covariance))
+
+
+def _beside(old: Uncertainty | None, new: Uncertainty) -> Uncertainty:
+    """Both; what is fitted again replaces what was known of it."""
+    if old is None:
+        return new
+    kept = old.without(new.names)
+    return kept.beside(new) if kept.names else new

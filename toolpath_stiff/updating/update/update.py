@@ -1,0 +1,331 @@
+"""Update a machine: fit the effects that a user names (or that the data ask for), and judge whether the data bear them.
+
+An effect is supported if
+
+- the error at left-out points falls by more than one standard error of that fall, paired by point;
+- no parameter ends at its upper bound, and not all end at zero;
+- its gain in likelihood, the strut law refitted with and without it, is more than the best of all candidates reaches
+  by chance in one campaign of twenty: the relative gate of the diagnosis. The gain is counted in units of the scatter
+  that remains, so that data which no effect explains do not lend every effect significance.
+
+Of several effects each is judged beside the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.updating.diagnosis.diagnose import FEWEST, make_problem, testable_effects
+from toolpath_stiff.updating.inference.bounded_fit import add_effect, base_fit, log_posterior
+from toolpath_stiff.updating.inference.candidates import Candidate
+from toolpath_stiff.updating.inference.discrepancy import discrepancy_forms
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.fit import Fit
+from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate
+from toolpath_stiff.updating.inference.held_out import HeldOut, gain_in_standard_errors, held_out
+from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, Noise, noise_models
+from toolpath_stiff.updating.inference.ranking import Family, score_families, signatures
+from toolpath_stiff.updating.readings.measurements import Measurements
+from toolpath_stiff.updating.update.additions import Addition
+from toolpath_stiff.updating.update.provenance import fitted_machine
+
+FloatArray = NDArray[np.float64]
+
+NEEDED = 1.0  # standard errors by which the error at left-out points must fall
+TRIED = 4  # candidates a step of `--auto`, the most likely first
+MOST_EFFECTS = 4  # that `--auto` adds
+
+
+@dataclass(frozen=True)
+class Step:
+    """One rung of the ladder: what it is called, its fit, its errors at left-out points."""
+
+    name: str
+    fit: Fit
+    held: HeldOut
+
+
+@dataclass(frozen=True)
+class Support:
+    """Whether the data bear an effect.
+
+    Attributes
+    ----------
+    effect
+        Its name.
+    gain_in_se
+        Fall of the error at left-out points over its standard error; nan where nothing can be left out.
+    fall
+        That fall, relative.
+    error, held_out_error
+        Mean errors with it, in sample and at left-out points.
+    likelihood_gain, threshold
+        Twice the log likelihood gained, in units of the scatter that remains; what chance alone reaches.
+    reasons
+        Why not, sentences; none if it is supported.
+    """
+
+    effect: str
+    gain_in_se: float
+    fall: float
+    error: float
+    held_out_error: float
+    likelihood_gain: float
+    threshold: float
+    reasons: tuple[str, ...]
+
+    @property
+    def supported(self) -> bool:
+        """Whether nothing speaks against it."""
+        return not self.reasons
+
+
+@dataclass(frozen=True)
+class Update:
+    """What an update did.
+
+    Attributes
+    ----------
+    machine, data, noise
+        What was updated, by what; the largest of the noise models.
+    problem
+        Model and scatter.
+    steps
+        From the machine file as it stands to the last model.
+    supports
+        Of every effect that was asked for, or that `auto` took.
+    turned_down
+        Of the effects that `auto` tried last and did not take.
+    forced, auto
+        As asked.
+    objective
+        "likelihood", or "mean-error" for the paper's own estimation.
+    """
+
+    machine: Machine
+    data: Measurements
+    noise: Noise
+    problem: Problem
+    steps: tuple[Step, ...]
+    supports: tuple[Support, ...]
+    turned_down: tuple[Support, ...]
+    forced: bool
+    auto: bool
+    objective: str = "likelihood"
+
+    @property
+    def last(self) -> Step:
+        """The last model of the ladder."""
+        return self.steps[-1]
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything was fitted."""
+        return len(self.steps) > 1
+
+    @property
+    def accepted(self) -> bool:
+        """Whether a machine is to be written."""
+        return self.changed and (self.forced or all(one.supported for one in self.supports))
+
+    @property
+    def widening(self) -> float:
+        """Factor on standard deviations: how much wider the residuals are than the noise model says, at least 1."""
+        # A bootstrap over points has the residuals' own width already.
+        return float(np.sqrt(dispersion(self.last.fit))) if self.objective == "likelihood" else 1.0
+
+    def fitted(self, provenance: dict[str, object]) -> Machine:
+        """The machine with the last model."""
+        return fitted_machine(self.machine, self.last.fit, provenance, self.widening)
+
+
+def update(
+    machine: Machine,
+    data: Measurements,
+    additions: Sequence[Addition] = (),
+    *,
+    strut_law: bool = False,
+    auto: bool = False,
+    force: bool = False,
+    noise: float | tuple[float, float] | None = None,
+    strut_spread: float = STRUT_SPREAD,
+    effect_files: Sequence[str | Path] = (),
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Update:
+    """Fit effects to measurements and judge them.
+
+    Parameters
+    ----------
+    machine, data
+        The model and n readings.
+    additions
+        The effects to be added, in this order.
+    strut_law
+        Fit the strut law's two stiffnesses along.
+    auto
+        Go on adding effects while the data bear them.
+    force
+        Keep what the data do not bear.
+    noise, strut_spread, effect_files, seed, progress
+        As in `diagnose`.
+
+    Raises
+    ------
+    InputError
+        Too few readings, an effect named twice or present already, or nothing to do.
+    """
+    _check(machine, data, additions, strut_law, auto)
+    say = progress or (lambda text: None)
+    # Of several noise models the one with the largest noise, as in a diagnosis.
+    worst = max(noise_models(data, noise, strut_spread), key=lambda one: one.typical)
+    problem, _ = make_problem(machine, data, worst, effect_files)
+    work = _Work(problem, worst, strut_law, seed, tuple(effect_files), say)
+    steps = [work.step("as given", base_fit(problem, law_free=False))]
+    if strut_law:
+        steps.append(work.step("strut law fitted", base_fit(problem, law_free=True)))
+    for addition in additions:
+        say(f"fitting {addition.effect.name}")
+        steps.append(work.added(steps[-1], addition.candidates(data)))
+    supports = tuple(
+        work.support(work.without(steps[-1], j), steps[-1].fit, j, additions[j].candidates(data))
+        for j in range(len(additions))
+    )
+    turned_down: tuple[Support, ...] = ()
+    while auto and len(steps[-1].fit.candidates) < MOST_EFFECTS:
+        better, tried = work.next_effect(steps[-1])
+        if better is None:
+            turned_down = tried
+            break
+        steps.append(better)
+        supports = (*supports, tried[-1])
+    return Update(machine, data, worst, problem, tuple(steps), supports, turned_down, force, auto)
+
+
+def _check(machine: Machine, data: Measurements, additions: Sequence[Addition], strut_law: bool, auto: bool) -> None:
+    if not additions and not strut_law and not auto:
+        raise InputError("nothing to update", expected="--add EFFECT, --strut-law or --auto")
+    lacking = int(np.isnan(data.stiffness).sum())
+    if len(data) < FEWEST or lacking:
+        raise InputError(
+            f"{len(data)} readings, {lacking} without a stiffness",
+            expected=f"at least {FEWEST} measured stiffnesses to update from",
+        )
+    names = [addition.effect.name for addition in additions]
+    present = {entry.name for entry in (*machine.effects, *machine.instruments)}
+    if np.isfinite(machine.platform_bar_stiffness):
+        present.add("platform_flexibility")
+    for name in names:
+        if names.count(name) > 1 or name in present:
+            found = "is given twice" if names.count(name) > 1 else f"is in machine {machine.name} already"
+            raise InputError(f"--add {name}: the effect {found}", hint="a machine carries an effect once")
+
+
+def dispersion(fit: Fit) -> float:
+    """Weighted squares of a fit over their degrees of freedom, at least 1."""
+    squares = float(fit.residual @ fit.scatter.inverse @ fit.residual)
+    fitted = len(fit.free) + (2 if fit.law_free else 0)
+    return max(1.0, squares / max(len(fit.residual) - fitted, 1))
+
+
+class _Work:
+    """What one update passes from step to step."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        noise: Noise,
+        law_free: bool,
+        seed: int,
+        effect_files: tuple[str | Path, ...],
+        say: Callable[[str], None],
+    ) -> None:
+        self.problem, self.noise, self.law_free, self.seed = problem, noise, law_free, seed
+        self.effect_files, self.say = effect_files, say
+        self.data = problem.predictor.data
+        self.fields: dict[tuple[str, ...], tuple[Problem, list[Family], float]] = {}
+
+    def step(self, name: str, fit: Fit) -> Step:
+        return Step(name, fit, held_out(fit, self.data.point))
+
+    def added(self, before: Step, candidates: Sequence[Candidate]) -> Step:
+        """A rung higher."""
+        fit = add_effect(self.problem, before.fit, candidates, self.law_free)
+        return self.step(f"+ {fit.candidates[-1].label}", fit)
+
+    def without(self, full: Step, j: int) -> Step:
+        """The model with all effects but one, fitted again."""
+        fit = base_fit(self.problem, self.law_free)
+        for k, candidate in enumerate(full.fit.candidates):
+            if k != j:
+                fit = add_effect(self.problem, fit, [candidate], self.law_free)
+        return self.step("", fit)
+
+    def field(self, others: Fit) -> tuple[Problem, list[Family], float]:
+        """The problem of a machine that carries the other effects, all candidates in it, the gate's threshold."""
+        key = tuple(candidate.label for candidate in others.candidates)
+        if key not in self.fields:
+            self.say("searching all effects for what chance alone would gain")
+            machine = self.problem.predictor.machine
+            carrying = fitted_machine(machine, others, {"command": "", "data_sha256": ""})
+            problem, covariance = make_problem(carrying, self.data, self.noise, self.effect_files)
+            base = problem.score_base()
+            effects, _ = testable_effects(problem.predictor, self.effect_files)
+            families = score_families(problem, effects, base)
+            gate = absolute_gate(
+                problem, base.residual, base.jacobian, Simulator.of(self.noise, covariance, self.seed),
+                discrepancy_forms(problem.predictor), signatures(problem, families),
+            )  # fmt: skip
+            self.fields[key] = problem, families, gate.gain_threshold
+        return self.fields[key]
+
+    def support(self, before: Step, fit: Fit, j: int, candidates: Sequence[Candidate]) -> Support:
+        """Judge effect j of a fit against the model with the other effects."""
+        name, after = fit.names[j], self.step("", fit)
+        fall = before.held.mean_error - after.held.mean_error
+        in_se = gain_in_standard_errors(before.held, after.held)
+        problem, _, threshold = self.field(before.fit)
+        none = base_fit(problem, law_free=True)
+        alone = add_effect(problem, none, candidates, law_free=True)
+        gained = 2.0 * (log_posterior(alone) - log_posterior(none)) / dispersion(alone)
+        reasons = []
+        if not fit.sizes[j].any():
+            reasons.append("it fits best when it is absent")
+        names = {component.parameter.name for component in fit.candidates[j].components}
+        bounded = [parameter for parameter in fit.at_upper_bound() if parameter in names]
+        if bounded:
+            reasons.append(f"{', '.join(bounded)} ends at its bound: the data would pull it beyond what is possible")
+        if np.isnan(in_se):
+            reasons.append("fewer than three points: none can be left out, so nothing can be said of unseen ones")
+        elif in_se <= NEEDED:
+            change = f"from {100 * before.held.mean_error:.2f} to {100 * after.held.mean_error:.2f} %"
+            reasons.append(
+                f"the error at left-out points goes {change}, {in_se:.1f} standard errors: more than {NEEDED:g} needed"
+            )
+        if gained <= threshold:
+            reasons.append(
+                f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {threshold:.1f} by "
+                "chance once in twenty campaigns"
+            )
+        error = float(fit.errors.mean())
+        return Support(name, in_se, fall, error, after.held.mean_error, gained, threshold, tuple(reasons))
+
+    def next_effect(self, before: Step) -> tuple[Step | None, tuple[Support, ...]]:
+        """The most likely effect that the data bear on top of a step, and the supports of all that were tried."""
+        _, families, _ = self.field(before.fit)
+        tried: list[Support] = []
+        for family in [f for f in families if f.best is not None][:TRIED]:
+            self.say(f"fitting {family.name}")
+            candidates = [table.candidate for table in family.tables]
+            step = self.added(before, candidates)
+            tried.append(self.support(before, step.fit, len(step.fit.candidates) - 1, candidates))
+            if tried[-1].supported:
+                return step, tuple(tried)
+        return None, tuple(tried)
