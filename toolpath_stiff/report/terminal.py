@@ -59,7 +59,7 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
 def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> str:
     """Two machines side by side, the difference in percent of the first."""
     compared = compare_summaries(summary, other)
-    rows = [["", shortened(plain(summary["machine"]), 24), shortened(plain(other["machine"]), 24), "difference"]]
+    rows = [["", *(shortened(plain(_machine(one)), 32) for one in (summary, other)), "difference"]]
     for name, change in zip(FIGURES, compared["difference_percent"].values(), strict=True):
         digits = 2 if name.endswith("_um") else 0
         difference = "-" if change is None else f"{change:+.1f} %"
