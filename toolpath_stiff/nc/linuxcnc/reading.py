@@ -65,7 +65,7 @@ def read(
     """
     lines = split(source, name)
     fence.check(lines, name)
-    session = _Session(lines, name, offsets, tools, block_delete, find_rs274(rs274), limits)
+    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits)
     return session.read(origin, default_origin)
 
 
@@ -80,6 +80,7 @@ def refusal(source: Sequence[str], name: str) -> InputError | None:
 
 @dataclass
 class _Session:
+    source: Sequence[str]
     lines: list[Line]
     name: str
     offsets: Offsets
@@ -249,13 +250,22 @@ class _Session:
                 for letter, digits in HARMLESS_WORD.findall(line.plain):
                     reason = HARMLESS.get(code_name(letter, float(digits)))
                     if reason:
-                        found.append(Unsupported(line.number, 1, letter + digits, reason))
+                        column = self._column(line, letter + digits)
+                        found.append(Unsupported(line.number, column, letter + digits, reason))
             found += [
                 Unsupported(line.number, column, text.split(",")[0].strip(), "no file is written")
                 for column, text in line.comments
                 if FILES.match(text)
             ]
         return found
+
+    def _column(self, line: Line, word: str) -> int:
+        """Where a word stands in its line, whatever blanks are within it."""
+        text = self.source[line.number - 1]
+        for start, comment in line.comments:
+            text = text[: start - 1] + " " * (len(comment) + 1) + text[start + len(comment) :]
+        match = re.search(r"\s*".join(map(re.escape, word)), text, re.IGNORECASE)
+        return match.start() + 1 if match else 1
 
     def _warnings(self, says: str, given: bool, follower: Follower) -> list[str]:
         warnings = list(follower.warnings)
