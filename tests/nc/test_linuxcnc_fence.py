@@ -199,7 +199,7 @@ def test_an_endless_loop_ends(confined, monkeypatch):
 
 @needs_rs274
 def test_an_endless_path_ends():
-    with pytest.raises(InputError, match=r"part\.nc.*after 1 MB of output"):
+    with pytest.raises(InputError, match=r"part\.nc:3: .*after 1 MB of output"):
         read_limited("G91\no100 while [1]\nG1 X1 F100\no100 endwhile\nM2", Limits(file_bytes=1_000_000))
 
 

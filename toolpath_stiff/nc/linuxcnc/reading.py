@@ -7,13 +7,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes import G_HARMLESS, M_HARMLESS, code_name
 from toolpath_stiff.nc.frames import Pose
 from toolpath_stiff.nc.linuxcnc import fence
 from toolpath_stiff.nc.linuxcnc.canon import Follower
 from toolpath_stiff.nc.linuxcnc.copy import Line, needs_tags, numbered, split
-from toolpath_stiff.nc.linuxcnc.runner import Limits, Run, find_rs274, message_and_line, run_rs274
+from toolpath_stiff.nc.linuxcnc.runner import Limits, Run, StoppedError, find_rs274, message_and_line, run_rs274
 from toolpath_stiff.nc.linuxcnc.tables import first_offset, parameter_file, tool_file, tool_numbers
 from toolpath_stiff.nc.moves import Moves, ToolUse, Unsupported
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
@@ -59,9 +59,7 @@ def read(
     Raises
     ------
     InputError
-        The fence, or the interpreter, refuses the program.
-    TpsError
-        The interpreter exceeded a limit.
+        The fence, or the interpreter, refuses the program, or a limit was exceeded.
     """
     lines = split(source, name)
     fence.check(lines, name)
@@ -185,10 +183,8 @@ class _Session:
                 rs274=self.rs274,
                 limits=self.limits,
             )
-        except InputError:
-            raise
-        except TpsError as error:
-            raise InputError(str(error), file=self.name) from None
+        except StoppedError as error:
+            raise InputError(str(error), file=self.name, line=error.line) from None
         follower = self._follow(run, (0.0, 0.0, 0.0))
         if run.message or not follower.ended:
             raise self._refusal(run.message, len(prefix))

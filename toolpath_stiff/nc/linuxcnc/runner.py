@@ -35,6 +35,14 @@ class Limits:
     file_bytes: int = 1 << 29
 
 
+class StoppedError(TpsError):
+    """A run that exceeded a limit; `line` is the last one that made rs274 print something, None if none did."""
+
+    def __init__(self, message: str, line: int | None) -> None:
+        super().__init__(message)
+        self.line = line
+
+
 @dataclass(frozen=True)
 class Run:
     """What rs274 left: its canonical commands, its message ("" if it went well), its parameter file."""
@@ -58,8 +66,10 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
 
     Raises
     ------
-    TpsError
-        It exceeded a limit, or could not be started.
+    StoppedError
+        It exceeded a limit.
+    InputError
+        It could not be started.
     """
     if sys.platform == "win32":
         raise TpsError("LinuxCNC's interpreter runs on Linux only")
@@ -74,7 +84,7 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
         message = _text(folder / ERRORS, LONGEST_MESSAGE)
         over = _exceeded(code, limits)
         if over:
-            raise TpsError(over)
+            raise StoppedError(over, _last_line(folder / CANON))
         return Run(_text(folder / CANON), message if code else "", _text(folder / PARAMETERS))
 
 
@@ -178,6 +188,17 @@ def _text(path: Path, most: int | None = None) -> str:
             return stream.read() if most is None else stream.read(most)
     except FileNotFoundError:
         return ""
+
+
+def _last_line(path: Path) -> int | None:
+    """Our number of the last line that shows in the canonical commands."""
+    try:
+        with path.open("rb") as stream:
+            stream.seek(max(0, path.stat().st_size - 4096))
+            numbers = re.findall(rb"^ *\d+ N(\d+)", stream.read(), re.MULTILINE)
+    except FileNotFoundError:
+        return None
+    return (int(numbers[-1]) or None) if numbers else None
 
 
 def message_and_line(message: str) -> tuple[str, int | None]:
