@@ -226,7 +226,9 @@ def interval(
     if index in fit.free:
         reach = NORMAL_95 * fit.deviation(index)
         low, high = (-reach, reach) if averaged is None or best is None else averaged - float(best.sizes[0][index])
-        return max(size + min(float(low), 0.0), low_bound), min(size + max(float(high), 0.0), high_bound)
+        low, high = size + min(float(low), 0.0), size + max(float(high), 0.0)
+        near = TOUCHES * (high - low)
+        return low_bound if low - low_bound < near else low, high_bound if high_bound - high < near else high
     pull, deviation = fit.absent.get(index, (0.0, 0.0))
     upper = max(pull, 0.0) + NORMAL_95 * deviation
     if averaged is not None:
