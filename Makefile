@@ -10,8 +10,9 @@ demo: $(VENV)/.run
 	$(BIN)/tps analyze $(PROGRAM) --out reports/demo
 	@echo "Report: $(CURDIR)/reports/demo/report.html"
 
+# One thread of linear algebra a process: the processes share the cores already.
 test: lint
-	$(BIN)/python -m pytest -n auto
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
