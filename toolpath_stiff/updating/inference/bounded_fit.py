@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem, scaled_inverse
 from toolpath_stiff.updating.inference.fit import Fit, fit_effects
 
 FloatArray = NDArray[np.float64]
@@ -99,16 +99,11 @@ def _without_zeros(fit: Fit) -> Fit:
         for k, index in enumerate(fit.free)
         if k not in kept
     }
-    information = _scaled_inverse(fit.covariance)[np.ix_(columns, columns)]
+    information = scaled_inverse(fit.covariance)[np.ix_(columns, columns)]
     return replace(
         fit,
         free=tuple(fit.free[k] for k in kept),
         jacobian=fit.jacobian[:, columns],
-        covariance=_scaled_inverse(information),
+        covariance=scaled_inverse(information),
         absent=absent,
     )
-
-
-def _scaled_inverse(matrix: FloatArray) -> FloatArray:
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))

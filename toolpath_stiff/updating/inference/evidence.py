@@ -260,7 +260,7 @@ class Problem:
             if not last or set(again.wild) == set(scatter.wild):
                 break
             scatter = again
-        covariance = np.asarray(_scaled_inverse(information), dtype=float)
+        covariance = np.asarray(scaled_inverse(information), dtype=float)
         deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
         held = _pull_back(chosen, sizes) if len(tables) > 1 else []
         if held:  # the others once more beside them
@@ -376,7 +376,8 @@ class _Scan:
         return float(1.0 / np.sqrt(max(-curvature, 1e-2 / x[1] ** 2)))
 
 
-def _scaled_inverse(matrix: FloatArray) -> FloatArray:
+def scaled_inverse(matrix: FloatArray) -> FloatArray:
+    """Inverse of a covariance or information matrix (p, p) whose rows may have very different units."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.candidates import Candidate
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem, Score
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem, Score, scaled_inverse
 from toolpath_stiff.updating.inference.scatter import Scatter
 
 FloatArray = NDArray[np.float64]
@@ -150,7 +150,7 @@ def fit_effects(
         law,
         residual,
         jacobian,
-        _scaled_inverse(information),
+        scaled_inverse(information),
         scatter,
         law_free,
         _pulls_on_absent(replace(search, free=tuple(range(len(flat)))), law, flat, residual, scatter, tuple(free)),
@@ -166,7 +166,7 @@ def _pulls_on_absent(
         return {}
     jacobian = search.jacobian(law, flat, residual)
     information, gradient = _normal_equations(jacobian, residual, law, scatter, search.law_free)
-    inverse = _scaled_inverse(information)
+    inverse = scaled_inverse(information)
     step = inverse @ gradient
     return {i: (float(flat[i] + step[2 + i]), float(np.sqrt(max(inverse[2 + i, 2 + i], 0.0)))) for i in absent}
 
@@ -183,13 +183,8 @@ def _normal_equations(
     return information, gradient
 
 
-def _scaled_inverse(matrix: FloatArray) -> FloatArray:
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
-
-
 def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
-    return np.asarray(_scaled_inverse(information) @ gradient)
+    return np.asarray(scaled_inverse(information) @ gradient)
 
 
 @dataclass(frozen=True)
