@@ -19,7 +19,8 @@ from toolpath_stiff.machine import load_machine
 from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.planning.plan import Plan, plan_document, plan_measurements, random_visits
+from toolpath_stiff.updating.planning.plan import Plan, plan_measurements, random_visits
+from toolpath_stiff.updating.planning.plan_document import plan_document
 from toolpath_stiff.updating.planning.plan_menu import Costs, Matters, Menu, possible_visits
 from toolpath_stiff.updating.planning.plan_rivals import (
     Forecast,

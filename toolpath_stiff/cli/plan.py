@@ -153,8 +153,9 @@ def _menu(args: argparse.Namespace, menu: Menu) -> Menu:
 def _told_apart(
     args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    from toolpath_stiff.updating.planning.plan import plan_document, plan_measurements
+    from toolpath_stiff.updating.planning.plan import plan_measurements
     from toolpath_stiff.updating.planning.plan_between import unfitted_rivals
+    from toolpath_stiff.updating.planning.plan_document import plan_document
     from toolpath_stiff.updating.planning.plan_files import plan_csv, plan_rows
     from toolpath_stiff.updating.planning.plan_menu import Menu
     from toolpath_stiff.updating.readings.measurements import read_measurements

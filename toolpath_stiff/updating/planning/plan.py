@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,12 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.updating.inference.noise import STRUT_SPREAD
+from toolpath_stiff.updating.planning.plan_choice import (
+    choose,
+    in_order,
+    plan_minutes,
+    same_place,
+)
 from toolpath_stiff.updating.planning.plan_menu import Costs, Matters, Menu, Visits, possible_visits
 from toolpath_stiff.updating.planning.plan_rivals import (
     SETTLED,
@@ -198,8 +203,8 @@ def plan_measurements(
         notes.append(f"no pose lower than was measured before: {words}; name heights to go lower")
     shares = {(f.name, g.name): pair_shares(visits, f, g, noise) for f, g in combinations(forecasts, 2)}
     weights = {f.name: f.weight for f in forecasts}
-    picked = _greedy(visits, usable, shares, weights, n, costs, menu)
-    chosen = _in_order(visits, picked, menu, seed)
+    picked = choose(visits, usable, shares, weights, n, costs, menu)
+    chosen = in_order(visits, picked, menu, seed)
     before = float(np.square([f.weight for f in forecasts]).sum())
     after = expectation(visits, picked, forecasts, noise, seed)
     pairs = tuple(sorted((_pair(p, shares[p], chosen, usable, ranked) for p in shares), key=lambda pair: pair.gap))
@@ -258,81 +263,6 @@ def _cleaned(forecast: Forecast, good: NDArray[np.bool_]) -> Forecast:
     )
 
 
-# -- choosing ----------------------------------------------------------------------------------------------------------
-
-
-def log_confusion(gaps: dict[tuple[str, str], FloatArray], weights: dict[str, float]) -> FloatArray:
-    """Logarithm of the bound on the chance of taking one rival for another, of any shape that the gaps have."""
-    each = [0.5 * np.log(weights[i] * weights[j]) - gap**2 / 4.0 for (i, j), gap in gaps.items()]
-    return np.asarray(np.logaddexp.reduce(each, axis=0))
-
-
-def _greedy(
-    visits: Visits,
-    usable: NDArray[np.bool_],
-    shares: dict[tuple[str, str], Shares],
-    weights: dict[str, float],
-    n: int,
-    costs: Costs,
-    menu: Menu,
-) -> tuple[int, ...]:
-    chosen: list[int] = []
-    free = usable.copy()
-    now = float(log_confusion({pair: np.zeros(()) for pair in shares}, weights))
-    for _ in range(min(n, int(usable.sum()))):
-        after = log_confusion({pair: share.gaps_with(chosen) for pair, share in shares.items()}, weights)
-        gain = np.where(free, (now - after) / further_minutes(visits, chosen, costs, menu), -np.inf)
-        best = int(np.argmax(gain))
-        if not np.isfinite(gain[best]):
-            break
-        chosen.append(best)
-        now = float(after[best])
-        free &= ~_same_place(visits, best)
-    return tuple(chosen)
-
-
-def _same_place(visits: Visits, visit: int) -> NDArray[np.bool_]:
-    """(v,) visits to the same pose with the same tool in the same set-up: other readings there are no new pose."""
-    return np.asarray(
-        (visits.pose == visits.pose[visit]).all(axis=1)
-        & (visits.extension == visits.extension[visit])
-        & (visits.setup == visits.setup[visit])
-    )
-
-
-def further_minutes(visits: Visits, chosen: Sequence[int], costs: Costs, menu: Menu) -> FloatArray:
-    """(v,) minutes that each visit adds to those chosen; visits of one set-up and tool are made together."""
-    setups = {menu.setups[0], *visits.setup[list(chosen)].tolist()}
-    equipped = {(menu.setups[0], menu.tool_extensions[0])}
-    equipped |= {(str(visits.setup[v]), float(visits.extension[v])) for v in chosen}
-    minutes = costs.pose + costs.reading * visits.counts + visits.wait / 60.0
-    minutes = minutes + costs.setup * ~np.isin(visits.setup, list(setups))
-    tools: dict[str, set[float]] = {}
-    for setup, tool in equipped:
-        tools.setdefault(setup, set()).add(tool)
-    # In a new set-up the tool that is in the spindle stays there.
-    known = np.array(
-        [
-            float(tool) in tools.get(str(setup), {menu.tool_extensions[0]})
-            for setup, tool in zip(visits.setup, visits.extension, strict=True)
-        ]
-    )
-    return np.asarray(minutes + costs.tool * ~known)
-
-
-def plan_minutes(visits: Visits, chosen: Sequence[int], costs: Costs, menu: Menu) -> float:
-    """Minutes of work for the chosen visits."""
-    return sum(float(further_minutes(visits, chosen[:k], costs, menu)[visit]) for k, visit in enumerate(chosen))
-
-
-def _in_order(visits: Visits, chosen: Sequence[int], menu: Menu, seed: int) -> tuple[int, ...]:
-    """Set-up by set-up, tool by tool, at random within: a drift over the day looks like no pose."""
-    order = list(np.random.default_rng([seed, 1]).permutation(len(chosen)))
-    setups, tools = list(menu.setups), list(menu.tool_extensions)
-    order.sort(key=lambda k: (setups.index(visits.setup[chosen[k]]), tools.index(visits.extension[chosen[k]])))
-    return tuple(chosen[k] for k in order)
-
-
 def random_visits(plan: Plan, n: int, seed: int) -> tuple[int, ...]:
     """As many visits to different places drawn blindly from the same menu: what planning is compared with."""
     free = np.ones(len(plan.visits), dtype=bool)
@@ -341,7 +271,7 @@ def random_visits(plan: Plan, n: int, seed: int) -> tuple[int, ...]:
     while len(found) < n and free.any():
         visit = int(rng.choice(np.flatnonzero(free)))
         found.append(visit)
-        free &= ~_same_place(plan.visits, visit)
+        free &= ~same_place(plan.visits, visit)
     return tuple(found)
 
 
@@ -440,63 +370,3 @@ def _why(visits: Visits, visit: int, shares: dict[tuple[str, str], Shares], menu
         what.append("each reading twice" if visits.rounds[visits.rows(visit)].max() == 2 else "readings repeated")
     gap = shares[pair].gap([visit])
     return f"{', '.join(what)}: {gap:.1f} sigma between {pair[0]} and {pair[1]}"
-
-
-def plan_document(plan: Plan) -> dict[str, Any]:
-    """The plan as the content of plan.json."""
-    return {
-        "rivals": [{"name": rival.name, "probability": rival.weight} for rival in plan.rivals],
-        "poses": len(plan.chosen),
-        "readings": int(plan.visits.counts[list(plan.chosen)].sum()),
-        "minutes": plan.minutes,
-        "expected": {
-            "probability_of_truth_before": plan.before.truth,
-            "probability_of_truth_after": plan.after.truth,
-            "settled_before": plan.before.settled,
-            "settled_after": plan.after.settled,
-            "settled_at": SETTLED,
-            "poses_to_settle": plan.enough,
-            "repeats_to_settle": plan.repeats,
-        },
-        "pairs": [
-            {
-                "effects": [pair.first, pair.second],
-                "gap_sigma": pair.gap,
-                "best_single_pose_sigma": pair.best_visit_gap,
-                "separable": pair.separable,
-                "indicator_across": pair.indicators,
-            }
-            for pair in plan.pairs
-        ],
-        "text": plan_text(plan),
-        "notes": list(plan.notes),
-    }
-
-
-def _percent(share: float) -> str:
-    """Never "100 %" for what is only expected."""
-    return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
-
-
-def plan_text(plan: Plan) -> list[str]:
-    """What the plan promises, in sentences."""
-    count = len(plan.chosen)
-    lines = [
-        f"{count} pose{'s' if count > 1 else ''}, about {plan.minutes:.0f} minutes: the probability of the right "
-        f"explanation is expected to rise from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}, "
-        f"and the verdict to be settled in {_percent(plan.after.settled)} of cases"
-    ]
-    if plan.enough is not None and plan.enough < count:
-        lines.append(f"{plan.enough} of the poses should do for {100 * SETTLED:.0f} %; the others are in reserve")
-    elif plan.repeats is None:
-        lines.append(f"{100 * SETTLED:.0f} % is not expected from repeats of these poses, up to {MOST_REPEATS} of them")
-    elif plan.repeats > 1:
-        lines.append(f"{100 * SETTLED:.0f} % is expected after {plan.repeats} repeats of each, clamped anew")
-    for pair in plan.pairs:
-        if not pair.separable:
-            lines.append(
-                f"tip stiffness cannot tell {pair.first} from {pair.second} ({pair.gap:.1f} sigma after all poses); "
-                f"put an indicator across the link: "
-                + "; or ".join(f"{link}: {place}" for link, place in pair.indicators.items())
-            )
-    return lines
