@@ -14,6 +14,7 @@ from toolpath_stiff.cli.measurement_arguments import (
     add_output_arguments,
     check_seed,
 )
+from toolpath_stiff.cli.progress import say
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     data = read_measurements(args.data, machine)
     diagnosis = diagnose(
         machine, data, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed,
-        files=args.data, progress=_say,
+        files=args.data, progress=say,
     )  # fmt: skip
     found = document(diagnosis, " ".join(["tps", *sys.argv[1:]]))
     _complete(found, diagnosis, args)
@@ -73,9 +74,9 @@ def run(args: argparse.Namespace) -> int:
         "residuals.csv": _residuals(diagnosis),
     }
     if not args.no_plots:
-        _say("drawing")
+        say("drawing")
         contents |= _pictures(found, diagnosis)
-    _say("")
+    say("")
     written = write_folder(args.out, contents, OWN_FILES)
     if args.json:
         print(contents["diagnose.json"], end="")
@@ -87,20 +88,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _say(text: str) -> None:
-    """One line of progress, where someone watches."""
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r\x1b[K{text}")
-        sys.stderr.flush()
-
-
 def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namespace) -> None:
     """Add what needs other rooms: the next measurements, and the choice's weight on a tool path."""
     from toolpath_stiff.updating.diagnosis.next_measurements import choice_on_path, next_measurements
 
     if diagnosis.verdict != "ambiguous":
         return
-    _say("planning the next measurements")
+    say("planning the next measurements")
     found["next_measurements"], remarks = next_measurements(diagnosis, seed=args.seed)
     found["why"] += remarks
     if args.program is None:

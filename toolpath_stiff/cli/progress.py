@@ -12,6 +12,13 @@ REDRAW_SECONDS = 0.1
 WIDTH = 30
 
 
+def say(text: str) -> None:
+    """Replace the line of progress, where someone watches; "" takes it away."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\x1b[K{text}")
+        sys.stderr.flush()
+
+
 @contextmanager
 def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int], None] | None]:
     """Yield a function (done, total) that draws the bar, or None where standard error is no terminal."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from toolpath_stiff.cli.measurement_arguments import (
     add_output_arguments,
     check_seed,
 )
+from toolpath_stiff.cli.progress import say
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
@@ -95,9 +95,9 @@ def run(args: argparse.Namespace) -> int:
     if search is not None:
         contents |= _figure3(args, machine, data)
     if not args.no_plots:
-        _say("drawing")
+        say("drawing")
         contents |= _pictures(found, update, contents.get("figure3.png"))
-    _say("")
+    say("")
     written = []
     if updated is not None and args.output is not None:  # first: update.json names it
         written.append(write_atomically(Path(args.output), machine_toml(updated, _preamble(found))))
@@ -127,7 +127,7 @@ def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> t
         from toolpath_stiff.updating.update.mean_error_update import update_by_mean_error
 
         return update_by_mean_error(
-            machine, data, noise=args.noise, strut_spread=args.strut_spread, seed=args.seed, progress=_say,
+            machine, data, noise=args.noise, strut_spread=args.strut_spread, seed=args.seed, progress=say,
             effect_files=args.effects,
         )  # fmt: skip
     from toolpath_stiff.updating.update.additions import parse_addition
@@ -136,16 +136,9 @@ def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> t
     additions = [parse_addition(text, data, args.effects) for text in args.add]
     found = update(
         machine, data, additions, strut_law=args.strut_law, auto=args.auto, force=args.force, noise=args.noise,
-        strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed, progress=_say,
+        strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed, progress=say,
     )  # fmt: skip
     return found, None
-
-
-def _say(text: str) -> None:
-    """One line of progress, where someone watches."""
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r\x1b[K{text}")
-        sys.stderr.flush()
 
 
 def _provenance(args: argparse.Namespace, update: Update) -> dict[str, Any]:
@@ -213,7 +206,7 @@ def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> 
 
     if any(entry.name == "platform_flexibility" for entry in machine.effects):
         return {}
-    _say("the platform's bars, soft to rigid")
+    say("the platform's bars, soft to rigid")
     curve = bar_curve(machine, data, seed=args.seed, starts=1)
     found: dict[str, str | bytes] = {"figure3.csv": bar_curve_csv(curve)}
     if not args.no_plots:

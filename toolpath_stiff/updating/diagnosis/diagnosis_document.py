@@ -51,15 +51,15 @@ def document(diagnosis: Diagnosis, command: str = "") -> dict[str, Any]:
                 "effect": one.effect,
                 "parameter": one.parameter.name,
                 "unit": one.parameter.unit,
-                "size": _number(one.value / one.parameter.si) if one.seen else None,
-                "rms_percent": _number(100.0 * one.rms),
+                "size": json_number(one.value / one.parameter.si) if one.seen else None,
+                "rms_percent": json_number(100.0 * one.rms),
                 "detectable": one.seen,
             }
             for one in diagnosis.detectable
         ],
         "confounding": {
             "effects": list(diagnosis.confounding.names),
-            "matrix": [[_number(x, 3) for x in row] for row in diagnosis.confounding.matrix.tolist()],
+            "matrix": [[json_number(x, 3) for x in row] for row in diagnosis.confounding.matrix.tolist()],
             "sets": [list(group) for group in diagnosis.confounding.sets],
             "threshold": CONFOUNDED,
         },
@@ -75,13 +75,13 @@ def document(diagnosis: Diagnosis, command: str = "") -> dict[str, Any]:
     }
 
 
-def _number(value: float, digits: int = 5) -> float | None:
+def json_number(value: float, digits: int = 5) -> float | None:
     """A float of some significant digits; None for what JSON cannot hold."""
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def _errors(fit: Fit) -> dict[str, Any]:
-    return {"mean_abs_error_percent": _number(100.0 * float(fit.errors.mean()))}
+    return {"mean_abs_error_percent": json_number(100.0 * float(fit.errors.mean()))}
 
 
 def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -92,26 +92,26 @@ def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
     factors = np.exp(diagnosis.base.law)
     deviations = np.sqrt(np.diag(diagnosis.base.covariance)[:2])
     return {
-        "mean_abs_error_percent": _number(100.0 * float(np.abs(relative).mean())),
-        "bias_percent": _number(100.0 * float(relative.mean())),
-        "rms_percent": _number(100.0 * float(np.sqrt(np.mean(relative**2)))),
-        "held_out_error_percent": _number(100.0 * held.mean_error),
-        "held_out_rms_percent": _number(100.0 * held.rms),
-        "noise_percent": _number(100.0 * diagnosis.noise.typical),
-        "noise_floor_percent": _number(80.0 * diagnosis.noise.typical),
-        "probability": _number(diagnosis.main.probability.get(NONE, 0.0)),
-        "probability_outside": _number(diagnosis.main.probability.get(OUTSIDE, 0.0)),
+        "mean_abs_error_percent": json_number(100.0 * float(np.abs(relative).mean())),
+        "bias_percent": json_number(100.0 * float(relative.mean())),
+        "rms_percent": json_number(100.0 * float(np.sqrt(np.mean(relative**2)))),
+        "held_out_error_percent": json_number(100.0 * held.mean_error),
+        "held_out_rms_percent": json_number(100.0 * held.rms),
+        "noise_percent": json_number(100.0 * diagnosis.noise.typical),
+        "noise_floor_percent": json_number(80.0 * diagnosis.noise.typical),
+        "probability": json_number(diagnosis.main.probability.get(NONE, 0.0)),
+        "probability_outside": json_number(diagnosis.main.probability.get(OUTSIDE, 0.0)),
         "adequate": bool(diagnosis.main.base_gate.probability > FALSE_ALARM),
         "as_given": {
-            "mean_abs_error_percent": _number(100.0 * float(np.abs(as_given).mean())),
-            "bias_percent": _number(100.0 * float(as_given.mean())),
+            "mean_abs_error_percent": json_number(100.0 * float(np.abs(as_given).mean())),
+            "bias_percent": json_number(100.0 * float(as_given.mean())),
         },
         "law": [
             {
-                "length_mm": _number(float(mm_from_m(length)), 7),
-                "stiffness_N_per_um": _number(stiffness * factor / 1e6),
-                "machine_file_N_per_um": _number(stiffness / 1e6),
-                "sd_percent": _number(100.0 * deviation, 3),
+                "length_mm": json_number(float(mm_from_m(length)), 7),
+                "stiffness_N_per_um": json_number(stiffness * factor / 1e6),
+                "machine_file_N_per_um": json_number(stiffness / 1e6),
+                "sd_percent": json_number(100.0 * deviation, 3),
             }
             for length, stiffness, factor, deviation in zip(
                 (law.length_1, law.length_2), (law.stiffness_1, law.stiffness_2), factors, deviations, strict=True
@@ -137,17 +137,17 @@ def _candidate(diagnosis: Diagnosis, family: Family, best: float) -> dict[str, A
         "effect": family.name,
         "title": family.effect.title,
         "link": family.effect.link,
-        "probability": _number(main.probability.get(family.name, 0.0)),
-        "log_evidence": _number(family.log_evidence - main.base.log_evidence),
+        "probability": json_number(main.probability.get(family.name, 0.0)),
+        "log_evidence": json_number(family.log_evidence - main.base.log_evidence),
         "words": words(2.0 * (best - family.log_evidence)),
     }
     if fit is None or not any(size.any() for size in fit.sizes):
         return common | {
             "parameters": {},
             "choice": {},
-            "mean_abs_error_percent": _number(100.0 * float(diagnosis.base.errors.mean())),
-            "held_out_error_percent": _number(100.0 * diagnosis.held_out_base.mean_error),
-            "held_out_rms_percent": _number(100.0 * diagnosis.held_out_base.rms),
+            "mean_abs_error_percent": json_number(100.0 * float(diagnosis.base.errors.mean())),
+            "held_out_error_percent": json_number(100.0 * diagnosis.held_out_base.mean_error),
+            "held_out_rms_percent": json_number(100.0 * diagnosis.held_out_base.rms),
             "held_out_gain_in_se": 0.0,
             "adequate": base_passes,
             "offered": False,
@@ -163,11 +163,11 @@ def _candidate(diagnosis: Diagnosis, family: Family, best: float) -> dict[str, A
         "parameters": parameters(fit, family),
         "choice": dict(fit.candidates[0].choice),
         **_errors(fit),
-        "held_out_error_percent": _number(100.0 * held.mean_error),
-        "held_out_rms_percent": _number(100.0 * held.rms),
-        "held_out_gain_in_se": _number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
+        "held_out_error_percent": json_number(100.0 * held.mean_error),
+        "held_out_rms_percent": json_number(100.0 * held.rms),
+        "held_out_gain_in_se": json_number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
         "adequate": bool(adequate),
-        "adequate_probability": None if gate is None else _number(gate.probability, 3),
+        "adequate_probability": None if gate is None else json_number(gate.probability, 3),
         "offered": not bounded,
         "remark": remark,
     }
@@ -197,9 +197,9 @@ def parameters(fit: Fit, family: Family | None = None) -> dict[str, Any]:
             si = component.parameter.si
             ends = sorted((component.value(low) / si, component.value(high) / si))
             found[component.parameter.key] = {
-                "value": _number(component.value(float(size)) / si),
+                "value": json_number(component.value(float(size)) / si),
                 "unit": component.parameter.unit,
-                "interval": [_number(ends[0]), _number(ends[1])],
+                "interval": [json_number(ends[0]), json_number(ends[1])],
             }
             index += 1
     return found
@@ -248,15 +248,15 @@ def _pairs(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         found.append(
             {
                 "effects": list(pair.names),
-                "probability": _number(diagnosis.main.probability.get(name, 0.0)),
-                "log_evidence": _number(pair.log_evidence - diagnosis.main.base.log_evidence),
+                "probability": json_number(diagnosis.main.probability.get(name, 0.0)),
+                "log_evidence": json_number(pair.log_evidence - diagnosis.main.base.log_evidence),
                 "parameters": pair_parameters(fit),
                 **_errors(fit),
-                "held_out_error_percent": _number(100.0 * held.mean_error),
-                "held_out_rms_percent": _number(100.0 * held.rms),
-                "held_out_gain_in_se": _number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
+                "held_out_error_percent": json_number(100.0 * held.mean_error),
+                "held_out_rms_percent": json_number(100.0 * held.rms),
+                "held_out_gain_in_se": json_number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
                 "adequate": bool(gate.probability > ADEQUATE),
-                "adequate_probability": _number(gate.probability, 3),
+                "adequate_probability": json_number(gate.probability, 3),
             }
         )
     return sorted(found, key=lambda pair: (-(pair["probability"] or 0.0), -(pair["log_evidence"] or 0.0)))
@@ -277,10 +277,10 @@ def _noise(judgement: Judgement) -> dict[str, Any]:
     noise = judgement.noise
     return {
         "name": noise.name,
-        "repeat_percent": _number(100.0 * float(np.sqrt(np.mean(noise.repeat**2))), 4),
-        "clamping_percent": _number(100.0 * noise.clamping, 4),
-        "strut_spread_percent": _number(100.0 * noise.strut_spread, 4),
-        "joint_error_mm": _number(float(mm_from_m(noise.joint_error)), 4),
+        "repeat_percent": json_number(100.0 * float(np.sqrt(np.mean(noise.repeat**2))), 4),
+        "clamping_percent": json_number(100.0 * noise.clamping, 4),
+        "strut_spread_percent": json_number(100.0 * noise.strut_spread, 4),
+        "joint_error_mm": json_number(float(mm_from_m(noise.joint_error)), 4),
         "origin": noise.origin,
     }
 
@@ -288,14 +288,14 @@ def _noise(judgement: Judgement) -> dict[str, Any]:
 def _gates(judgement: Judgement) -> dict[str, Any]:
     gate = judgement.base_gate
     return {
-        "baseline_probability": _number(gate.probability, 3),
-        "squares": _number(gate.squares),
-        "squares_probability": _number(gate.squares_probability, 3),
-        "simulated_squares": [_number(x) for x in np.sort(gate.simulated).tolist()],
-        "structure_probability": _number(gate.structure_probability, 3),
+        "baseline_probability": json_number(gate.probability, 3),
+        "squares": json_number(gate.squares),
+        "squares_probability": json_number(gate.squares_probability, 3),
+        "simulated_squares": [json_number(x) for x in np.sort(gate.simulated).tolist()],
+        "structure_probability": json_number(gate.structure_probability, 3),
         "structure": gate.worst,
-        "gain_probability": _number(gate.gain_probability, 3),
-        "gain_threshold": _number(gate.gain_threshold),
+        "gain_probability": json_number(gate.gain_probability, 3),
+        "gain_threshold": json_number(gate.gain_threshold),
     }
 
 
@@ -303,14 +303,14 @@ def _in_short(judgement: Judgement) -> dict[str, Any]:
     return {
         "verdict": judgement.verdict,
         "plausible": list(judgement.plausible),
-        "noise_percent": _number(100.0 * judgement.noise.typical, 4),
+        "noise_percent": json_number(100.0 * judgement.noise.typical, 4),
         "origin": judgement.noise.origin,
         "probability": {
-            name: _number(weight, 4)
+            name: json_number(weight, 4)
             for name, weight in sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0]))
             if weight > 1e-4
         },
-        "baseline_gate_probability": _number(judgement.base_gate.probability, 3),
+        "baseline_gate_probability": json_number(judgement.base_gate.probability, 3),
         "structure": judgement.base_gate.worst,
     }
 

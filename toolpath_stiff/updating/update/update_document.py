@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison.residual_variables import directions
-from toolpath_stiff.updating.diagnosis.diagnosis_document import interval
+from toolpath_stiff.updating.diagnosis.diagnosis_document import interval, json_number
 from toolpath_stiff.updating.inference.fit import NORMAL_95, Fit
 from toolpath_stiff.updating.inference.held_out import gain_in_standard_errors
 from toolpath_stiff.updating.inference.predict import scaled_law
@@ -60,16 +60,16 @@ def document(
         "steps": steps,
         "support": [_support(one) for one in update.supports],
         "turned_down": [_support(one) for one in update.turned_down],
-        "noise_percent": _number(100.0 * update.noise.typical),
-        "noise_floor_percent": _number(100.0 * MEAN_OVER_SD * update.noise.typical),
+        "noise_percent": json_number(100.0 * update.noise.typical),
+        "noise_floor_percent": json_number(100.0 * MEAN_OVER_SD * update.noise.typical),
         "noise": {"name": update.noise.name, "origin": update.noise.origin},
-        "widening": _number(update.widening),
+        "widening": json_number(update.widening),
         "uncertainty": None
         if uncertainty is None
         else {
             "parameters": list(uncertainty.names),
-            "sd": [_number(float(sd)) for sd in uncertainty.sd],
-            "correlation": [[_number(float(x), 3) for x in row] for row in uncertainty.correlation],
+            "sd": [json_number(float(sd)) for sd in uncertainty.sd],
+            "correlation": [[json_number(float(x), 3) for x in row] for row in uncertainty.correlation],
         },
         "assumptions": _assumptions(update),
         "warnings": list(update.data.warnings),
@@ -126,13 +126,13 @@ def _step(update: Update, k: int) -> dict[str, Any]:
         "name": step.name,
         "effects": list(step.fit.names),
         **_errors(step.fit.residual),
-        "held_out_error_percent": _number(100.0 * held.mean_error),
-        "held_out_rms_percent": _number(100.0 * held.rms),
+        "held_out_error_percent": json_number(100.0 * held.mean_error),
+        "held_out_rms_percent": json_number(100.0 * held.rms),
         "by_direction": {
             name: {
                 "readings": int((along == name).sum()),
                 **_errors(step.fit.residual[along == name]),
-                "held_out_error_percent": _number(100.0 * float(held.errors[along == name].mean())),
+                "held_out_error_percent": json_number(100.0 * float(held.errors[along == name].mean())),
             }
             for name in np.unique(along).tolist()
         },
@@ -144,8 +144,8 @@ def _step(update: Update, k: int) -> dict[str, Any]:
         before = update.steps[k - 1].held
         gain = gain_in_standard_errors(before, held)
         fall = before.mean_error - held.mean_error
-        found["held_out_gain_in_se"] = _number(gain, 3)
-        found["held_out_se_percent"] = _number(100.0 * abs(fall / gain), 3) if gain else None
+        found["held_out_gain_in_se"] = json_number(gain, 3)
+        found["held_out_se_percent"] = json_number(100.0 * abs(fall / gain), 3) if gain else None
     return found
 
 
@@ -153,9 +153,9 @@ def _errors(residual: FloatArray) -> dict[str, Any]:
     """Of (modelled - measured) / measured."""
     relative = np.expm1(-residual)
     return {
-        "mean_abs_error_percent": _number(100.0 * float(np.abs(relative).mean())),
-        "bias_percent": _number(100.0 * float(relative.mean())),
-        "rms_percent": _number(100.0 * float(np.sqrt(np.mean(relative**2)))),
+        "mean_abs_error_percent": json_number(100.0 * float(np.abs(relative).mean())),
+        "bias_percent": json_number(100.0 * float(relative.mean())),
+        "rms_percent": json_number(100.0 * float(np.sqrt(np.mean(relative**2)))),
     }
 
 
@@ -165,9 +165,9 @@ def _law(machine: Machine, step: Step, widening: float) -> list[dict[str, Any]]:
     ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))
     return [
         {
-            "length_mm": _number(float(mm_from_m(length)), 7),
-            "stiffness": _number(stiffness / 1e6),
-            "sd": _number(stiffness / 1e6 * float(deviation), 3) if step.fit.law_free else None,
+            "length_mm": json_number(float(mm_from_m(length)), 7),
+            "stiffness": json_number(stiffness / 1e6),
+            "sd": json_number(stiffness / 1e6 * float(deviation), 3) if step.fit.law_free else None,
         }
         for (length, stiffness), deviation in zip(ends, deviations, strict=True)
     ]
@@ -184,9 +184,9 @@ def step_parameters(fit: Fit, widening: float = 1.0) -> dict[str, Any]:
             si = component.parameter.si
             ends = sorted((component.value(low) / si, component.value(high) / si))
             entry[component.parameter.key] = {
-                "value": _number(component.value(float(size)) / si),
+                "value": json_number(component.value(float(size)) / si),
                 "unit": component.parameter.unit,
-                "interval": [_number(end) for end in ends],
+                "interval": [json_number(end) for end in ends],
             }
             index += 1
         found[candidate.name] = entry
@@ -207,12 +207,12 @@ def _support(one: Support) -> dict[str, Any]:
         "effect": one.effect,
         "supported": one.supported,
         "reasons": list(one.reasons),
-        "mean_abs_error_percent": _number(100.0 * one.error),
-        "held_out_error_percent": _number(100.0 * one.held_out_error),
-        "held_out_fall_percent": _number(100.0 * one.fall),
-        "held_out_gain_in_se": _number(one.gain_in_se, 3),
-        "likelihood_gain": _number(one.likelihood_gain),
-        "threshold": _number(one.threshold),
+        "mean_abs_error_percent": json_number(100.0 * one.error),
+        "held_out_error_percent": json_number(100.0 * one.held_out_error),
+        "held_out_fall_percent": json_number(100.0 * one.fall),
+        "held_out_gain_in_se": json_number(one.gain_in_se, 3),
+        "likelihood_gain": json_number(one.likelihood_gain),
+        "threshold": json_number(one.threshold),
     }
 
 
@@ -269,8 +269,3 @@ def residuals_csv(update: Update) -> str:
             ]
         )  # fmt: skip
     return out.getvalue()
-
-
-def _number(value: float, digits: int = 5) -> float | None:
-    """A float of some significant digits; None for what JSON cannot hold."""
-    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
