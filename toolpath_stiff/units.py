@@ -40,11 +40,6 @@ def m_from_um(um: T) -> T:
     return um / 1e6
 
 
-def mm_from_inch(inch: T) -> T:
-    """Millimetres from inches."""
-    return inch * MM_PER_INCH
-
-
 def rad_from_deg(deg: T) -> T:
     """Radians from degrees."""
     return deg * RAD_PER_DEG

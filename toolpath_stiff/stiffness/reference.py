@@ -65,14 +65,6 @@ def axis_products(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.asarray(np.outer(axis, axis) / (axis @ axis))
 
 
-def tip_displacement(machine: Machine, position: ArrayLike, rotation: ArrayLike, force: ArrayLike) -> FloatArray:
-    """(3,) m, displacement of the tool tip under a force (3,) N at the tip."""
-    loads = np.zeros(24)
-    loads[3 * TIP : 3 * TIP + 3] = force
-    displacements = np.linalg.solve(structure_stiffness(machine, position, rotation), loads)
-    return np.asarray(displacements[3 * TIP : 3 * TIP + 3])
-
-
 def tip_compliance(machine: Machine, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """(3, 3) m/N, displacements of the tip under unit forces along x, y, z."""
     loads = np.zeros((24, 3))
