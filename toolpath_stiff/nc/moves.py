@@ -127,6 +127,9 @@ class Program:
         Who read it: "builtin" or "linuxcnc".
     dialect
         How it was read: "generic", "linuxcnc", "fanuc", "haas", or one of them as a controller file changes it.
+    marks
+        (line, name) where operations begin, ascending, in a language whose text says so otherwise than by comment
+        lines; None: the comment lines of `source` say it.
     """
 
     name: str
@@ -141,3 +144,4 @@ class Program:
     tools: tuple[ToolUse, ...] = field(default=())
     interpreter: str = "builtin"
     dialect: str = "generic"
+    marks: tuple[tuple[int, str], ...] | None = None

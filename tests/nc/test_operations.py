@@ -1,0 +1,405 @@
+"""Operations of a program: where they begin, what they are called, on texts as CAM posts write them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.nc import rs274
+from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, operations
+from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.tables import ToolEntry
+
+needs_rs274 = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
+
+
+def found(text: str, **options: object) -> Operations:
+    return operations(parse_program(text, "part.nc", **options))  # type: ignore[arg-type]
+
+
+def names(text: str, **options: object) -> list[str]:
+    return [row.name for row in found(text, **options).rows]
+
+
+# What the posts write, shortened; the text around the moves as it stands in published programs.
+FUSION = """%
+(1001)
+(BRACKET - SETUP 1)
+(T1 D=6. CR=0. - ZMIN=-3. - FLAT END MILL)
+(T4 D=10. CR=0. - ZMIN=-3. - FLAT END MILL)
+N10 G90 G94 G17
+N15 G21
+(When using Fusion for Personal Use, the feedrate of rapid)
+(moves is reduced to match the feedrate of cutting moves,)
+(which can increase machining time.)
+N20 G53 G0 Z0.
+
+(2D CONTOUR2)
+N25 M9
+N30 T1 M6
+(6 MM CARBIDE)
+S10000 M3
+G0 X35 Y-1
+G1 Z5 F1000
+G1 X0
+
+(2D CONTOUR3)
+G1 Z5
+X20
+Z15
+
+(POCKET1)
+M5
+T4 M6
+S5000 M3
+G0 X1
+G1 Z-1
+M30
+%
+"""
+FREECAD = """(Exported by FreeCAD)
+(Post Processor: linuxcnc_post)
+(Output Time:2019-08-18 19:02:12.259952)
+(begin preamble)
+G17 G90
+G21
+(begin operation: Fixture)
+(Path: Fixture)
+G54
+G0 Z25
+(finish operation: Fixture)
+(begin operation: TC: end mill 1.4)
+(Path: TC: end mill 1.4)
+(begin toolchange)
+M5
+M6 T7
+M3 S10000
+(finish operation: TC: end mill 1.4)
+(begin operation: Drilling)
+(Path: Drilling)
+(Begin Drilling)
+G0 Z6
+G99 G81 X1 Y1 Z-2 R1 F100
+G80
+(finish operation: Drilling)
+(begin operation: Profile)
+(Path: Profile)
+G1 X5 F300
+(finish operation: Profile)
+(begin postamble)
+M5
+M2
+"""
+SOLIDCAM = """%
+O1000 (TEST)
+( MCV-OP ) (28-OCT-2019)
+(SUBROUTINES: O2 .. O0)
+G90 G17
+G80 G40
+M6 T1
+(TOOL -1- MILL DIA 10.0 R0. MM )
+G90 G00 G40 G54
+X1. Y1. Z50. S1000 M3
+(------------------)
+(F-CONTOUR - PROFILE)
+(------------------)
+G1 Z-1. F100.
+X20.
+G0 Z50.
+(------------------)
+(P-POCKET - T1)
+(------------------)
+G1 X5. F100.
+M30
+%
+"""
+MASTERCAM = """%
+O0000 (BRACKET)
+(DATE=DD-MM-YY - 09-07-10 TIME=HH:MM - 11:53)
+(MCX FILE - T)
+( T1 | 12. FLAT ENDMILL | H1 )
+( T2 | 8. DRILL | H2 )
+N100 G21
+N102 G0 G17 G40 G80 G90
+( ROUGH OUTER PROFILE )
+( TOOL - 1 DIA. OFF. - 1 LEN. - 1 DIA. - 12. )
+N104 T1 M6
+N106 G0 G90 G54 X0. Y0. S1000 M3
+N112 G1 Z-1. F100.
+N114 X20.
+N116 G0 Z50.
+( DRILL )
+N118 T2 M6
+N120 G0 X5. Y5.
+N122 G99 G81 Z-5. R2. F80.
+N124 G80
+N126 M30
+%
+"""
+VECTRIC = """( sign )
+( File created: Monday )
+(Toolpaths used in this file:)
+(Pocket 1)
+(Profile 2)
+(Tools used in this file: )
+(1 = End Mill {6 mm})
+N100G00G21G17G90G40
+N110G80
+N120T1M06
+N130 (End Mill {6 mm})
+N140S18000M03
+N150(Toolpath:- Pocket 1)
+N160()
+N170G94
+N180G00X0.000Y0.000F1000.0
+N190G1Z-2.000F500.0
+N200G1X10.000F1000.0
+N210G00Z20
+N220(| Toolpath:- 'Profile 2'    )
+N230G1X0.000
+M30
+"""
+ESTLCAM = """( Zero is the XY centre )
+(Project sign)
+G90
+M03 S12000
+(No. 1: Hole 1)
+G00 X1 Y1
+G01 Z-1 F100
+(No. 2: Part 3)
+G00 Z5
+G00 X5
+G01 Z-1
+M30
+"""
+GCODETOOLS = """(Header)
+G21 (All units in mm)
+(Start cutting path id: path1-4)
+(Change tool to Default tool)
+G00 Z5
+G00 X24 Y2
+G01 Z-1 F100 (Penetrate)
+G01 X3
+G00 Z5
+(End cutting path id: path1-4)
+(Start cutting path id: path9)
+G00 X0
+G01 Z-1
+G00 Z5
+(End cutting path id: path9)
+M2
+"""
+MARLIN = """(Fusion CAM 2.0.18961)
+( Posts processor: MPCNC21.cps)
+( *** START begin ***)
+G21 G90
+( *** START end ***)
+( *** SECTION begin ***)
+(   X Min: 11.35 - X Max: 145.87)
+( boxDoorDrill - Milling - Tool: 1 -  drill)
+( COMMAND_START_SPINDLE)
+M3 S5000
+G0 Z3
+( MOVEMENT_CUTTING)
+G1 Z-3 F1000
+( MOVEMENT_LEAD_OUT)
+G1 Z-2
+( MOVEMENT_CUTTING)
+G1 X5
+M30
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (FUSION, ["2D CONTOUR2", "2D CONTOUR3", "POCKET1"]),
+        (FREECAD, ["Drilling", "Profile"]),
+        (SOLIDCAM, ["F-CONTOUR - PROFILE", "P-POCKET - T1"]),
+        (MASTERCAM, ["ROUGH OUTER PROFILE", "DRILL"]),
+        (VECTRIC, ["Pocket 1", "Profile 2"]),
+        (ESTLCAM, ["No. 1: Hole 1", "No. 2: Part 3"]),
+        (GCODETOOLS, ["path1-4", "path9"]),
+        (MARLIN, ["boxDoorDrill - Milling - Tool: 1 - drill"]),
+    ],
+    ids=["fusion", "freecad", "solidcam", "mastercam", "vectric", "estlcam", "gcodetools", "marlin"],
+)
+def test_programs_as_posts_write_them(text: str, expected: list[str]) -> None:
+    assert names(text) == expected
+
+
+def test_where_operations_begin_and_end() -> None:
+    got = found(FUSION)
+    lines = FUSION.split("\n")
+    assert [lines[row.first_line - 1] for row in got.rows[1:]] == ["(2D CONTOUR3)", "(POCKET1)"]
+    assert [row.tool for row in got.rows] == [1, 1, 4]
+    assert [lines[row.last_line - 1] for row in got.rows] == ["G1 X0", "Z15", "G1 Z-1"]
+    assert [row.number for row in got.rows] == [1, 2, 3]
+
+
+def test_a_retract_belongs_to_what_it_leaves_and_an_approach_to_what_it_goes_to() -> None:
+    program = parse_program("G0 X1\nG1 X2 F100\nG0 Z5\n(B)\nG0 X9\nG1 X8\nG0 Z9\n(C)\nG0 X0\nM30\n")
+    got = operations(program)
+    assert [program.source[line - 1] for line in program.moves.line[got.of_move == 0]] == [
+        "G0 X1",
+        "G1 X2 F100",
+        "G0 Z5",
+    ]
+    assert [row.name for row in got.rows][1:] == ["B"]  # nothing is cut after C: its rapid stays with B
+    assert program.moves.line[got.of_move == 1].tolist() == [5, 6, 7, 9]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("G1 X1 F100\nX2\n", ["part.nc"]),
+        ("(BRACKET)\n(JOE)\nG1 X1 F100\nX2\n", ["BRACKET"]),
+        ("O12 (BRACKET)\nT3 M6\nG1 X1 F100\nX2\n", ["BRACKET"]),
+        ("T3 M6\nG1 X1 F100\n", ["part.nc"]),
+        ("(PLATE)\nG1 X1 F100\n(WALL)\nX2\n", ["PLATE", "WALL"]),
+        ("(BRACKET)\nT3 M6\nG1 X1 F100\nT4 M6\nG1 X2\n", ["T3", "T4"]),
+        ("T3 M6 (ROUGHER)\nG1 X1 F100\nT4 M6 ; finisher\nG1 X2\n", ["T3 ROUGHER", "T4 finisher"]),
+        ("T3 M6\nG1 X1 F100\n(T4 D=6. BALL)\nT4 M6\nG1 X2\n", ["T3", "T4 D=6. BALL"]),
+        ("T3 M6\nG1 X1 F100\nT3 M6\nG1 X2\n", ["part.nc"]),
+        ("T3 M6 G0 X1 (A)\nG1 X2 F100\nT4 M6 G1 X9 (B)\n", ["T3 A", "T4 B"]),
+        ("G1 X1 F100\nX2 (finish)\nX3 ; wall\n", ["part.nc"]),
+        ("G1 X1 F100\n(MSG, NOW THE WALL)\nX3\n", ["part.nc", "NOW THE WALL"]),
+        ("G1 X1 F100\n(debug,wall)\nX3\n", ["part.nc", "wall"]),
+        ("G1 X1 F100\n; OPERATION 2: POCKET\nX3\n", ["part.nc", "OPERATION 2: POCKET"]),
+        ("G1 X1 F100\n; Operation: POCKET\nX3\n", ["part.nc", "POCKET"]),
+        ("G1 X1 F100\nN200 (WALL)\nX3\n", ["part.nc", "WALL"]),
+        ("G1 X1 F100\n(=====)\n(* WALL *)\n(=====)\nX3\n", ["part.nc", "WALL"]),
+        ("G1 X1 F100\n(17)\nX3\n", ["part.nc"]),
+        ("G1 X1 F100\n(row 1 done)\nX3\n", ["part.nc"]),
+        ("G1 X1 F100\n(M5 T2)\nX3\n", ["part.nc"]),
+        ("G1 X1 F100\n;G04 P1 ; dwell\nX3\n", ["part.nc"]),
+        ("G1 X1 F100\n(A)\n(B)\n\n(C)\nX3\n", ["part.nc", "A"]),
+        ("G1 X1 F100\nM5\n(WALL)\nM30\n", ["part.nc"]),
+    ],
+)
+def test_names(text: str, expected: list[str]) -> None:
+    assert names(text) == expected
+
+
+def test_a_tool_without_comment_has_its_remark_from_the_tool_table() -> None:
+    tools = {3: ToolEntry(3, remark="face mill"), 4: ToolEntry(4)}
+    assert names("T3 M6\nG1 X1 F100\nT4 M6\nG1 X2\n", tools=tools) == ["T3 face mill", "T4"]
+
+
+def test_marks_take_the_place_of_comments() -> None:
+    from dataclasses import replace
+
+    program = replace(parse_program("G1 X1 F100\n(NO)\nX2\nX3\n", "part.nc"), marks=((1, "ROUGH"), (3, "WALL")))
+    assert [(row.name, row.first_line, row.last_line) for row in operations(program).rows] == [
+        ("ROUGH", 1, 1),
+        ("WALL", 3, 4),
+    ]
+
+
+SUBPROGRAM = """O1 (PLATE)
+G90 G94
+(ROUGH)
+G0 X0
+M98 P1000 L3
+(FINISH)
+G0 X5
+M98 P1000
+G0 X9
+(REST)
+G1 X9.5
+M30
+O1000 (CONTOUR)
+(FROM THE LEFT)
+G91
+G1 X1 F100
+X-2
+G90
+M99
+"""
+
+
+def test_a_subprogram_belongs_to_the_operation_that_calls_it() -> None:
+    got = found(SUBPROGRAM)
+    assert [row.name for row in got.rows] == ["ROUGH", "FINISH", "REST"]
+    assert np.bincount(got.of_move).tolist() == [6, 1 + 2 + 1, 1]
+
+
+def test_a_list_of_calls_has_the_subprograms_for_operations() -> None:
+    text = "O1\nM98 P10\nM98 P20\nM98 P10\nM30\nO10\n(BORE)\nG1 X1 F100\nX0\nM99\nO20\n(WALL)\nG1 Y1 F100\nY0\nM99\n"
+    assert names(text) == ["BORE", "WALL", "BORE"]
+
+
+@needs_rs274
+def test_the_second_interpreter_gives_the_same_operations() -> None:
+    for text in (FREECAD, SUBPROGRAM.replace("O1 (PLATE)\n", ""), ESTLCAM):
+        assert found(text, interpreter="linuxcnc").rows == found(text).rows
+
+
+@needs_rs274
+def test_a_loop_passes_its_comments_again_without_a_new_operation() -> None:
+    text = "(HEAD)\nG21\n(LAYERS)\n#1=0\no1 while [#1 lt 3]\n(LAYER)\nG1 X1 F100\nX#1\n#1=[#1+1]\n"
+    text += "o1 endwhile\n(WALL)\nG1 Y1\nM2\n"
+    assert names(text, interpreter="linuxcnc") == ["LAYERS", "WALL"]
+
+
+def test_comments_between_all_moves_name_no_operations() -> None:
+    count = MOST_OPERATIONS + 5
+    text = "T1 M6\nG1 F100\n" + "".join(f"(MOVE {i})\nX{i + 1}\n" for i in range(count)) + "T2 M6\n(WALL)\nY1\n"
+    assert names(text) == ["T1", "T2"]
+
+
+LINES = st.lists(
+    st.sampled_from(
+        [
+            "G0 X1",
+            "G0 X2 Z5",
+            "G1 X3 F100",
+            "G1 X4 F50",
+            "G1 X5 F70",
+            "T1 M6",
+            "T2 M6",
+            "(ROUGH)",
+            "(WALL)",
+            "; x",
+            "",
+            "M8",
+            "(END OF OP)",
+        ]
+    ),
+    min_size=1,
+    max_size=25,
+)
+
+
+@settings(deadline=None, max_examples=150)
+@given(LINES, st.data())
+def test_comments_beside_words_change_no_operation(lines: list[str], data: st.DataObject) -> None:
+    lines = [*lines, "G1 X99 F100"]
+    beside = [
+        f"{line} {data.draw(st.sampled_from(['(finish)', '; finish', '']))}"
+        if line[:1] in "GXM" and line and data.draw(st.booleans())
+        else line
+        for line in lines
+    ]
+    plain, commented = found("\n".join(lines)), found("\n".join(beside))
+    assert plain.rows == commented.rows
+    assert plain.of_move.tolist() == commented.of_move.tolist()
+
+
+@settings(deadline=None, max_examples=150)
+@given(LINES)
+def test_operations_are_stretches_that_cut_and_hold_one_tool(lines: list[str]) -> None:
+    program = parse_program("\n".join([*lines, "G1 X99 F100"]))
+    got, moves = operations(program), program.moves
+    assert (np.diff(got.of_move) >= 0).all()
+    assert sorted(set(got.of_move.tolist())) == list(range(len(got.rows)))
+    for i, row in enumerate(got.rows):
+        mine = moves.take(got.of_move == i)
+        cuts = mine.motion != 0
+        assert cuts.any()
+        assert set(mine.tool[cuts].tolist()) == {row.tool}
+        assert row.first_line <= mine.line.min()
+        assert row.last_line == mine.line.max()
+        assert row.name

@@ -1,0 +1,103 @@
+"""Comment lines of a program that head an operation, as CAM posts and people write them.
+
+What posts write was looked up in programs of Fusion 360, HSMWorks and Inventor (one line before each operation; tools,
+notes on the licence in the header), FreeCAD (`begin operation: NAME`, `finish operation: NAME`), Vectric (`Toolpath:-
+NAME` between lines of dashes), SolidCAM and Mastercam (the description of the tool beside the name), Estlcam, bCNC,
+Inkscape's Gcodetools, pcb2gcode.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+NAMED, MARKED, TOOL = "named", "marked", "tool"
+
+COMMENTS = re.compile(r"\(([^()]*)\)?|;(.*)")
+NO_WORDS = re.compile(r"\s*(?:N\s*\d+\s*)?", re.IGNORECASE)  # a line number is no word
+ACTIVE = re.compile(r"\s*(?:MSG|DEBUG|PRINT)\s*,", re.IGNORECASE)  # LinuxCNC shows what follows
+BORDER = re.compile(r"^(?:[\s*=#~|'\"]|[-_.]{2,})+|(?:[\s*=#~|'\"]|[-_.]{2,})+$")
+MARK = re.compile(
+    r"(?:(?:begin|start)\s+(?:of\s+)?(?:operation|section|toolpath|cutting\s+path\s+id)|tool\s?path(?:\s+name)?"
+    r"|operation(?:\s+name)?|block-name)\s*:-?\s*(?=.*\w)",
+    re.IGNORECASE,
+)
+TOOL_LINE = re.compile(r"(?:T\s*\d+|tools?|change\s+(?:to\s+)?tool)\b", re.IGNORECASE)
+# The end of something, the state of a post, licence notes, code that is commented out: none of these heads anything.
+NOTHING = re.compile(
+    r"(?:finish(?:ed)?|end)\s+(?:of\s+)?(?:the\s+)?(?:op|operation|section|tool\s?path|cutting|path|preamble)\b"
+    r"|.*\b(?:done|finished|completed)$"
+    r"|(?:begin|start)\s+(?:of\s+)?(?:preamble|tool\s?change)\b|tool\s?change$|(?:section|start|stop|end)\s+(?:begin|end)$"
+    r"|(?:MOVEMENT|COMMAND)_\w+$|>>>|block-(?:expand|enable)\b|[XYZ]\s+min\b|when\s+using\s+fusion\b"
+    r"|(?:[A-Z]\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*)+(?:;.*)$|(?:[A-Z]\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*){2,}$",
+    re.IGNORECASE,
+)
+FROM_HERE_NOTES = re.compile(r"when\s+using\s+fusion\b", re.IGNORECASE)  # the rest of its block is its sentence
+
+
+class Heading(NamedTuple):
+    """A block of comment lines: its first line, its name, and what the name is: NAMED, MARKED (by the post) or TOOL."""
+
+    line: int
+    name: str
+    kind: str
+
+
+def split_comments(text: str) -> tuple[str, str]:
+    """The code of a line and its comments, joined."""
+    return COMMENTS.sub(" ", text), " ".join(first or second for first, second in COMMENTS.findall(text))
+
+
+def headings(lines: Sequence[str]) -> list[Heading]:
+    """Blocks of successive lines that hold comments alone, in order; those that name nothing are left out."""
+    found: list[Heading] = []
+    block: list[str] = []
+    first = last = 0
+    for number, text in enumerate(lines, 1):
+        if "(" not in text and ";" not in text:
+            continue
+        code, comment = split_comments(text)
+        if not NO_WORDS.fullmatch(code):
+            continue
+        if number != last + 1:
+            _close(found, first, block)
+            block, first = [], number
+        block.append(comment)
+        last = number
+    _close(found, first, block)
+    return found
+
+
+def _close(found: list[Heading], first: int, block: list[str]) -> None:
+    heading = heading_of(block, first)
+    if heading is not None:
+        found.append(heading)
+
+
+def heading_of(block: Sequence[str], line: int) -> Heading | None:
+    """What a block of comments names: what the post marks, else the first line with letters, else a tool."""
+    named = tool = None
+    for comment in block:
+        name = plain_name(comment)
+        mark = MARK.match(name)
+        if mark is not None:
+            return Heading(line, plain_name(name[mark.end() :]), MARKED)
+        if FROM_HERE_NOTES.match(name):
+            break
+        if NOTHING.match(name) or not any(character.isalpha() for character in name):
+            continue
+        if TOOL_LINE.match(name):
+            tool = tool or name
+        else:
+            named = named or name
+    if named is None:
+        return None if tool is None else Heading(line, tool, TOOL)
+    return Heading(line, named, NAMED)
+
+
+def plain_name(comment: str) -> str:
+    """A comment without what frames it: blanks, asterisks, dashes; the text alone of `MSG, text`."""
+    active = ACTIVE.match(comment)
+    text = " ".join((comment[active.end() :] if active else comment).split())
+    return BORDER.sub("", text)

@@ -1,0 +1,260 @@
+"""The operations of a program: which moves belong together, and what people call them.
+
+An operation begins at a tool change, and at a block of comment lines, if cutting follows before the next one. Between
+two cuts there is one beginning at most: tool change, comments and rapids between them belong to what follows, rapids
+before the first of these to what went before. An operation always cuts. docs/nc.md has the whole rule.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.nc.headings import MARKED, NAMED, TOOL, Heading, headings, plain_name, split_comments
+from toolpath_stiff.nc.moves import RAPID, Moves, Program
+
+IntArray = NDArray[np.int64]
+
+MOST_OPERATIONS = 1000  # beyond, comments name passes or moves, not operations: the tools are taken
+# A call, a return, a loop or a condition: M98, M99 and LinuxCNC's O words (`o100 call`, `o<name> while`).
+LEAVES = re.compile(
+    r"\s*(?:/\s*\d?\s*)?(?:N\s*\d+\s*)?(?:O\s*(?:\d+\s*[A-Z]|[<#\[])|[^O(;]*M\s*0*9[89](?!\d))", re.IGNORECASE
+)
+HEAD = re.compile(r"\s*/?\s*[O:]\s*\d+\s*(?:[(;].*)?$", re.IGNORECASE)
+BARE = re.compile(r"\s*(?:%|[O:]\s*\d+|N\s*\d+)?\s*", re.IGNORECASE)
+CHANGES_TOOL = re.compile(r"M\s*0*6(?!\d)|T\s*\d", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Operation:
+    """A stretch of moves between two beginnings.
+
+    Attributes
+    ----------
+    number
+        From 1, in the order of the run.
+    name
+        Of its comment block, of its tool, or of the program.
+    first_line, last_line
+        From its heading to the last line of its moves; with subprograms the smallest and the largest of its lines.
+    tool
+        The tool that cuts, 0 for none.
+    first_move
+        Row of its first move.
+    """
+
+    number: int
+    name: str
+    first_line: int
+    last_line: int
+    tool: int
+    first_move: int
+
+
+@dataclass(frozen=True)
+class Operations:
+    """All operations of a program, and `of_move` (n,): the row of its operation for every move, ascending."""
+
+    rows: tuple[Operation, ...]
+    of_move: IntArray
+
+
+def operations(program: Program) -> Operations:
+    """The operations of a program that was read, by either interpreter."""
+    remarks = {tool.number: tool.remark for tool in program.tools}
+    return find_operations(program.source, program.moves, program.name, remarks, program.marks)
+
+
+def find_operations(
+    lines: Sequence[str],
+    moves: Moves,
+    name: str,
+    remarks: dict[int, str] | None = None,
+    marks: Sequence[tuple[int, str]] | None = None,
+) -> Operations:
+    """The operations of moves.
+
+    Parameters
+    ----------
+    lines
+        The program's text.
+    moves
+        With the lines that asked for them.
+    name
+        Of the program, for an operation that nothing else names.
+    remarks
+        What the tool table says of tools, by number.
+    marks
+        (line, name) where operations begin, ascending, on the line of their first move or before it: of a language
+        whose text says so otherwise than by comment lines.
+    """
+    cuts = np.flatnonzero(moves.motion != RAPID)
+    if not len(cuts):
+        return Operations((), np.zeros(len(moves), dtype=np.int64))
+    text = _Text(lines, marks)
+    begins = _beginnings(text, moves, cuts, text.heads, MOST_OPERATIONS) or _beginnings(text, moves, cuts, [])
+    first = [0] + [begin.move for begin in begins[1:]]
+    names = [_name(begin, text, remarks or {}, alone=len(begins) == 1) or name for begin in begins]
+    of_move = np.repeat(np.arange(len(first)), np.diff([*first, len(moves)]))
+    low, high = np.minimum.reduceat(moves.line, first), np.maximum.reduceat(moves.line, first)
+    rows = [
+        Operation(i + 1, names[i], min(int(low[i]), begin.line), int(high[i]), begin.tool, begin.move)
+        for i, begin in enumerate(begins)
+    ]
+    return Operations(tuple(rows), of_move.astype(np.int64))
+
+
+@dataclass
+class _Beginning:
+    """What stands between two cuts: the first move after it, headings passed, the tool that cuts, its tool change."""
+
+    move: int
+    heads: list[Heading]
+    tool: int
+    change: tuple[int, str] | None  # line and comment
+
+    @property
+    def line(self) -> int:
+        """Where its heading or its tool change stands; the largest number there is without any."""
+        found = [head.line for head in self.heads] + ([self.change[0]] if self.change else [])
+        return min(found, default=np.iinfo(np.int64).max)
+
+
+class _Text:
+    """A program's text: headings, its title, and which of its lines are passed between two moves."""
+
+    def __init__(self, lines: Sequence[str], marks: Sequence[tuple[int, str]] | None) -> None:
+        self.lines = lines
+        self.title, self.header_end = ("", 0) if marks is not None else _title(lines)
+        found = headings(lines) if marks is None else [Heading(line, name, MARKED) for line, name in marks]
+        if not self.title:
+            self.title = next((h.name for h in found if h.line <= self.header_end and h.kind == NAMED), "")
+        self.heads = [h for h in found if h.line > self.header_end or h.kind == MARKED]
+        self.leaves = np.array(
+            [
+                number
+                for number, text in enumerate(lines, 1)
+                if ("M" in text or "O" in text or "m" in text or "o" in text) and LEAVES.match(text)
+            ],
+            dtype=np.int64,
+        )
+        self._enters: IntArray | None = None
+
+    @property
+    def enters(self) -> IntArray:
+        """Lines at which a run can arrive from elsewhere: calls and loops, and the heads of subprograms."""
+        if self._enters is None:
+            heads = [number for number, text in enumerate(self.lines, 1) if HEAD.match(text)]
+            self._enters = np.union1d(self.leaves, np.array(heads, dtype=np.int64))
+        return self._enters
+
+    def passed(self, before: int, line: int) -> list[tuple[int, int]]:
+        """Stretches of lines, their first left out, that a run passes from a move of `before` to one of `line`.
+
+        Straight on, all between them; where it leaves for a subprogram or a loop, those up to there and those from
+        where it arrives.
+        """
+        leaves = self.leaves
+        at = int(np.searchsorted(leaves, before))
+        stop = int(leaves[at]) if at < len(leaves) else len(self.lines) + 1
+        if before <= line <= stop:
+            return [(before, line)]
+        arrive = self.enters
+        at = int(np.searchsorted(arrive, line))
+        return [(before, stop), (int(arrive[at - 1]) if at else 0, line)]
+
+
+def _title(lines: Sequence[str]) -> tuple[str, int]:
+    """The comment beside the program's number, and the last line before the first one with other words."""
+    title = ""
+    for number, text in enumerate(lines, 1):
+        code, comment = split_comments(text)
+        if not BARE.fullmatch(code):
+            return title, number - 1
+        if code.strip() and comment and not title:
+            title = plain_name(comment)
+    return title, len(lines)
+
+
+def _beginnings(
+    text: _Text, moves: Moves, cuts: IntArray, heads: list[Heading], most: float = np.inf
+) -> list[_Beginning]:
+    """One for every cut before which a heading is passed or the tool changes, and one for the first cut.
+
+    None at all if there are more than `most`.
+    """
+    at = np.array([head.line for head in heads], dtype=np.int64)
+    seen: dict[int, Sequence[int]] = {}  # move -> headings (rows of `heads`) passed right before it
+    line = np.concatenate([[0], moves.line])
+    below, left = np.searchsorted(at, line, side="right"), np.searchsorted(text.leaves, line)
+    odd = (np.diff(line) < 0) | (np.diff(left) != 0)
+    straight = np.flatnonzero(~odd & (np.diff(below) != 0))
+    for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
+        seen[move] = range(low, high)
+    known: dict[tuple[int, int], list[int]] = {}
+    for move in np.flatnonzero(odd).tolist():
+        way = (int(line[move]), int(line[move + 1]))
+        if way not in known:
+            spans = [np.searchsorted(at, ends, side="right").tolist() for ends in text.passed(*way)]
+            known[way] = [row for low, high in spans for row in range(low, high)]
+        if known[way]:
+            seen[move] = known[way]
+    changes = set((np.flatnonzero(np.diff(moves.tool) != 0) + 1).tolist())
+    events = sorted(changes.union(seen))
+    next_cut = np.searchsorted(cuts, events)
+    tool = int(moves.tool[cuts[0]])
+    change = _tool_change(text, 0, int(moves.line[cuts[0]])) if tool else None
+    found, current, of_current = [_Beginning(0, [], tool, change)], 0, set[int]()
+    for event, ordinal in zip(events, next_cut.tolist(), strict=True):
+        if ordinal == len(cuts):
+            break  # nothing is cut after it
+        if len(found) > most:
+            return []
+        rows = seen.get(event, [])
+        if ordinal == current:
+            of_current.update(rows)
+            found[-1].heads += [heads[row] for row in rows]
+            continue
+        tool, last = int(moves.tool[cuts[ordinal]]), int(moves.tool[cuts[ordinal - 1]])
+        fresh = [row for row in rows if row not in of_current]
+        if not fresh and tool == last:
+            continue  # the comments of a subprogram that runs again
+        ends = moves.line[cuts[ordinal - 1]], moves.line[cuts[ordinal]]
+        change = None if tool == last else _tool_change(text, int(ends[0]), int(ends[1]))
+        found.append(_Beginning(event, [heads[row] for row in fresh], tool, change))
+        current, of_current = ordinal, set(fresh)
+    return found if len(found) <= most else []
+
+
+def _tool_change(text: _Text, before: int, line: int) -> tuple[int, str]:
+    """Line of the first tool change between two lines, and the comment beside the last one that has any."""
+    first, remark = line, ""
+    for low, high in text.passed(before, line):
+        for number, words in enumerate(text.lines[low:high], low + 1):
+            code, comment = split_comments(words)
+            if CHANGES_TOOL.search(code):
+                first = min(first, number)
+                remark = plain_name(comment) or remark
+    return first, remark
+
+
+def _name(begin: _Beginning, text: _Text, remarks: dict[int, str], alone: bool) -> str:
+    """What the post marks, else the first heading, else the tool; of a lone operation rather the title; "" if none."""
+    marked = [head.name for head in begin.heads if head.kind == MARKED]
+    if marked:
+        return marked[-1]
+    named = [head.name for head in begin.heads if head.kind == NAMED]
+    if named:
+        return named[0]
+    if alone and text.title:
+        return text.title
+    tools = [head.name for head in begin.heads if head.kind == TOOL]
+    about = (begin.change[1] if begin.change else "") or (tools[0] if tools else "") or remarks.get(begin.tool, "")
+    number = f"T{begin.tool}"
+    if about:
+        return about if about.upper().startswith(number) else f"{number} {about}"
+    return text.title if not begin.tool else "" if alone else number
