@@ -49,8 +49,8 @@ class BlockReader:
         self.values: dict[str, Word] = {}
         self.free: set[str] = set()
         self.block = Block(0, ())
-        self._bare: tuple[int, Word] | None = None  # the first length without a point, and its line
-        self._pointed = False  # whether any length ends with its point, as `X10.`
+        self.bare: tuple[int, Word] | None = None  # the first length without a point, and its line
+        self.pointed = False  # whether any length ends with its point, as `X10.`
 
     def fail(self, word: Word | None, found: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block, or at the block."""
@@ -139,7 +139,8 @@ class BlockReader:
     def _note(self, word: Word, reason: str) -> None:
         self.unsupported.append(Unsupported(self.block.line, word.column, word.text, reason))
 
-    def _assume(self, sentence: str) -> None:
+    def assume(self, sentence: str) -> None:
+        """Note what is taken for granted, once."""
         if sentence not in self.assumptions:
             self.assumptions.append(sentence)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import Moves, Unsupported
+from toolpath_stiff.nc.plain_lines import G_COLUMN
 from toolpath_stiff.nc.reader import ZERO
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets
@@ -106,6 +108,16 @@ class _CheckingRun(ProgramRun):
             self._add(error)
             return Block(at + 1, ())
 
+    def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
+        codes = [row[G_COLUMN] for row in rows]
+        for number, count in Counter(code for code in codes if code).items():
+            code = f"G{number}"
+            if code not in self.first:
+                line = at + codes.index(number)
+                column = next(word.column for word in self._read(line).words if word.letter == "G")
+                self.first[code] = (line + 1, column)
+            self.count[code] = self.count.get(code, 0) + count
+
     def _execute(self, block: Block) -> bool:
         for word in block.words:
             if word.letter in "GM":
@@ -165,7 +177,7 @@ def check_lines(
         findings=tuple(sorted(findings, key=lambda f: (f.line, f.column))),
         start=start,
         end=modal_state(interpreter),
-        moves=interpreter.recorder.moves() if interpreter.recorder.line else None,
+        moves=interpreter.recorder.moves() if len(interpreter.recorder) else None,
         origin=(m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c)),
         complete=not errors,
     )

@@ -50,14 +50,14 @@ class Coordinates(BlockReader):
         self.unsettled: str | None = None
 
     @property
-    def _scale(self) -> float:
+    def length_scale(self) -> float:
         """Millimetres of one length unit of the program."""
         return MM_PER_INCH if self.inch else 1.0
 
     def _read_numbers(self, codes: Codes) -> None:
         """Give the block's words their values in program units, by the dialect's decimal-point rule."""
         if not self.dialect.increments:
-            if self.dialect.name == GENERIC.name and (self._bare is None or not self._pointed):
+            if self.dialect.name == GENERIC.name and (self.bare is None or not self.pointed):
                 self._watch_points()
             return
         inch = (codes.get("units") or ("G20" if self.inch else "G21")) == "G20"
@@ -72,7 +72,7 @@ class Coordinates(BlockReader):
                 continue
             unit = INCREMENT_DEGREE if letter in angles else INCREMENT_INCH if inch else INCREMENT_MM
             self.values[letter] = word._replace(value=word.value * unit)
-            self._assume(INCREMENTS.format(self.dialect.name))
+            self.assume(INCREMENTS.format(self.dialect.name))
 
     def _watch_points(self) -> None:
         """Notice what looks like a program for a control that counts increments."""
@@ -80,11 +80,15 @@ class Coordinates(BlockReader):
             if letter not in LENGTHS or not word.value:
                 continue
             if word.text.endswith("."):
-                self._pointed = True
-            elif self._bare is None and "." not in word.text and "E" not in word.text.upper():
-                self._bare = (self.block.line, word)
-        if self._pointed and self._bare is not None:
-            self.warnings.append(MIXED.format(self._bare[1].text, self._bare[0]))
+                self.pointed = True
+            elif self.bare is None and "." not in word.text and "E" not in word.text.upper():
+                self.bare = (self.block.line, word)
+        self.warn_of_points()
+
+    def warn_of_points(self) -> None:
+        """Say, once, that some lengths have their decimal point and others none."""
+        if self.pointed and self.bare is not None:
+            self.warnings.append(MIXED.format(self.bare[1].text, self.bare[0]))
 
     def _axis_words(self) -> dict[int, float]:
         """Axis index -> value of the block's axis words in mm and degrees; they are thereby used."""
@@ -92,7 +96,7 @@ class Coordinates(BlockReader):
         for index, letter in enumerate(AXES):
             value = self.take(letter)
             if value is not None:
-                found[index] = value * self._scale if letter in LINEAR else value
+                found[index] = value * self.length_scale if letter in LINEAR else value
         return found
 
     def _point_words(self) -> dict[int, float]:
@@ -123,6 +127,21 @@ class Coordinates(BlockReader):
             first, second, _ = arcs.PLANES[self.plane]
             if first in words or second in words:
                 point[first], point[second] = self._polar_point(words.get(first), words.get(second))
+        return point
+
+    def _control_point(self, here: list[float], words: dict[int, float]) -> list[float]:
+        """Control coordinates of that point.
+
+        Where nothing turns, axis by axis: one that is not named keeps its number to the last digit.
+        """
+        frames = self.frames
+        point = frames.to_control(self._destination(here, words))
+        if self.polar is None and not frames.rotated:
+            for axis, present in enumerate(frames.position):
+                if axis not in words:
+                    point[axis] = present
+                elif not self.absolute:
+                    point[axis] = present + words[axis]
         return point
 
     # -- polar words -----------------------------------------------------------------------------------------------
@@ -200,8 +219,8 @@ class Coordinates(BlockReader):
         if self.frames.rotation is not None:
             here = [*self.frames.rotation[:2], *here[2:]] if x is None and y is None else here
         return (
-            here[0] if x is None else x * self._scale,
-            here[1] if y is None else y * self._scale,
+            here[0] if x is None else x * self.length_scale,
+            here[1] if y is None else y * self.length_scale,
             angle,
         )
 

@@ -76,6 +76,11 @@ class Frames:
         return program if self.rotation is None else _about(self.rotation, program, -self.rotation[2])
 
     @property
+    def rotated(self) -> bool:
+        """Whether a work offset or G68 turns the program's X and Y."""
+        return self.rotation is not None or self.offsets.table[self.active].rotation != 0.0
+
+    @property
     def turned(self) -> float:
         """Degrees by which the program's X and Y axes are turned from the control's: work offset and G68."""
         return self.offsets.table[self.active].rotation + (self.rotation[2] if self.rotation else 0.0)

@@ -208,7 +208,7 @@ class Interpreter(Zeros):
             value = self.take("Z")
             if value is None or any(self.has(axis) for axis in "XYABC"):
                 raise self.fail(word, "with other words than Z", "Z with the tool length")
-            length = value * self._scale
+            length = value * self.length_scale
         else:
             length = self._table_length(word)
         self.tool_length = length
@@ -276,8 +276,7 @@ class Interpreter(Zeros):
             self._machine_move(machine_word)
         elif self.motion in ("G0", "G1") and axes:
             words = self._point_words()
-            frames = self.frames
-            target = frames.to_control(self._destination(frames.to_program(frames.position), words))
+            target = self._control_point(self.frames.to_program(self.frames.position), words)
             self._straight(RAPID if self.motion == "G0" else FEED, target, set(words))
         elif self.motion in ARCS and (axes or any(self.has(c) for c in "IJKR") or given):
             self._arc()

@@ -73,10 +73,13 @@ class Mover(Coordinates):
             arc,
         )
         frames.position = control
-        if added and self.tool not in self.used_tools:
-            self._use_tool()
+        if added:
+            self.note_tool()
 
-    def _use_tool(self) -> None:
+    def note_tool(self) -> None:
+        """Keep the tool in the spindle among those that moved."""
+        if self.tool in self.used_tools:
+            return
         entry = (self.tools or {}).get(self.tool, ToolEntry(self.tool))
         self.used_tools[self.tool] = ToolUse(
             self.tool,
@@ -96,7 +99,7 @@ class Mover(Coordinates):
                 "is a feed move before any feed" if self.feed_mode != "G93" else "is a feed move without F under G93",
                 "F above 0",
             )
-        linear = math.dist(start[:3], end[:3]) if arc is None else _arc_length(arc, start, end)
+        linear = math.dist(start[:3], end[:3]) if arc is None else arc_length(arc, start, end)
         turn = max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
         if self.feed_mode == "G93":
             feed, self.feed = self.feed, None  # every move needs its own
@@ -132,7 +135,7 @@ class Mover(Coordinates):
         axis_vector[normal] = 1.0
         x, y, z = frames.to_setup(frames.to_control(middle))[:3]
         turned = frames.turn_direction((axis_vector[0], axis_vector[1], axis_vector[2]))
-        self._record(ARC, frames.to_control(target), set(words), set(), Arc((x, y, z), turned, sweep))
+        self._record(ARC, self._control_point(here, words), set(words), set(), Arc((x, y, z), turned, sweep))
 
     def _turns(self) -> int:
         turns = self.take("P")
@@ -165,17 +168,17 @@ class Mover(Coordinates):
                 raise self.fail(self.values["R"], "and a centre (I, J, K) are both given", "one of them")
             if not {first, second} & words.keys():
                 raise arcs.ArcError("an arc with R and without an end point", "an axis word of the plane")
-            return arcs.center_from_radius(start, end, radius * self._scale, clockwise)
+            return arcs.center_from_radius(start, end, radius * self.length_scale, clockwise)
         if offsets == [None, None]:
             raise arcs.ArcError("an arc without a centre", f"{in_plane[0]}, {in_plane[1]} or R")
         if self.arc_absolute:
             if None in offsets:
                 raise arcs.ArcError("an absolute centre (G90.1) with one word", f"{in_plane[0]} and {in_plane[1]}")
-            center = [v * self._scale for v in offsets if v is not None]
+            center = [v * self.length_scale for v in offsets if v is not None]
             middle = self.frames.to_program(self.frames.position)
             middle[first], middle[second] = center
             return (middle[first], middle[second])
-        return (start[0] + (offsets[0] or 0.0) * self._scale, start[1] + (offsets[1] or 0.0) * self._scale)
+        return (start[0] + (offsets[0] or 0.0) * self.length_scale, start[1] + (offsets[1] or 0.0) * self.length_scale)
 
     # -- cycles --------------------------------------------------------------------------------------------------------
 
@@ -188,7 +191,7 @@ class Mover(Coordinates):
         for letter in "RQ":
             value = self.take(letter)
             if value is not None:
-                self.sticky[letter] = value * self._scale
+                self.sticky[letter] = value * self.length_scale
         if self.has("P"):
             self.sticky["P"] = self._seconds("P") or 0.0
         words = self._point_words()
@@ -209,7 +212,7 @@ class Mover(Coordinates):
         if retract < bottom:
             raise self.fail(None, f"{code}: R at {retract:g} mm is below the bottom at {bottom:g} mm", "R above it")
         if self.retract is None:
-            self._assume("a drilling cycle before any G98 or G99 ends at its R plane (G99), as LinuxCNC starts")
+            self.assume("a drilling cycle before any G98 or G99 ends at its R plane (G99), as LinuxCNC starts")
         # As measured on LinuxCNC: a run that began below R goes to R first; otherwise a tool at or below R goes to the
         # level above the holes on its way to the next one.
         if initial < retract:
@@ -297,7 +300,7 @@ class Mover(Coordinates):
             self.recorder.add_dwell(dwell)
 
 
-def _arc_length(arc: Arc, start: list[float], end: list[float]) -> float:
+def arc_length(arc: Arc, start: list[float], end: list[float]) -> float:
     """Length of an arc or helix as `path.move_lengths` has it, so that G93's F is one over the move's time."""
     climb = sum((e - s) * n for s, e, n in zip(start, end, arc.normal, strict=False))
     first = math.dist(start[:3], arc.center)

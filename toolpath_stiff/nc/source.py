@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 
-# Control characters that a text file may hold: tab, line feed, form feed, carriage return, and the old
-# end-of-file mark of CP/M and DOS, which some posts still append.
-ALLOWED_CONTROLS = {0x09, 0x0A, 0x0C, 0x0D, 0x1A}
+# Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
+# end-of-file mark of CP/M and DOS (0x1A), which some posts still append.
+BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 
 
 def read_lines(path: str | Path) -> tuple[str, ...]:
@@ -32,19 +33,18 @@ def read_lines(path: str | Path) -> tuple[str, ...]:
 
 def split_lines(text: str, name: str) -> tuple[str, ...]:
     """Split into lines; a byte that no text holds is an error with its line and column."""
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    if not text.isprintable():
-        for number, line in enumerate(lines, 1):
-            for column, character in enumerate(line, 1):
-                code = ord(character)
-                if (code < 0x20 and code not in ALLOWED_CONTROLS) or code == 0x7F:
-                    raise InputError(
-                        f"binary byte 0x{code:02X}",
-                        expected="the text of an NC program",
-                        file=name,
-                        line=number,
-                        column=column,
-                    )
-    if lines and not lines[-1]:
-        lines.pop()
-    return tuple(line.replace("\x1a", "").replace("\x0c", " ") for line in lines)
+    joined = text.replace("\r\n", "\n").replace("\r", "\n")
+    binary = BINARY.search(joined)
+    if binary is not None:
+        at = binary.start()
+        raise InputError(
+            f"binary byte 0x{ord(binary[0]):02X}",
+            expected="the text of an NC program",
+            file=name,
+            line=joined.count("\n", 0, at) + 1,
+            column=at - joined.rfind("\n", 0, at),
+        )
+    found = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
+    if not found[-1]:
+        found.pop()
+    return tuple(found)

@@ -9,14 +9,19 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.interpreter import Call, Interpreter
 from toolpath_stiff.nc.words import Block, read_block
 
+if TYPE_CHECKING:
+    from toolpath_stiff.nc.plain_moves import PlainRun
+
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
 MOST_REPEATS = 9999
+FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
 HEAD = re.compile(r"\s*/?\s*[oO:]\s*(\d+)\s*(?:[(;].*)?$")
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
 
@@ -42,10 +47,19 @@ class ProgramRun:
         The file.
     switches
         The block-delete switches that are on, 1 to 9: blocks that begin with their slash are left out.
+    fast
+        Whether plain lines are executed many at a time; the moves are the same.
     """
 
-    def __init__(self, interpreter: Interpreter, lines: tuple[str, ...], name: str, switches: frozenset[int]) -> None:
+    def __init__(
+        self, interpreter: Interpreter, lines: tuple[str, ...], name: str, switches: frozenset[int], fast: bool = True
+    ) -> None:
         self.interpreter, self.lines, self.name = interpreter, lines, name
+        self._plain: PlainRun | None = None
+        if fast and len(lines) >= FEWEST_LINES:
+            from toolpath_stiff.nc.plain_moves import PlainRun
+
+            self._plain = PlainRun(interpreter, lines, name)
         self.switches = switches
         self._levels: list[_Level] = []
         self._programs: dict[int, int] | None = None
@@ -56,6 +70,13 @@ class ProgramRun:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
         at, percent, numbered = 0, False, False
         while at < len(self.lines):
+            if self._plain is not None and not self._levels:
+                rows = self._plain.execute(at)
+                if rows:
+                    self._executed(at, rows)
+                    percent = percent or any(any(row) for row in rows)
+                    at += len(rows)
+                    continue
             block = self._block(at)
             if block.percent:
                 if percent:
@@ -98,6 +119,9 @@ class ProgramRun:
     def _execute(self, block: Block) -> bool:
         return self.interpreter.execute(block)
 
+    def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
+        """Plain lines from `at` were executed; `rows` are their words (`plain_lines.PlainLines.rows`)."""
+
     def _read(self, at: int) -> Block:
         return read_block(self.lines[at], at + 1, self.name, self.interpreter.dialect.semicolon)
 
@@ -108,7 +132,7 @@ class ProgramRun:
         """A program number within a program: the next one begins where this one did not end."""
         if self._levels:
             raise self._unended(block.line - 1)
-        if (numbered or self.interpreter.recorder.line) and self.interpreter.dialect.name != "linuxcnc":
+        if (numbered or len(self.interpreter.recorder)) and self.interpreter.dialect.name != "linuxcnc":
             raise self._fail(
                 block.line - 1,
                 f"{block.words[0].text} begins another program before the first one has ended",

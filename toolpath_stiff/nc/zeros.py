@@ -60,7 +60,7 @@ class Zeros(Mover):
         self.tools = {} if self.tools is None else self.tools
         tool = self.tools.setdefault(int(number), ToolEntry(int(number)))
         tool.length = words.get(2, tool.length)
-        tool.diameter = tool.diameter if radius is None else 2.0 * radius * self._scale
+        tool.diameter = tool.diameter if radius is None else 2.0 * radius * self.length_scale
 
     def _go_home(self, code: str, word: Word) -> None:
         """G28, G30: rapid to the intermediate point, then the axes named there, or all, to the reference point."""
@@ -71,7 +71,7 @@ class Zeros(Mover):
             self._straight(RAPID, self.frames.to_control(between), set(words))
         home = self.frames.offsets.home_g28 if code == "G28" else self.frames.offsets.home_g30
         if not any(home):
-            self._assume(f"the reference point of {code}, not given by any offsets file, is machine 0, 0, 0")
+            self.assume(f"the reference point of {code}, not given by any offsets file, is machine 0, 0, 0")
         going = set(words) or set(range(6))
         # Axis by axis in program coordinates, as LinuxCNC does: with a rotation in force it is not the same.
         frames = self.frames

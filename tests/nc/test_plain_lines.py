@@ -1,0 +1,159 @@
+"""Plain lines many at a time and one by one: the same moves, the same words to the user, digit for digit."""
+
+import copy
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc import plain_moves, subprograms
+from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.dialects import DIALECTS
+from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.interpreter import Interpreter
+from toolpath_stiff.nc.source import read_lines, split_lines
+from toolpath_stiff.nc.subprograms import ProgramRun
+from toolpath_stiff.nc.tables import Offsets, ToolEntry
+
+PROGRAMS = sorted((Path(__file__).parents[2] / "programs").glob("*.nc"))
+TOOLS = {1: ToolEntry(1, 50.0, 6.0), 2: ToolEntry(2, 80.0, 10.0), 3: ToolEntry(3, 120.0, 8.0)}
+ZERO = (0.0,) * 6
+
+
+@pytest.fixture(autouse=True)
+def _runs_of_any_length(monkeypatch):
+    monkeypatch.setattr(plain_moves, "FEWEST", 1)
+    monkeypatch.setattr(subprograms, "FEWEST_LINES", 1)
+
+
+def outcome(lines, dialect, fast):
+    """Everything that reading leaves behind, in comparable form, and how many lines were executed at once."""
+    frames = Frames(Offsets(), None, ZERO)
+    interpreter = Interpreter("p", frames, copy.deepcopy(TOOLS), DIALECTS[dialect])
+    run = ProgramRun(interpreter, lines, "p", frozenset(), fast=fast)
+    executed = []
+    run._executed = lambda at, rows: executed.append(len(rows))
+    error = None
+    try:
+        warnings = run.run()
+    except InputError as found:
+        error, warnings = str(found), []
+    interpreter.bare = interpreter.bare and (interpreter.bare[0], interpreter.bare[1].text)
+    state = {
+        name: repr(value)
+        for name, value in vars(interpreter).items()
+        if name not in ("recorder", "frames", "block", "values", "free", "tools", "dialect")
+    }
+    frame = {f.name: repr(getattr(frames, f.name)) for f in dataclasses.fields(frames)}
+    moves = interpreter.recorder.moves()
+    columns = {f.name: getattr(moves, f.name) for f in dataclasses.fields(moves)}
+    return error, warnings, state if error is None else None, frame if error is None else None, columns, sum(executed)
+
+
+def assert_same(lines, dialect="generic"):
+    slow, fast = outcome(lines, dialect, fast=False), outcome(lines, dialect, fast=True)
+    assert fast[0] == slow[0]
+    assert fast[1] == slow[1]
+    assert fast[2] == slow[2]
+    assert fast[3] == slow[3]
+    for name, column in slow[4].items():
+        np.testing.assert_array_equal(fast[4][name], column, err_msg=name, strict=True)
+    assert slow[5] == 0
+    return fast[5]
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.name)
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_programs(program, dialect):
+    lines = read_lines(program)[:6000]
+    assert assert_same(lines, dialect) > 0 or not DIALECTS[dialect].semicolon  # whose blocks end at `;`
+
+
+numbers = st.one_of(
+    st.decimals(-200, 200, places=3).map(str),
+    st.integers(-100, 100).map(str),
+    st.sampled_from(["0", "0.", "-0.", ".5", "+3.25", "10.", "-.125", "00012.50", "1e3", "1.", "100001", "1.2.3", "-"]),
+)
+feeds = st.sampled_from(["100", "250.5", "1", "0", ".5", "1e2", "-5"])
+blank = st.sampled_from(["", "", "", " ", "\t"])
+
+
+@st.composite
+def plain(draw):
+    words = [f"G{draw(st.sampled_from(['0', '1', '1', '00', '01', '2', '3', '02']))}"] if draw(st.booleans()) else []
+    if draw(st.integers(0, 5)) == 0:
+        words.append("F" + draw(feeds))
+    words += [letter + draw(numbers) for letter in draw(st.sets(st.sampled_from("XYZABC"), max_size=3))]
+    words += [letter + draw(numbers) for letter in draw(st.sets(st.sampled_from("IJKR"), max_size=2))] * draw(
+        st.sampled_from([0, 0, 0, 1])
+    )
+    if draw(st.booleans()):
+        words.sort(key="GXYZABCIJKRF".find, reverse=False) if "F" in "".join(words) else None
+    if draw(st.integers(0, 3)) == 0:
+        words.append("F" + draw(feeds))
+    text = "".join(word + draw(blank) for word in words)
+    if draw(st.integers(0, 5)) == 0:
+        text = f"N{draw(st.integers(1, 99999))} {text}"
+    text += draw(st.sampled_from(["", "", "", "", "(a comment)", "; another", ";", "(open", "(a)(b)", "(a(b))"]))
+    return text.lower() if draw(st.integers(0, 9)) == 0 else text
+
+
+@st.composite
+def arc(draw):
+    """An arc that fits, from wherever the tool is: a full circle or a half one, in G91 and G90 alike."""
+    radius = draw(st.decimals("0.5", "50", places=2))
+    code = draw(st.sampled_from(["G2", "G3"]))
+    return draw(
+        st.sampled_from([f"{code}I{radius}J0", f"{code}I-{radius}", f"G91\n{code}X{2 * radius}Y0R{radius}\nG90"])
+    )
+
+
+modal = st.sampled_from(
+    [
+        "G90", "G91", "G20", "G21", "G17", "G18", "G19", "G93", "G94", "G54", "G55", "G10 L2 P2 X10 Y-3.3 Z0.7 A1",
+        "G92 X1 Z-2", "G92.1", "G52 X.1", "M3 S100", "T2 M6", "G43 H2", "G49", "G80", "G4 P1", "G53 G0 Z0", "G28 Z0",
+        "G81 X1 Y2 Z-1 R2", "X5 Y5", "", "(only a comment)", "%", "G68 X0 Y0 R30", "G69", "G10 L2 P1 R15", "G61", "/X1",
+        "G90.1", "G91.1", "G1 X1 P2", "X1 X2", "X1 Y", "Ä", "(Ä)", "\u0131 10", "G16", "G15", "M30", "S100 X1",
+    ]
+)  # fmt: skip
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    st.lists(st.one_of(plain(), plain(), plain(), arc(), modal), min_size=1, max_size=30),
+    st.sampled_from(sorted(DIALECTS)),
+)
+@example(["G1X1F1", "X10.", "Y2"], "generic")
+@example(["G93", "G1 X1 F2", "X2"], "generic")
+@example(["G1 X1 F100", "G91", "X.1", "X.1", "X.1", "G90", "Y1"], "generic")
+def test_random_programs(blocks, dialect):
+    assert_same(split_lines("G21 G90 G17 F300\nG0 X0. Y0. Z0.\n" + "\n".join(blocks), "p"), dialect)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.one_of(plain(), arc(), modal), min_size=1, max_size=20))
+def test_random_programs_are_checked_alike(blocks):
+    lines = split_lines("F300\n" + "\n".join(blocks), "p")
+    fast = check_lines(lines, "p", controller=Controller())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(subprograms, "FEWEST_LINES", len(lines) + 1)
+        slow = check_lines(lines, "p", controller=Controller())
+    for found in (fast, slow):
+        assert found.used == slow.used
+        assert found.findings == slow.findings
+        assert found.end == slow.end
+
+
+def test_long_runs_across_chunks():
+    lines = ["G1 F500 X0 Y0", *(f"X{i % 100} Y{i % 77}.{i % 10} Z-{i % 5}.5" for i in range(20_000)), "M2"]
+    assert assert_same(lines) == 20_001
+
+
+def test_inverse_time_and_inches():
+    lines = ["G20 G93", *(f"G1 X{i}.5 A{i} F{i + 1}.25" for i in range(50)), "G94 F10", *(f"B{i}" for i in range(9))]
+    assert assert_same(lines) > 50
