@@ -15,7 +15,7 @@ from toolpath_stiff.cli.main import main
 PART = "(square)\nG21 G90 F1000\nG0 X-100 Y-100 Z0\nG1 X100\nY100\nX-100\nM8\nY-100\nM2\n"
 COLUMNS = (
     "line,motion,tool,s_mm,t_s,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,feed_mm_per_min,stiffness_N_per_mm,deflection_um,"
-    "strut1_mm,strut2_mm,strut3_mm,strut4_mm,strut5_mm,strut6_mm,margin,margin_limit"
+    "strut1_mm,strut2_mm,strut3_mm,strut4_mm,strut5_mm,strut6_mm,margin,margin_limit,operation"
 )
 
 
@@ -42,8 +42,8 @@ def test_analyze_writes_the_reports(part, capsys):
     assert summary["unsupported"] == [{"line": 7, "column": 1, "word": "M8", "reason": "coolant"}]
     for key in (
         "program", "machine", "samples", "cutting_length_mm", "rapid_length_mm", "mean_N_per_mm", "min_N_per_mm",
-        "max_N_per_mm", "range_N_per_mm", "weakest", "per_tool", "extrapolated_share", "unsupported", "assumptions",
-        "warnings",
+        "max_N_per_mm", "range_N_per_mm", "weakest", "per_tool", "per_operation", "extrapolated_share", "unsupported",
+        "assumptions", "warnings",
     ):  # fmt: skip
         assert key in summary
     cutting = [float(r["stiffness_N_per_mm"]) for r in rows if r["motion"] != "rapid"]
@@ -70,8 +70,8 @@ def test_several_programs_one_folder_each(part, capsys):
     assert (part.parent / "all/part/samples.csv").exists() and (part.parent / "all/other/samples.csv").exists()
     (part.parent / "sub").mkdir()
     (part.parent / "sub/part.nc").write_text(PART)
-    assert main(["analyze", "part.nc", "sub/part.nc", "--no-plots", "--out", "twice"]) == 0
-    assert (part.parent / "twice/part/samples.csv").exists() and (part.parent / "twice/sub/part/samples.csv").exists()
+    assert main(["analyze", "part.nc", "sub/part.nc", "--no-plots", "--out", "twice"]) == 2
+    assert not (part.parent / "twice").exists()
 
 
 def test_require_lists_weak_lines_and_exits_3(part, capsys):

@@ -15,6 +15,7 @@ from toolpath_stiff.analysis.parameter_band import ParameterBand, parameter_band
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Machine, Pose
 from toolpath_stiff.nc.moves import Moves, Program
+from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path import place, sample_moves
 from toolpath_stiff.path.samples import Samples
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
@@ -81,6 +82,16 @@ class Analysis:
     def out_of_reach(self) -> BoolArray:
         """(n,) cutting samples that the machine cannot reach."""
         return np.asarray(self.samples.cutting & ~self.at.reachable)
+
+    @cached_property
+    def operations(self) -> Operations:
+        """The program's operations, and the row of its operation for every move."""
+        return operations(self.program)
+
+    @property
+    def operation(self) -> NDArray[np.int64]:
+        """(n,) number of each sample's operation, from 1."""
+        return np.asarray(self.operations.of_move[self.samples.move] + 1)
 
     @cached_property
     def parameter_band(self) -> ParameterBand | None:

@@ -1,4 +1,4 @@
-"""Figures of a path: length-weighted mean, extremes, the weakest places, shares; per tool and in all."""
+"""Figures of a path: length-weighted mean, extremes, the weakest places, shares."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.analysis.breakdown import describe_sample, per_operation, per_tool, weighted_figures
 from toolpath_stiff.analysis.parameter_band import band_figures
 from toolpath_stiff.analysis.path_analysis import Analysis, assumptions
 from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 if TYPE_CHECKING:
     from toolpath_stiff.path.samples import Samples
@@ -23,20 +24,7 @@ def stiffness_figures(analysis: Analysis, rows: BoolArray) -> dict[str, Any]:
 
     None for each where there are no such samples.
     """
-    weight, stiffness = analysis.samples.weight[rows], analysis.at.stiffness[rows]
-    if not len(stiffness):
-        keys = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
-        return dict.fromkeys(keys)
-    low, high = float(stiffness.min()), float(stiffness.max())
-    mean = float(np.average(stiffness, weights=weight))
-    deflection = float(np.average(analysis.deflection[rows], weights=weight))
-    return {
-        "mean_N_per_mm": n_per_mm_from_n_per_m(mean),
-        "min_N_per_mm": n_per_mm_from_n_per_m(low),
-        "max_N_per_mm": n_per_mm_from_n_per_m(high),
-        "range_N_per_mm": n_per_mm_from_n_per_m(high - low),
-        "mean_deflection_um": um_from_m(deflection),
-    }
+    return weighted_figures(analysis.at.stiffness[rows], analysis.samples.weight[rows], analysis.force)
 
 
 def path_length(samples: Samples, rapid: bool) -> float:
@@ -62,27 +50,6 @@ def weakest_places(analysis: Analysis, count: int = 3) -> list[int]:
         chosen.append(best)
         order = order[(np.abs(s[order] - s[best]) >= apart) & (line[order] != line[best])]
     return chosen
-
-
-def describe_sample(analysis: Analysis, row: int) -> dict[str, Any]:
-    """Line, source text, position and stiffness of one sample."""
-    samples = analysis.samples
-    line = int(samples.line[row])
-    x, y, z = (mm_from_m(float(v)) for v in samples.position[row])
-    a, b, c = (deg_from_rad(float(v)) for v in samples.abc[row])
-    source = analysis.program.source
-    return {
-        "line": line,
-        "text": source[line - 1].strip() if 0 < line <= len(source) else "",
-        "s_mm": mm_from_m(float(samples.s[row])),
-        "x_mm": x,
-        "y_mm": y,
-        "z_mm": z,
-        "a_deg": a,
-        "b_deg": b,
-        "c_deg": c,
-        "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(analysis.at.stiffness[row])),
-    }
 
 
 def summarise(analysis: Analysis) -> dict[str, Any]:
@@ -113,6 +80,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
         "weakest": describe_sample(analysis, places[0]) if places else None,
         "weakest_places": [describe_sample(analysis, row) for row in places],
         "per_tool": per_tool(analysis),
+        "per_operation": per_operation(analysis),
         "min_margin": float(analysis.at.margin[nearest]),
         "min_margin_limit": analysis.at.reach.describe(nearest),
         "min_margin_line": int(samples.line[nearest]),
@@ -127,28 +95,6 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
         "warnings": list(analysis.warnings),
         "version": __version__,
     }
-
-
-def per_tool(analysis: Analysis) -> list[dict[str, Any]]:
-    """The figures of each tool, in order of use."""
-    samples, counted = analysis.samples, analysis.counted
-    remarks = {tool.number: tool.remark for tool in analysis.program.tools}
-    length = np.nan_to_num(samples.tool_length, nan=-1.0)  # nan is not equal to itself; -1 stands for it here
-    keys = np.stack([samples.tool.astype(float), length], axis=1)[counted]
-    _, first = np.unique(keys, axis=0, return_index=True)
-    rows = []
-    for tool, tool_length in keys[np.sort(first)]:
-        mine = counted & (samples.tool == tool) & (length == tool_length)
-        rows.append(
-            {
-                "tool": int(tool),
-                "remark": remarks.get(int(tool), ""),
-                "length_mm": None if tool_length < 0.0 else mm_from_m(float(tool_length)),
-                "cutting_length_mm": mm_from_m(float(samples.weight[mine].sum())),
-                **stiffness_figures(analysis, mine),
-            }
-        )
-    return rows
 
 
 def share(condition: BoolArray, among: BoolArray) -> float:

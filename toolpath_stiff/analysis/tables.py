@@ -22,6 +22,7 @@ COLUMNS: dict[str, int | None] = {
     **{f"strut{i}_mm": 6 for i in range(1, 7)},
     "margin": 6,
     "margin_limit": None,
+    "operation": None,
 }
 
 
@@ -36,6 +37,7 @@ def sample_columns(analysis: Analysis, rows: slice = slice(None)) -> dict[str, N
         **{f"strut{i + 1}_mm": mm_from_m(at.strut_lengths[rows, i]) for i in range(6)},
         "margin": at.margin[rows],
         "margin_limit": names[at.limit[rows]],
+        "operation": analysis.operations.of_move[analysis.samples.move[rows]] + 1,
     }
 
 
