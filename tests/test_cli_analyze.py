@@ -70,8 +70,8 @@ def test_several_programs_one_folder_each(part, capsys):
     assert (part.parent / "all/part/samples.csv").exists() and (part.parent / "all/other/samples.csv").exists()
     (part.parent / "sub").mkdir()
     (part.parent / "sub/part.nc").write_text(PART)
-    assert main(["analyze", "part.nc", "sub/part.nc", "--no-plots", "--out", "twice"]) == 2
-    assert not (part.parent / "twice").exists()
+    assert main(["analyze", "part.nc", "sub/part.nc", "--no-plots", "--out", "twice"]) == 0
+    assert (part.parent / "twice/part/samples.csv").exists() and (part.parent / "twice/sub/part/samples.csv").exists()
 
 
 def test_require_lists_weak_lines_and_exits_3(part, capsys):

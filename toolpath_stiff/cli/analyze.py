@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import (
     add_json_option,
@@ -16,10 +17,11 @@ from toolpath_stiff.cli.arguments import (
     positive_number,
     read_program_for,
 )
-from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.analysis.evaluate import Progress
+    from toolpath_stiff.nc import Program
     from toolpath_stiff.stiffness.model import StiffnessModel
 
 BELOW_REQUIRED, PARTIAL = 3, 1  # exit codes
@@ -27,6 +29,7 @@ BELOW_REQUIRED, PARTIAL = 3, 1  # exit codes
 EPILOG = """\
 example:
   tps analyze programs/pocket.nc --origin 100,-50,800 --load normal --require 40000
+  tps analyze programs more/part.nc --jobs 4    all programs of a folder and one more, four at a time
 
 files written to --out:
   samples.csv   every sample: line, position, stiffness, strut lengths, margin to the nearest limit
@@ -35,7 +38,18 @@ files written to --out:
   profile.png   stiffness along the path
   report.html   the path in 3-D, linked to profile and program text; one file, no network
 
-exit code: 0 done; 1 --partial left samples out; 2 the input is wrong; 3 a cutting move is below --require
+several programs, or a folder:
+  a folder stands for the programs in it and below it, those ending in .nc .ngc .tap .cnc .gcode .gc .eia .mpf .min
+  .apt .cl .cls in any case; hidden files and linked folders are left alone. Each program has these files in a folder of
+  its own below --out (default: reports); beside them
+  index.html    all programs in one sortable table, drawn on one scale of stiffness; failures with their reason
+  summary.csv   the same for a spreadsheet, one row a program
+  A program that fails does not stop the others and is named at the end.
+
+exit code
+  one program: 0 done; 1 --partial left samples out; 2 the input is wrong; 3 a cutting move is below --require
+  several: 0 done; 1 a program failed, or --partial left samples out; 2 the arguments are wrong, nothing was started;
+  3 a cutting move is below --require and no program failed
 """
 
 
@@ -43,14 +57,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("programs", nargs="+", metavar="PROGRAM", help="NC program")
+    parser.add_argument("programs", nargs="+", metavar="PROGRAM", help="NC program, or a folder of them")
     add_program_options(parser)
     add_machine_options(parser)
     add_load_options(parser)
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="folder for the report (default: reports/<program>; several programs: one each below it)",
+        help="folder for the report (default: reports/<program>; several programs: reports, with a folder for each)",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="several programs: so many at a time, each in its own process; 1: all in this one "
+        "(default: one a CPU that may be used)",
     )
     parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="format of the samples (default: csv)"
@@ -72,48 +93,54 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Analyse every program; the exit code is the worst of them."""
+    """Analyse one program, or hand several, or a folder, to `batch`."""
+    from toolpath_stiff.cli.programs import find_programs
+
+    found, counts = find_programs(args.programs)
+    if counts or len(found) > 1:
+        from toolpath_stiff.cli.batch import run_batch
+
+        return run_batch(args, found, counts)
+    return _run_single(args, found[0].file)
+
+
+@dataclass(frozen=True)
+class Models:
+    """What the programs are analysed on: the machine and, with --compare, another one."""
+
+    first: StiffnessModel
+    second: StiffnessModel | None
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the analysis of a program left: its summary as written, the one on the other machine, what is too weak."""
+
+    program: Program
+    summary: dict[str, Any]
+    second: Analysis | None
+    missed: list[tuple[int, float]]
+    files: list[Path]
+
+
+def models_for(args: argparse.Namespace) -> Models:
+    """Load the machines. Raises `InputError` for a machine or an effect that does not exist."""
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.stiffness.model import build_model
 
-    model = build_model(load_machine(args.machine), args.effects)
-    other = build_model(load_machine(args.compare), args.effects) if args.compare else None
-    folders = _folders(args)
-    worst, summaries = 0, []
-    for program, folder in zip(args.programs, folders, strict=True):
-        code, summary = _analyse_one(args, program, folder, model, other)
-        worst = max(worst, code)
-        summaries.append(summary)
-    if args.json:
-        json.dump(summaries[0] if len(summaries) == 1 else summaries, sys.stdout, indent=2)
-        sys.stdout.write("\n")
-    return worst
+    first = build_model(load_machine(args.machine), args.effects)
+    return Models(first, build_model(load_machine(args.compare), args.effects) if args.compare else None)
 
 
-def _folders(args: argparse.Namespace) -> list[Path]:
-    """One report folder a program. Raises `InputError` if two programs would share one."""
-    stems = [Path(program).stem for program in args.programs]
-    if len(stems) == 1:
-        return [Path(args.out) if args.out else Path("reports") / stems[0]]
-    doubled = sorted({stem for stem in stems if stems.count(stem) > 1})
-    if doubled:
-        raise InputError(
-            f"several programs are called {doubled[0]!r} and would share a report folder",
-            hint="analyse them one at a time with --out",
-        )
-    return [Path(args.out or "reports") / stem for stem in stems]
-
-
-def _analyse_one(
-    args: argparse.Namespace, file: str, folder: Path, model: StiffnessModel, other: StiffnessModel | None
-) -> tuple[int, dict[str, object]]:
+def analyse_and_write(
+    args: argparse.Namespace, file: str, folder: Path, models: Models, progress: Progress | None = None
+) -> Report:
+    """Analyse a program and write its report folder. Raises `TpsError`, with nothing written."""
     from toolpath_stiff.analysis.path_analysis import analyse, required_stiffness_missed
-    from toolpath_stiff.cli.progress import progress_bar
-    from toolpath_stiff.report.terminal import comparison_table, terminal_table
     from toolpath_stiff.report.write import write_analysis
     from toolpath_stiff.units import n_per_m_from_n_per_mm
 
-    program = read_program_for(args, file, model.machine)
+    program = read_program_for(args, file, models.first.machine)
     options = {
         "origin": args.origin,
         "load": args.load,
@@ -121,26 +148,48 @@ def _analyse_one(
         "force": args.force,
         "partial": args.partial,
     }
-    with progress_bar(f"{program.name}: samples", quiet=args.json) as progress:
-        analysis = analyse(model, program, progress=progress, **options)
+    analysis = analyse(models.first, program, progress=progress, **options)
     second: Analysis | None = None
-    if other is not None:
-        second = analyse(other, read_program_for(args, file, other.machine), **options)
+    if models.second is not None:
+        second = analyse(models.second, read_program_for(args, file, models.second.machine), **options)
     required = None if args.require is None else n_per_m_from_n_per_mm(args.require)
     files = write_analysis(
         analysis, folder, plots=not args.no_plots, table=args.format, required=required, other=second
     )
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    missed = required_stiffness_missed(analysis, required) if required is not None else []
-    if not args.json:
-        print(terminal_table(summary))
-        if second is not None:
-            print(comparison_table(summary, second.summary()))
-        if missed:
-            print(f"below the required {args.require:g} N/mm:")
-            for line, stiffness in missed:
-                print(f"  line {line}: {stiffness:.0f} N/mm  {program.source[line - 1].strip()}")
-        print("\n".join(["written:", *(f"  {path}" for path in files)]))
-    if missed:
-        return BELOW_REQUIRED, summary
-    return (PARTIAL if analysis.out_of_reach.any() else 0), summary
+    return Report(
+        program=program,
+        summary=json.loads((folder / "summary.json").read_text(encoding="utf-8")),
+        second=second,
+        missed=required_stiffness_missed(analysis, required) if required is not None else [],
+        files=files,
+    )
+
+
+def _run_single(args: argparse.Namespace, file: str) -> int:
+    """Analyse, write, print; the exit code."""
+    from toolpath_stiff.cli.progress import progress_bar
+
+    folder = Path(args.out) if args.out else Path("reports") / Path(file).stem
+    with progress_bar(f"{Path(file).name}: samples", quiet=args.json) as progress:
+        report = analyse_and_write(args, file, folder, models_for(args), progress)
+    if args.json:
+        json.dump(report.summary, sys.stdout, indent=2)
+        sys.stdout.write("\n")
+    else:
+        _print(args, report)
+    if report.missed:
+        return BELOW_REQUIRED
+    return PARTIAL if report.summary["out_of_reach_samples"] else 0
+
+
+def _print(args: argparse.Namespace, report: Report) -> None:
+    from toolpath_stiff.report.terminal import comparison_table, terminal_table
+
+    print(terminal_table(report.summary))
+    if report.second is not None:
+        print(comparison_table(report.summary, report.second.summary()))
+    if report.missed:
+        print(f"below the required {args.require:g} N/mm:")
+        for line, stiffness in report.missed:
+            print(f"  line {line}: {stiffness:.0f} N/mm  {report.program.source[line - 1].strip()}")
+    print("\n".join(["written:", *(f"  {path}" for path in report.files)]))

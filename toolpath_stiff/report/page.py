@@ -8,8 +8,6 @@ content security policy lets only our own script run.
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import html
 import json
 import re
@@ -19,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.report.page_data import page_data
 from toolpath_stiff.report.page_tables import page_tables
+from toolpath_stiff.report.sections import script_hash
 from toolpath_stiff.report.wording import number, plain
 
 if TYPE_CHECKING:
@@ -80,11 +79,6 @@ def filled(template: str, parts: Mapping[str, str]) -> str:
 
 def _asset(name: str) -> str:
     return resources.files("toolpath_stiff.report").joinpath("assets", name).read_text(encoding="utf-8")
-
-
-def script_hash(script: str) -> str:
-    """The source expression of Content Security Policy Level 3, section 2.3.1."""
-    return "sha256-" + base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
 def _heading(summary: Mapping[str, Any]) -> str:

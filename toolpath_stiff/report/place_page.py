@@ -18,8 +18,9 @@ from toolpath_stiff.analysis import Analysis
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.batch import Keepout
 from toolpath_stiff.placement.drawn_path import DrawnPath, drawn_path
-from toolpath_stiff.report.page import filled, json_for_script, script_hash
+from toolpath_stiff.report.page import filled, json_for_script
 from toolpath_stiff.report.page_data import class_colours
+from toolpath_stiff.report.sections import script_hash
 from toolpath_stiff.report.wording import number, plain
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 

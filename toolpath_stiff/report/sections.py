@@ -1,11 +1,13 @@
 """Pages that are a headline, a few figures and sections below each other: comparison, diagnosis, update. No network.
 
-Everything from a file is escaped, and a content security policy lets the page load nothing and run nothing.
+Everything from a file is escaped, and a content security policy lets the page load nothing and run nothing but a
+script of its own, where it has one.
 """
 
 from __future__ import annotations
 
 import base64
+import hashlib
 import html
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,6 +21,11 @@ Row = tuple[str, Sequence[str]]  # class of the row, its cells
 def escaped(value: object) -> str:
     """Text as HTML."""
     return html.escape(plain(str(value)))
+
+
+def script_hash(script: str) -> str:
+    """The source expression of Content Security Policy Level 3, section 2.3.1."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
 def section(title: str, body: str) -> str:
@@ -70,9 +77,12 @@ def figures(found: Iterable[tuple[str, str]]) -> str:
 
 def page(
     title: str, verdict: str, headline: str, text: str, about: Sequence[str], figures: str, warnings: Sequence[str],
-    sections: Iterable[str], footer: str, verdict_class: str = "",
+    sections: Iterable[str], footer: str, verdict_class: str = "", head: str = "", script: str = "",
 ) -> str:  # fmt: skip
-    """The whole page. `figures`, `sections` and `footer` are HTML, the others text."""
+    """The whole page. `figures`, `sections`, `footer` and `head` (more of it) are HTML, the others text.
+
+    `script` is the only one that may run; most pages have none.
+    """
     parts = {
         "title": escaped(title),
         "verdict": escaped(verdict),
@@ -84,6 +94,9 @@ def page(
         "warnings": "\n".join(f'<p class="warning">{escaped(warning)}</p>' for warning in warnings),
         "sections": "\n".join(part for part in sections if part),
         "footer": footer,
+        "head": head,
+        "script": f"<script>{script}</script>\n" if script else "",
+        "script_policy": f"; script-src '{script_hash(script)}'" if script else "",
     }
     template = resources.files("toolpath_stiff.report").joinpath("assets", "sections.html").read_text(encoding="utf-8")
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)

@@ -6,6 +6,7 @@ import importlib
 import io
 import json
 import math
+import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -175,7 +176,7 @@ def _write_and_move(
 ) -> list[Path]:
     """Write to a temporary folder on the same file system, then rename: a new report folder in one go."""
     exists = folder.is_dir()
-    stage = Path(tempfile.mkdtemp(dir=folder if exists else folder.absolute().parent, prefix=".tps-"))
+    stage = Path(tempfile.mkdtemp(dir=folder if exists else folder.absolute().parent, prefix=f".tps-{os.getpid()}-"))
     try:
         report = stage / "report"
         report.mkdir()

@@ -1,0 +1,231 @@
+"""`tps analyze` of many programs: reports side by side, one overview, failures that stop nothing."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.test_cli_analyze import PART, _nist
+from toolpath_stiff.cli.batch import PAGE_MARK, TABLE_MARK
+from toolpath_stiff.cli.main import main
+
+BROKEN = "G21 F1000\nG1 X10\nG77.7\n"
+FAR = "F1000\nG1 X100\nX2000\n"
+SHORT = ["--no-plots", "--step", "20"]
+
+
+@pytest.fixture
+def shop(tmp_path, monkeypatch):
+    """Two good programs of one name, a broken one between them."""
+    monkeypatch.chdir(tmp_path)
+    for name, text in {
+        "jobs/a/part.nc": PART,
+        "jobs/bad.nc": BROKEN,
+        "jobs/b/part.nc": PART.replace("Z0", "Z50"),
+    }.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tmp_path
+
+
+def files_of(folder):
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def rows_of(out):
+    return {row["file"]: row for row in csv.DictReader((out / "summary.csv").open(encoding="utf-8"))}
+
+
+def test_a_failing_program_does_not_stop_the_others_and_is_named_last(shop, capsys):
+    assert main(["analyze", "jobs", "--out", "out", "--jobs", "2", *SHORT]) == 1
+    printed = capsys.readouterr().out
+    lines = printed.splitlines()
+    assert lines[0] == "jobs: 3 programs"
+    assert [line.split()[0] for line in lines[2:4]] == ["a/part.nc", "b/part.nc"]
+    assert lines[4] == "1 of 3 programs failed:"
+    assert lines[5].startswith("  jobs/bad.nc:3:1: ") and "G77.7" in lines[5]
+    assert set(files_of(shop / "out")) == {
+        "a/part/samples.csv", "a/part/summary.json", "b/part/samples.csv", "b/part/summary.json",
+        "index.html", "summary.csv",
+    }  # fmt: skip
+
+
+def test_the_overview_says_what_the_summaries_say(shop):
+    main(["analyze", "jobs", "--out", "out", *SHORT])
+    rows = rows_of(shop / "out")
+    assert list(rows) == ["jobs/a/part.nc", "jobs/b/part.nc", "jobs/bad.nc"]
+    for file, row in rows.items():
+        if row["status"] == "failed":
+            assert row["reason"].startswith(f"{file}:3:1: ") and row["mean_N_per_mm"] == row["report"] == ""
+            continue
+        assert row["reason"] == "" and row["status"] == "done"
+        summary = json.loads((shop / "out" / row["report"]).read_text())
+        for key in ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "cutting_length_mm", "time_s"):
+            assert float(row[key]) == pytest.approx(summary[key], abs=1e-3)  # a thousandth is the coarsest column
+        assert int(row["weakest_line"]) == summary["weakest"]["line"]
+        assert row["weakest_text"] == summary["weakest"]["text"]
+
+
+def test_the_same_bytes_for_any_number_of_jobs(shop):
+    printed = []
+    for jobs in ("1", "2", "3"):
+        (shop / jobs).mkdir()
+        done = subprocess.run(
+            [sys.executable, "-m", "toolpath_stiff", "analyze", "../jobs", "--jobs", jobs, "--step", "20"],
+            capture_output=True, text=True, check=False, cwd=shop / jobs,
+        )  # fmt: skip
+        assert done.returncode == 1 and done.stderr == ""
+        printed.append(done.stdout)
+    assert len(set(printed)) == 1
+    assert files_of(shop / "1") == files_of(shop / "2") == files_of(shop / "3")
+    assert "reports/a/part/report.html" in files_of(shop / "1")
+
+
+def test_json_lists_all_in_the_order_given(shop, capsys):
+    assert main(["analyze", "jobs/bad.nc", "jobs/b/part.nc", "jobs/a/part.nc", "--json", "--out", "o", *SHORT]) == 1
+    bad, *good = json.loads(capsys.readouterr().out)
+    assert bad["program"] == "bad.nc" and bad["error"].startswith("jobs/bad.nc:3:1: ")
+    assert [entry["file"] for entry in good] == ["jobs/b/part.nc", "jobs/a/part.nc"]
+    for entry in good:
+        summary = json.loads((shop / entry["report"]).read_text())
+        assert {key: entry[key] for key in summary} == summary
+
+
+def test_a_program_that_cannot_be_read_is_one_of_the_failures(shop, capsys):
+    assert main(["analyze", "jobs/a/part.nc", "jobs/gone.nc", *SHORT]) == 1
+    assert "cannot read 'jobs/gone.nc'" in capsys.readouterr().out
+    assert (shop / "reports/part/summary.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["jobs", "--jobs", "0"], "--jobs 0"),
+        (["jobs", "--jobs", "two"], "invalid int"),
+        (["jobs", "--machine", "none"], "neither a packaged machine nor a file"),
+        (["jobs", "--compare", "none"], "neither a packaged machine nor a file"),
+        (["jobs", "--effects", "none.py"], "does not exist"),
+        (["jobs", "--controller", "none.toml"], "none.toml"),
+        (["jobs", "--tools", "none.tbl"], "none.tbl"),
+        (["jobs", "--interpreter", "linuxcnc", "--rs274", "/none"], "/none"),
+        (["jobs", "--out", "jobs/bad.nc/out"], "cannot write"),
+        (["jobs/a/part.nc", "empty"], "no NC program in folder 'empty'"),
+    ],
+)
+def test_wrong_arguments_are_one_message_before_anything_starts(shop, capsys, arguments, words):
+    (shop / "empty").mkdir()
+    before = files_of(shop)
+    assert main(["analyze", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert words in captured.err and "Traceback" not in captured.err and captured.out == ""
+    assert files_of(shop) == before and not (shop / "reports").exists()
+
+
+def test_partial_exits_1_and_require_3_unless_something_failed(shop, capsys):
+    (shop / "far.nc").write_text(FAR)
+    good = ["jobs/a/part.nc", "jobs/b/part.nc"]
+    required = [*SHORT, "--require", "200000"]  # more than the machine has anywhere
+    assert main(["analyze", *good, *SHORT]) == 0
+    assert main(["analyze", *good, *required]) == 3
+    assert "below the required 200000 N/mm:\n  a/part.nc: 4 lines" in capsys.readouterr().out
+    assert main(["analyze", *good, "far.nc", *required]) == 1
+    assert main(["analyze", *good, "far.nc", "--partial", *required]) == 1
+    rows = rows_of(shop / "reports")
+    assert rows["far.nc"]["status"] == "partial" and int(rows["far.nc"]["out_of_reach_samples"]) > 0
+    assert main(["analyze", "far.nc", "jobs/bad.nc", *SHORT]) == 1
+    assert {row["status"] for row in rows_of(shop / "reports").values()} == {"failed"}
+
+
+def test_compare_and_require_are_columns_of_the_overview(shop, capsys):
+    (shop / "soft.toml").write_text(_nist().replace("bar_stiffness_N_per_m = inf", "bar_stiffness_N_per_m = 3e8"))
+    assert main(["analyze", "jobs/a", "jobs/b", "--compare", "soft.toml", "--require", "1", *SHORT]) == 0
+    assert "other mean" in capsys.readouterr().out
+    for row in rows_of(shop / "reports").values():
+        assert float(row["compare_mean_N_per_mm"]) < float(row["mean_N_per_mm"])
+        assert float(row["compare_mean_difference_percent"]) < 0 == int(row["lines_below_required"])
+
+
+def test_other_peoples_files_of_these_names_stay(shop, capsys):
+    for name in ("index.html", "summary.csv"):
+        out = shop / f"with {name}"
+        out.mkdir()
+        (out / name).write_text("mine")
+        assert main(["analyze", "jobs", "--out", str(out), *SHORT]) == 2
+        assert "is there already" in capsys.readouterr().err
+        assert files_of(out) == {name: b"mine"}
+    assert main(["analyze", "jobs", *SHORT]) == 1
+    assert PAGE_MARK in (shop / "reports/index.html").read_text()[:1000]
+    assert (shop / "reports/summary.csv").read_text().startswith(TABLE_MARK)
+    assert main(["analyze", "jobs/a", *SHORT]) == 0  # an earlier overview is replaced
+    assert len(rows_of(shop / "reports")) == 1
+
+
+def test_one_program_has_no_overview_however_often_it_is_named(shop):
+    assert main(["analyze", "jobs/a/part.nc", "jobs/a/../a/part.nc", *SHORT]) == 0
+    assert set(files_of(shop / "reports")) == {"part/samples.csv", "part/summary.json"}
+    assert main(["analyze", "jobs/bad.nc"]) == 2
+
+
+TRAP = '''
+import os, time
+from multiprocessing import parent_process
+from pathlib import Path
+
+import numpy as np
+
+from toolpath_stiff.stiffness.effects import Effect, Parameter
+
+
+class Trap(Effect):
+    """Kills the process that sees the tool at Z 850 mm, or waits there for ever."""
+
+    name, title, link, equation, source = "trap", "trap", "struts", "-", "-"
+    parameters = (Parameter("seconds", "s", 1.0, (0.0, 1e6), (0.0, 1.0), "-"),)
+
+    def strut_compliance(self, path, p):
+        if parent_process() is not None and (path.position[:, 2] > 0.84).any():
+            Path("reached").touch()
+            if p["seconds"] == 0.0:
+                os.kill(os.getpid(), 9)
+            time.sleep(p["seconds"])
+        return np.zeros((len(path), 6))
+'''
+
+
+def trap(shop, seconds):
+    (shop / "trap.py").write_text(TRAP)
+    (shop / "trap.toml").write_text(_nist() + f'\n[[effect]]\nname = "trap"\nseconds_s = {seconds}\n')
+    return ["--machine", "trap.toml", "--effects", "trap.py"]
+
+
+def test_a_killed_process_is_a_failing_program(shop, capsys):
+    assert main(["analyze", "jobs", "--jobs", "2", *trap(shop, 0.0), *SHORT]) == 1
+    rows = rows_of(shop / "reports")
+    assert [row["status"] for row in rows.values()] == ["done", "failed", "failed"]
+    assert rows["jobs/b/part.nc"]["reason"].startswith("jobs/b/part.nc: its process was ended by SIGKILL")
+    assert "jobs/b/part.nc: its process was ended by SIGKILL" in capsys.readouterr().out
+
+
+def test_ctrl_c_leaves_whole_reports_and_nothing_else(shop):
+    arguments = ["analyze", "jobs", "--jobs", "2", *trap(shop, 600.0), *SHORT]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "toolpath_stiff", *arguments],
+        cwd=shop, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    done = shop / "reports/a/part/summary.json"
+    while process.poll() is None and not (done.exists() and (shop / "reached").exists()):
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes
+    _, error = process.communicate()
+    assert process.returncode == 130
+    assert error == "tps: interrupted; no file is half-written\n"
+    assert set(files_of(shop / "reports")) == {"a/part/samples.csv", "a/part/summary.json"}
+    assert not any(path.name.startswith(".") for path in (shop / "reports").rglob("*"))

@@ -1,0 +1,201 @@
+"""`tps analyze` of many programs: in parallel processes, one overview of all, failures named at the end."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from toolpath_stiff.cli.analyze import BELOW_REQUIRED, Models, analyse_and_write, models_for
+from toolpath_stiff.cli.arguments import controller_for
+from toolpath_stiff.cli.programs import RESERVED, FolderCount, Found, Listed, report_folders
+from toolpath_stiff.cli.progress import say
+from toolpath_stiff.cli.workers import answers, job_count, one_thread
+from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.report.batch import PAGE_MARK, TABLE_MARK, Outcome, figures_of, summary_csv, terminal_summary
+
+INCOMPLETE = 1  # exit code: a program failed, or samples were left out
+INDEX, SUMMARY = RESERVED
+MARK_WITHIN = 1000  # bytes of a file of ours, within which it says so
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What every process needs to know: the arguments, and where the reports go."""
+
+    args: argparse.Namespace
+    out: Path
+
+
+def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence[FolderCount]) -> int:
+    """Analyse the programs, write the overview, print; the exit code.
+
+    Raises
+    ------
+    InputError
+        An argument is wrong; nothing has been started then.
+    """
+    jobs = job_count(args.jobs, len(found))
+    one_thread()
+    programs, setting = report_folders(found), Setting(args, Path(args.out or "reports"))
+    _check(setting)
+    if not args.json:
+        for count in counts:
+            print(count, flush=True)
+    with _folders_for(setting.out, programs):
+        outcomes = _outcomes(programs, setting, jobs)
+        files = _write_overview(setting.out, outcomes)
+    if args.json:
+        _print_json(setting.out, programs, outcomes)
+    else:
+        print(terminal_summary(outcomes))
+        print("\n".join(["written:", *(f"  {path}" for path in files)]))
+    if any(one.status != "done" for one in outcomes):
+        return INCOMPLETE
+    return BELOW_REQUIRED if any((one.figures or {}).get("lines_below_required") for one in outcomes) else 0
+
+
+def _check(setting: Setting) -> None:
+    """Read everything that all programs share once, so that a mistake in it is one error. Raises `InputError`."""
+    from toolpath_stiff.nc.linuxcnc.runner import find_rs274
+
+    models_for(setting.args)
+    controller_for(setting.args)
+    if setting.args.interpreter == "linuxcnc":
+        find_rs274(setting.args.rs274)
+    for name, mark in ((INDEX, PAGE_MARK), (SUMMARY, TABLE_MARK)):
+        _check_ours(setting.out / name, mark)
+
+
+def _check_ours(file: Path, mark: str) -> None:
+    """A file of that name that an earlier run did not write is somebody's, and stays."""
+    try:
+        with file.open("rb") as stream:
+            beginning = stream.read(MARK_WITHIN)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise InputError(f"cannot write {str(file)!r}: {error.strerror}") from None
+    if mark.encode() not in beginning:
+        raise InputError(
+            f"{str(file)!r} is there already and not from `tps analyze`", hint="choose another folder with --out"
+        )
+
+
+@contextmanager
+def _folders_for(out: Path, programs: Sequence[Listed]) -> Iterator[None]:
+    """Make the folders above the reports, for all processes; those that stay empty are taken away at the end."""
+    wanted = {out, *((out / program.folder).parent for program in programs)}
+    above = {folder for place in wanted for folder in (place, *place.parents)}
+    made = sorted((folder for folder in above if not folder.exists()), key=lambda folder: len(folder.parts))
+    try:
+        _make(made)
+        yield
+    finally:
+        for folder in reversed(made):
+            with suppress(OSError):  # not empty, the usual case
+                folder.rmdir()
+
+
+def _make(folders: Sequence[Path]) -> None:
+    for folder in folders:
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            raise InputError(f"cannot write to {str(folder)!r}: {error.strerror}") from None
+
+
+def _outcomes(programs: Sequence[Listed], setting: Setting, jobs: int) -> list[Outcome]:
+    """What became of each program, in the order given."""
+
+    def died(program: Listed, process: int, how: str) -> Outcome:
+        _sweep(setting.out / program.folder, process)
+        return Outcome(program.name, program.file, f"{program.file}: {how}")
+
+    # The largest first, so that no process is left alone with one at the end.
+    order = sorted(range(len(programs)), key=lambda i: -_size(programs[i].file)) if jobs > 1 else range(len(programs))
+    outcomes: list[Outcome | None] = [None] * len(programs)
+    done = 0
+    try:
+        say(f"0/{len(programs)} programs, {jobs} at a time")
+        for place, outcome in answers([programs[i] for i in order], partial(start_worker, setting), died, jobs):
+            outcomes[order[place]] = outcome
+            done += 1
+            say(f"{done}/{len(programs)} programs, {outcome.name}{': failed' if outcome.reason else ''}")
+    finally:
+        say("")
+    return [one for one in outcomes if one is not None]
+
+
+def _size(file: str) -> int:
+    try:
+        return Path(file).stat().st_size
+    except OSError:  # it fails later, with a better message
+        return 0
+
+
+def _sweep(folder: Path, process: int) -> None:
+    """Remove what a process that died was writing."""
+    for place in (folder, folder.parent):
+        for left in place.glob(f".tps-{process}-*"):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def start_worker(setting: Setting) -> Callable[[Listed], Outcome]:
+    """What a process does with each program; the machines are loaded once."""
+    models = models_for(setting.args)
+
+    def work(program: Listed) -> Outcome:
+        return _analyse(setting, program, models)
+
+    return work
+
+
+def _analyse(setting: Setting, program: Listed, models: Models) -> Outcome:
+    folder = setting.out / program.folder
+    try:
+        report = analyse_and_write(setting.args, program.file, folder, models)
+    except TpsError as error:
+        return Outcome(program.name, program.file, _reason(program, str(error)))
+    except MemoryError:
+        return Outcome(program.name, program.file, f"{program.file}: out of memory; try fewer --jobs")
+    except Exception as error:  # a defect of ours: it must not stop the other programs
+        told = " ".join(f"{type(error).__name__}: {error}".split())
+        return Outcome(program.name, program.file, f"{program.file}: {told} (a defect; analyse it alone to see where)")
+    opens = "summary.json" if setting.args.no_plots else "report.html"
+    return Outcome(program.name, program.file, "", (program.folder / opens).as_posix(), figures_of(report.summary))
+
+
+def _reason(program: Listed, message: str) -> str:
+    """The message in one line, beginning with the file as named: errors know its last name alone."""
+    line = "; ".join(message.splitlines())
+    last = Path(program.file).name
+    if line.startswith(f"{last}:"):
+        return program.file + line[len(last) :]
+    return line if program.file in line else f"{program.file}: {line}"
+
+
+def _write_overview(out: Path, outcomes: Sequence[Outcome]) -> list[Path]:
+    from toolpath_stiff.report.batch_page import batch_page
+    from toolpath_stiff.report.write import write_folder
+
+    return write_folder(out, {INDEX: batch_page(outcomes), SUMMARY: summary_csv(outcomes)})
+
+
+def _print_json(out: Path, programs: Sequence[Listed], outcomes: Sequence[Outcome]) -> None:
+    """The summaries one by one, from their files: together they may be large."""
+    for i, (program, outcome) in enumerate(zip(programs, outcomes, strict=True)):
+        if outcome.reason:
+            entry = {"program": Path(program.file).name, "file": program.file, "error": outcome.reason}
+        else:
+            summary = json.loads((out / program.folder / "summary.json").read_text(encoding="utf-8"))
+            entry = {**summary, "file": program.file, "report": str(out / outcome.opens)}
+        sys.stdout.write(("[\n" if i == 0 else ",\n") + textwrap.indent(json.dumps(entry, indent=2), "  "))
+    sys.stdout.write("\n]\n")

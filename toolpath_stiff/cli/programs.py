@@ -1,0 +1,153 @@
+"""Which programs the arguments of `tps analyze` name, and which report folder each one gets."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from toolpath_stiff.errors import InputError
+
+# Endings that are NC programs or cutter-location files and nothing else; `.txt` is as often a note or a tool list.
+ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min", ".apt", ".cl", ".cls")
+RESERVED = ("index.html", "summary.csv")  # what lies beside the report folders
+
+
+@dataclass(frozen=True)
+class Found:
+    """A program: the file as named (or as found below the folder named), and its path as seen from that folder."""
+
+    file: str
+    inside: Path
+
+
+@dataclass(frozen=True)
+class FolderCount:
+    """What a folder argument holds."""
+
+    folder: str
+    programs: int
+    left: tuple[tuple[str, int], ...]  # endings of the other files and how many, "" for none
+
+    def __str__(self) -> str:
+        text = f"{self.folder}: {self.programs} program{'' if self.programs == 1 else 's'}"
+        if not self.left:
+            return text
+        others = ", ".join(f"{count} {ending or 'without an ending'}" for ending, count in self.left)
+        return f"{text}; other files are left alone: {others}"
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A program to analyse: its file, a short name that no other program has, its report folder below `--out`."""
+
+    file: str
+    name: str
+    folder: Path
+
+
+def find_programs(arguments: Sequence[str]) -> tuple[list[Found], list[FolderCount]]:
+    """The programs that files and folders name, each file once, in the order given; those of a folder by name.
+
+    Raises
+    ------
+    InputError
+        A folder cannot be read or holds no program.
+    """
+    found: dict[Path, Found] = {}
+    counts = []
+    for argument in arguments:
+        if Path(argument).is_dir():
+            inside, count = _in_folder(argument)
+            counts.append(count)
+        else:
+            inside = [Found(argument, Path(Path(argument).name))]
+        for program in inside:
+            found.setdefault(Path(program.file).resolve(), program)
+    return list(found.values()), counts
+
+
+def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
+    """Programs in a folder and below it; hidden ones, and folders that are symbolic links, are not entered."""
+
+    def refuse(error: OSError) -> None:
+        raise InputError(f"cannot read folder {str(error.filename)!r}: {error.strerror}")
+
+    inside, others = [], Counter[str]()
+    for place, folders, files in os.walk(folder, onerror=refuse):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        for name in files:
+            path = Path(place, name)
+            if name.startswith("."):
+                continue
+            # A symbolic link that leads nowhere is a program that cannot be read; a pipe would wait for ever.
+            if path.suffix.lower() in ENDINGS and (path.is_file() or path.is_symlink()):
+                inside.append(Found(str(path), path.relative_to(folder)))
+            else:
+                others[path.suffix.lower()] += 1
+    if not inside:
+        raise InputError(
+            f"no NC program in folder {folder!r}",
+            expected=f"files ending in {', '.join(ENDINGS)}",
+            hint="name files with another ending themselves",
+        )
+    inside.sort(key=lambda program: program.inside.parts)
+    return inside, FolderCount(folder, len(inside), tuple(sorted(others.items())))
+
+
+def report_folders(programs: Sequence[Found]) -> list[Listed]:
+    """A report folder for each program: its path as seen from the folder named, without the ending.
+
+    The ending stays where two programs differ in nothing else (`part.nc` and `part.tap`) or where one would lie within
+    the other (`part.nc` and `part/side.nc`). Where two would still be the same (`a/part.nc` and `b/part.nc`), as many
+    of the folders above as are needed come before. Capitals do not count: some file systems take `Part` for `part`.
+    """
+    files = [Path(os.path.abspath(program.file)) for program in programs]  # noqa: PTH100  (without `..`, links kept)
+    whole = [file.with_suffix("") for file in files]
+    while clashing := [i for i in _same_or_around(whole) if whole[i] != files[i]]:
+        for i in clashing:
+            whole[i] = files[i]
+    shown = [len(program.inside.parts) for program in programs]
+    named = [_named_parts(program.file) for program in programs]  # rather these than the folders above the current one
+    paths = [Path(*path.parts[-count:]) for path, count in zip(whole, shown, strict=True)]
+    while clashing := _clashing(paths):
+        longer = [i for i in clashing if shown[i] < named[i]]
+        longer = longer or [i for i in clashing if shown[i] < len(whole[i].parts) - 1]
+        if not longer:
+            break
+        for i in longer:
+            shown[i] += 1
+            paths[i] = Path(*whole[i].parts[-shown[i] :])
+    return [
+        Listed(program.file, (path.parent / program.inside.name).as_posix(), path)
+        for program, path in zip(programs, paths, strict=True)
+    ]
+
+
+def _named_parts(file: str) -> int:
+    """How many folders and names the file was named by, steps upwards left out."""
+    path = Path(os.path.normpath(file))
+    return sum(part not in ("..", path.anchor) for part in path.parts)
+
+
+def _same_or_around(paths: Sequence[Path]) -> list[int]:
+    """Which of the paths are another one's too, or hold another one."""
+    keys = [_key(path) for path in paths]
+    times = Counter(keys)
+    around = {key[:n] for key in keys for n in range(1, len(key))}
+    return [i for i, key in enumerate(keys) if times[key] > 1 or key in around]
+
+
+def _clashing(paths: Sequence[Path]) -> list[int]:
+    """Those, and the paths that lie within another one, or have a name that is kept for the overview."""
+    keys = [_key(path) for path in paths]
+    taken = set(keys)
+    within = {i for i, key in enumerate(keys) if any(key[:n] in taken for n in range(1, len(key)))}
+    reserved = {i for i, key in enumerate(keys) if key[0] in RESERVED}
+    return sorted({*_same_or_around(paths), *within, *reserved})
+
+
+def _key(path: Path) -> tuple[str, ...]:
+    return tuple(part.casefold() for part in path.parts)
