@@ -1,0 +1,82 @@
+"""The curves that moves follow: lines, arcs, helices, spirals; lengths, points and tangents, all moves at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.nc.moves import Moves
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def move_lengths(moves: Moves) -> FloatArray:
+    """(n,) m, length of the tip's path in each move.
+
+    An arc's is sqrt((r sweep)^2 + climb^2); where start and end radius differ (a control's tolerance, or a spiral)
+    r is their mean, which is exact to second order in the difference.
+    """
+    chord = np.linalg.norm(moves.end[:, :3] - moves.start[:, :3], axis=1)
+    arc = moves.arc_sweep != 0.0
+    if arc.any():
+        frame = arc_frame(moves, np.flatnonzero(arc))
+        radius = 0.5 * (frame.radius_start + frame.radius_end)
+        sweep = moves.arc_sweep[arc]
+        chord[arc] = np.sqrt((radius * sweep) ** 2 + frame.climb**2 + (frame.radius_end - frame.radius_start) ** 2)
+    return np.asarray(chord)
+
+
+class ArcFrame:
+    """Plane, radii and climb of some arcs: position(u) = c + r(u) (cos e1 + sin e2) + (lift + u climb) n."""
+
+    def __init__(self, center: FloatArray, normal: FloatArray, start: FloatArray, end: FloatArray) -> None:
+        from_center, to_end = start - center, end - center
+        self.normal, self.center = normal, center
+        lift = np.einsum("ni,ni->n", from_center, normal)
+        self.climb = np.einsum("ni,ni->n", to_end, normal) - lift
+        in_plane = from_center - lift[:, None] * normal
+        self.radius_start = np.linalg.norm(in_plane, axis=1)
+        end_in_plane = to_end - (lift + self.climb)[:, None] * normal
+        self.radius_end = np.linalg.norm(end_in_plane, axis=1)
+        self.e1 = in_plane / self.radius_start[:, None]
+        self.e2 = np.cross(normal, self.e1)
+        self.lift = lift
+
+
+def arc_frame(moves: Moves, rows: IntArray) -> ArcFrame:
+    """The frames of the arcs in `rows` of moves."""
+    return ArcFrame(moves.arc_center[rows], moves.arc_normal[rows], moves.start[rows, :3], moves.end[rows, :3])
+
+
+def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positions (n, 3) and unit tangents (n, 3) at shares u of moves; ends are met exactly."""
+    start, end = moves.start[:, :3], moves.end[:, :3]
+    chord = end - start
+    length = np.linalg.norm(chord, axis=1)
+    direction = chord / np.where(length > 0.0, length, 1.0)[:, None]
+    position = start[move] + u[:, None] * chord[move]
+    tangent = direction[move]
+    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
+    if len(arcs):
+        frame = arc_frame(moves, arcs)
+        which = np.full(len(moves), -1)
+        which[arcs] = np.arange(len(arcs))
+        rows = np.flatnonzero(moves.arc_sweep[move] != 0.0)
+        position[rows], tangent[rows] = _along_arcs(frame, moves.arc_sweep[arcs], which[move[rows]], u[rows])
+    position[u == 0.0] = start[move[u == 0.0]]
+    position[u == 1.0] = end[move[u == 1.0]]
+    return position, tangent
+
+
+def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    angle = (u * sweep[arc])[:, None]
+    growth = (frame.radius_end - frame.radius_start)[arc][:, None]
+    radius = frame.radius_start[arc][:, None] + u[:, None] * growth
+    e1, e2, normal = frame.e1[arc], frame.e2[arc], frame.normal[arc]
+    outward = np.cos(angle) * e1 + np.sin(angle) * e2
+    around = -np.sin(angle) * e1 + np.cos(angle) * e2
+    height = (frame.lift[arc] + u * frame.climb[arc])[:, None]
+    position = frame.center[arc] + radius * outward + height * normal
+    velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
+    return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
