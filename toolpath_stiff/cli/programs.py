@@ -111,18 +111,20 @@ def report_folders(programs: Sequence[Found]) -> list[Listed]:
             whole[i] = files[i]
     shown = [len(program.inside.parts) for program in programs]
     named = [_named_parts(program.file) for program in programs]  # rather these than the folders above the current one
-    paths = [Path(*path.parts[-count:]) for path, count in zip(whole, shown, strict=True)]
-    while clashing := _clashing(paths):
+    while True:
+        folders, names = (
+            [Path(*path.parts[-n:]) for path, n in zip(paths, shown, strict=True)] for paths in (whole, files)
+        )
+        clashing = sorted({*_clashing(folders), *_same_or_around(names)})
         longer = [i for i in clashing if shown[i] < named[i]]
         longer = longer or [i for i in clashing if shown[i] < len(whole[i].parts) - 1]
         if not longer:
             break
         for i in longer:
             shown[i] += 1
-            paths[i] = Path(*whole[i].parts[-shown[i] :])
     return [
-        Listed(program.file, (path.parent / program.inside.name).as_posix(), path)
-        for program, path in zip(programs, paths, strict=True)
+        Listed(program.file, name.as_posix(), folder)
+        for program, name, folder in zip(programs, names, folders, strict=True)
     ]
 
 
