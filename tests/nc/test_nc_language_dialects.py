@@ -230,7 +230,6 @@ def test_the_options_of_the_command_line(tmp_path, capsys):
         ("N5 TRANS X10 Y20\n", "Siemens", 1),
         ("N5 CYCLE81(10,0,2,-5)\n", "Siemens", 1),
         ("G0 X1\n" * 60 + "R1=5\n", "Siemens", 61),
-        ("PARTNO EXAMPLE\nGOTO/1,2,3,0,0,1\n", "APT", 1),
     ],
 )
 def test_other_languages_are_refused_by_name(text, language, line):

@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         block_delete=args.block_delete,
         controller=controller,
     )
-    document = {"program": name, "dialect": controller.label, **_document(args, checked, machine)}
+    document = {"program": name, "dialect": checked.dialect or controller.label, **_document(args, checked, machine)}
     if args.json:
         json.dump(document, sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
         sys.stdout.write("\n")

@@ -124,6 +124,7 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.placement.batch import work_path
     from toolpath_stiff.placement.report_data import analyse_before, front_rows, placement_summary, pose_of
+    from toolpath_stiff.placement.rewrite import check_rewritable
     from toolpath_stiff.placement.search import search_placements
     from toolpath_stiff.stiffness.model import build_model
 
@@ -133,6 +134,8 @@ def run(args: argparse.Namespace) -> int:
     _check_write(args)
     model = build_model(load_machine(args.machine), args.effects)
     program = read_program_for(args, args.program, model.machine)
+    if args.write:
+        check_rewritable(program)
     if args.write and program.interpreter != "builtin":
         raise InputError(
             f"--write {args.write}: {program.name} was read by LinuxCNC's interpreter; its blocks cannot be rewritten",

@@ -10,10 +10,13 @@ from dataclasses import dataclass
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes import code_meaning, would_change
 from toolpath_stiff.nc.controller import ALL_SWITCHES, UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.cutter_location.checking import CheckedCutterLocation
+from toolpath_stiff.nc.cutter_location.program import not_for
+from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
-from toolpath_stiff.nc.moves import Moves, Unsupported
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Unsupported
 from toolpath_stiff.nc.plain_lines import G_COLUMN
 from toolpath_stiff.nc.reader import ZERO
 from toolpath_stiff.nc.subprograms import ProgramRun
@@ -22,6 +25,7 @@ from toolpath_stiff.nc.words import Block
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
+NO_CHANGE = "nothing of the path"
 MOST_ERRORS = 100  # beyond, a file is no program for this reader
 
 
@@ -80,6 +84,8 @@ class Checked:
         Where program zero sits, m and rad.
     complete
         Whether the whole program was read.
+    dialect
+        What the file was taken for, where that is not the control's dialect.
     """
 
     used: tuple[UsedCode, ...]
@@ -90,6 +96,7 @@ class Checked:
     moves: Moves | None
     origin: Pose
     complete: bool
+    dialect: str = ""
 
 
 class _CheckingRun(ProgramRun):
@@ -149,6 +156,8 @@ def check_lines(
     """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone."""
     if not any(line.strip() for line in lines):
         raise InputError("the program is empty", expected="an NC program", file=name)
+    if looks_like_cutter_location(lines, name):
+        return _check_cutter_location(lines, name, origin or default_origin, block_delete, controller)
     place, default = None if origin is None else _to_mm(origin), _to_mm(default_origin)
     frames = Frames(copy.deepcopy(controller.offsets or Offsets()), place, default)
     interpreter = Interpreter(name, frames, copy.deepcopy(controller.tools), controller.dialect)
@@ -183,6 +192,39 @@ def check_lines(
     )
 
 
+def _check_cutter_location(
+    lines: tuple[str, ...], name: str, origin: Iterable[float], block_delete: bool, controller: Controller
+) -> Checked:
+    reading = CheckedCutterLocation(name, copy.deepcopy(controller.tools), MOST_ERRORS)
+    reading.check(lines)
+    offsets = controller.offsets is not None and any(offset.given for offset in controller.offsets.table)
+    warnings = (*not_for(controller, offsets, block_delete), *reading.warnings)
+    findings = [_of_error(error) for error in reading.errors]
+    findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in warnings]
+    findings += [Finding(0, 0, "assumption", text, NOTE) for text in reading.assumptions]
+    x, y, z, a, b, c = origin
+    return Checked(
+        used=tuple(UsedCode(line, 1, word, text, NOTE, count) for word, text, line, count in reading.meanings()),
+        unsupported=tuple(
+            Finding(
+                word.line,
+                word.column,
+                word.word,
+                f"{word.reason}; it would change {'what is not known' if word.word in reading.doubtful else NO_CHANGE}",
+                NOTE,
+            )
+            for word in reading.unsupported
+        ),
+        findings=tuple(sorted(findings, key=lambda f: (f.line, f.column))),
+        start=reading.start,
+        end=reading.state(),
+        moves=reading.recorder.moves() if reading.recorder.line else None,
+        origin=(x, y, z, a, b, c),
+        complete=not reading.errors,
+        dialect=CUTTER_LOCATION,
+    )
+
+
 def _of_error(error: InputError) -> Finding:
     """What could not be read, and what it would change."""
     text = error.found + (f"; expected {error.expected}" if error.expected else "")
@@ -193,7 +235,7 @@ def _of_error(error: InputError) -> Finding:
 
 
 def _of_unsupported(word: Unsupported) -> Finding:
-    text = f"{word.reason}; it would change {would_change(word.word) or 'nothing of the path'}"
+    text = f"{word.reason}; it would change {would_change(word.word) or NO_CHANGE}"
     return Finding(word.line, word.column, word.word, text, NOTE)
 
 

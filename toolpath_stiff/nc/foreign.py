@@ -10,11 +10,9 @@ HEAD_LINES = 50  # a file says what it is at its beginning
 
 _HEIDENHAIN = "Heidenhain's conversational language"
 _SIEMENS = "Siemens' own language (Sinumerik)"
-_APT = "a cutter-location file (APT)"
 HINTS = {
     _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
     _SIEMENS: "post it as ISO G code: no frames (TRANS, ROT), no CYCLE calls, no variables, no X=... words",
-    _APT: "post it as ISO G code",
 }
 # What no G code of the controls read here has at the beginning of a block, blanks and N words apart.
 _SIGNS = (
@@ -27,7 +25,6 @@ _SIGNS = (
     (_SIEMENS, r"MSG\s*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+\s*\(|WORKPIECE\s*\("),
     (_SIEMENS, r"A?(?:TRANS|ROT|SCALE|MIRROR)(?:\s|;|$)|TRAORI\b|TRAFOOF\b|SUPA\b|D?R\d+\s*="),
     (_SIEMENS, r"(?:[A-Z]+\d*[\d.+-]*\s+)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
-    (_APT, r"(?:GOTO|FROM|FEDRAT|MULTAX|CUTTER|PPRINT|PARTNO|LOADTL)\s*(?:/|$)|PARTNO\s"),
 )
 _PATTERNS = tuple((what, re.compile(r"\s*(?:N\d+\s+|\d+\s+)?(?:" + sign + ")", re.IGNORECASE)) for what, sign in _SIGNS)
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     BoolArray = NDArray[np.bool_]
 
 RAPID, FEED, ARC, CYCLE = 0, 1, 2, 3
+CUTTER_LOCATION = "cutter-location file"
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
 
 
@@ -126,7 +127,8 @@ class Program:
     interpreter
         Who read it: "builtin" or "linuxcnc".
     dialect
-        How it was read: "generic", "linuxcnc", "fanuc", "haas", or one of them as a controller file changes it.
+        How it was read: "generic", "linuxcnc", "fanuc", "haas", or one of them as a controller file changes it;
+        `CUTTER_LOCATION` for a cutter-location file.
     marks
         (line, name) where operations begin, ascending, in a language whose text says so otherwise than by comment
         lines; None: the comment lines of `source` say it.

@@ -1,4 +1,4 @@
-"""An NC program, from file or text, to `Program`."""
+"""An NC program or a cutter-location file, from file or text, to `Program`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import ALL_SWITCHES, UNKNOWN_CONTROL, Controller, check_plain
+from toolpath_stiff.nc.cutter_location import program as cutter_location
+from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
@@ -116,6 +118,16 @@ def _read(
         raise InputError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in lines):
         raise InputError("the program is empty", expected="an NC program", file=name)
+    if looks_like_cutter_location(lines, name):
+        if interpreter == "linuxcnc":
+            raise InputError(
+                "LinuxCNC's interpreter reads no cutter-location files",
+                expected="--interpreter builtin",
+                file=name,
+            )
+        place, default = None if origin is None else _six(origin), _six(default_origin)
+        warnings = cutter_location.not_for(controller, any(o.given for o in offsets.table), block_delete)
+        return cutter_location.read(lines, name, path, place, default, tools, warnings)
     foreign = foreign_program(lines, name)
     if foreign is not None:
         raise foreign
@@ -221,6 +233,11 @@ def _read_built_in(
         tools=tuple(interpreter.used_tools.values()),
         dialect=controller.label,
     )
+
+
+def _six(origin: Iterable[float]) -> Pose:
+    x, y, z, a, b, c = origin
+    return (x, y, z, a, b, c)
 
 
 def _to_mm(origin: Iterable[float]) -> Pose:

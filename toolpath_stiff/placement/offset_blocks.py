@@ -14,7 +14,7 @@ import numpy as np
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.codes import WORK_OFFSETS, code_name
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
 from toolpath_stiff.nc.words import read_block
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -79,6 +79,8 @@ def _not_about_z(program: Program, placement: Pose) -> str:
 
 def _not_g54_alone(program: Program) -> str:
     """Why setting G54 would not move the whole program, or ""."""
+    if program.dialect == CUTTER_LOCATION:
+        return "a cutter-location file has no work offsets: set the zero of the program posted from it, or place that"
     for number, text in enumerate(program.source, 1):
         if "5" not in text and "10" not in text:
             continue  # neither a work offset nor G10

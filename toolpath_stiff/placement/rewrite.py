@@ -21,7 +21,7 @@ from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.frames import Pose as ShopPose
 from toolpath_stiff.nc.interpreter import Interpreter
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.source import split_lines
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
@@ -93,6 +93,7 @@ def rewrite_program(
         A block cannot be expressed at the placement, with its line and the reason.
     """
     check_decimals(decimals)
+    check_rewritable(program)
     if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
         raise InputError(
             "a program is rewritten by the words of the built-in interpreter in the dialects "
@@ -115,6 +116,16 @@ def rewrite_program(
     )
     pieces = list(_rewritten_lines(rewriter, text, program.name, block_delete))
     return Rewritten("".join(pieces), encoding, tuple(rewriter.notes))
+
+
+def check_rewritable(program: Program) -> None:
+    """Raise `InputError` for a file that is no program of a control."""
+    if program.dialect == CUTTER_LOCATION:
+        raise InputError(
+            "a cutter-location file is not rewritten: it is no program that a control runs",
+            hint="place it without --write, set the work so in the CAM system, or place the posted program",
+            file=program.name,
+        )
 
 
 def check_decimals(decimals: int | None) -> None:

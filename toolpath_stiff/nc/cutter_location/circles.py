@@ -1,0 +1,166 @@
+"""Circles of a cutter-location file: which way round, how far, and whether start, end and radius agree. mm.
+
+- `CIRCLE/x,y,z,i,j,k,r`: by the right hand about i, j, k (PTC, "CL Output for Circular Interpolation").
+- `CIRCLE/x,y,z,i,j,k,r,t,f,d,e`: clockwise about i, j, k (Siemens NX, "CLSF Manager": "assuming a clockwise direction";
+  Autodesk's post for CAMplete).
+- `MOVARC/x,y,z,i,j,k,r,ANGLE,a`: by the right hand (ISO 4343; Autodesk's post for it).
+- `INDIRV/i,j,k` before `CIRCLE/x,y,z,r` or `TLON,GOFWD/(CIRCLE/...)`: the direction at the start.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from toolpath_stiff.nc import arcs
+from toolpath_stiff.nc.recorder import Arc
+
+Vector = tuple[float, float, float]
+SAME_POINT_MM = 5e-4  # start and end closer than this are one point: a whole turn
+SMOOTH_DEG = 5.0  # a path that enters an arc within this of its tangent enters it smoothly
+SWEEP_TOLERANCE_DEG = 0.05
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle that the next motion follows: centre, unit axis (the motion is right-handed about it), radius.
+
+    `turns` are whole turns, given for a start that is the end; `sweep` is the angle in degrees, if given.
+    """
+
+    center: Vector
+    axis: Vector
+    radius: float
+    turns: int = 1
+    sweep: float | None = None
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def along(point: Vector, direction: Vector, distance: float) -> Vector:
+    """A point moved by a distance."""
+    x, y, z = (p + distance * d for p, d in zip(point, direction, strict=True))
+    return (x, y, z)
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """Difference."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _in_plane(circle: Circle, start: Vector) -> tuple[Vector, Vector]:
+    """Axes of the circle's plane, the first towards the start as far as that lies in the plane."""
+    out = minus(start, circle.center)
+    out = along(out, circle.axis, -dot(out, circle.axis))
+    length = math.sqrt(dot(out, out))
+    if length < arcs.SAME_POINT:
+        raise arcs.ArcError("a circle whose centre is the tool's position", "a centre apart from it")
+    first = (out[0] / length, out[1] / length, out[2] / length)
+    return first, cross(circle.axis, first)
+
+
+def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
+    """The arc from start to end. Raises `arcs.ArcError` where they do not lie on the circle within its tolerance."""
+    first, second = _in_plane(circle, start)
+    from_center, to_end = minus(start, circle.center), minus(end, circle.center)
+    here = (dot(from_center, first), 0.0)
+    there = (dot(to_end, first), dot(to_end, second))
+    arcs.check_radii(here, there, (0.0, 0.0))
+    allowed = min(max(arcs.ABSOLUTE_TOLERANCE, arcs.RELATIVE_TOLERANCE * here[0]), arcs.LARGEST_DIFFERENCE)
+    if abs(circle.radius - here[0]) > allowed:
+        raise arcs.ArcError(
+            f"a circle of radius {circle.radius:.4f} mm whose centre lies {here[0]:.4f} mm from the tool's position",
+            f"radii that agree within {allowed:.4f} mm",
+        )
+    center = along(circle.center, circle.axis, dot(from_center, circle.axis))
+    return Arc(center, circle.axis, _sweep(circle, here, there))
+
+
+def _sweep(circle: Circle, here: arcs.Point2, there: arcs.Point2) -> float:
+    angle = math.atan2(there[1], there[0])
+    if math.dist(here, there) < SAME_POINT_MM:
+        angle += math.tau * circle.turns
+        whole = True
+    else:
+        angle, whole = angle % math.tau, False
+    if circle.turns > 1 and not whole:
+        raise arcs.ArcError("a helix of several turns that does not end above its start", "one CIRCLE a turn")
+    if circle.sweep is not None:
+        angle += math.tau * round((math.radians(circle.sweep) - angle) / math.tau)
+        if angle <= 0.0 or abs(math.degrees(angle) - circle.sweep) > SWEEP_TOLERANCE_DEG:
+            raise arcs.ArcError(
+                f"an arc of {math.degrees(angle % math.tau):.3f} degrees where ANGLE says {circle.sweep:g}",
+                "an end that is that far along the circle",
+            )
+    return angle
+
+
+def part_of(arc: Arc, start: Vector, end: Vector, share: float) -> Vector:
+    """The point at a share of an arc's sweep, as it is sampled: climb and growth of the radius go with the angle."""
+    out = minus(start, arc.center)
+    radius = math.sqrt(dot(out, out))
+    first = (out[0] / radius, out[1] / radius, out[2] / radius)
+    second = cross(arc.normal, first)
+    climb = dot(minus(end, arc.center), arc.normal)
+    flat = along(minus(end, arc.center), arc.normal, -climb)
+    growth = math.sqrt(dot(flat, flat)) - radius
+    angle, size = share * arc.sweep, radius + share * growth
+    point = along(along(arc.center, first, size * math.cos(angle)), second, size * math.sin(angle))
+    return along(point, arc.normal, share * climb)
+
+
+def turned_as(center: Vector, axis: Vector, start: Vector, direction: Vector) -> Vector:
+    """The axis with the sign that makes a motion from the start begin in a direction. Raises `arcs.ArcError`."""
+    tangent = cross(axis, minus(start, center))
+    size = math.sqrt(dot(tangent, tangent) * dot(direction, direction))
+    if size < arcs.SAME_POINT or abs(dot(tangent, direction)) < 0.5 * size:
+        raise arcs.ArcError("a direction (INDIRV) that does not go along the circle", "the tangent at the start")
+    return axis if dot(tangent, direction) > 0.0 else (-axis[0], -axis[1], -axis[2])
+
+
+def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which: int) -> Vector:
+    """Where a motion along the circle meets a line for the first or second time. Raises `arcs.ArcError`.
+
+    Parameters
+    ----------
+    circle, start
+        The motion.
+    line
+        Two points of the line; it goes on beyond them.
+    which
+        1 or 2: APT's `ON,(LINE/...)` and `ON,2,INTOF,(LINE/...)`.
+    """
+    first, second = _in_plane(circle, start)
+    a, b = (minus(point, circle.center) for point in line)
+    p, q = (dot(a, first), dot(a, second)), (dot(b, first), dot(b, second))
+    length = math.dist(p, q)
+    if length < arcs.SAME_POINT:
+        raise arcs.ArcError("a line of no length", "two points")
+    u = ((q[0] - p[0]) / length, (q[1] - p[1]) / length)
+    foot = -(p[0] * u[0] + p[1] * u[1])
+    miss = abs(p[0] * u[1] - p[1] * u[0])
+    radius = dot(minus(start, circle.center), first)
+    if miss > radius:
+        raise arcs.ArcError("a line that does not meet its circle", "one that does")
+    half = math.sqrt(radius * radius - miss * miss)
+    met = [(p[0] + (foot + s * half) * u[0], p[1] + (foot + s * half) * u[1]) for s in (-1.0, 1.0)]
+    # The start itself, if the line goes through it, is met after a whole turn.
+    order = sorted(met, key=lambda m: math.atan2(m[1], m[0]) % math.tau or math.tau)
+    order.sort(key=lambda m: math.dist(m, (radius, 0.0)) < 10.0 * SAME_POINT_MM)
+    x, y = order[which - 1]
+    if abs(math.hypot(*q) - radius) < 10.0 * SAME_POINT_MM and math.dist(q, (x, y)) > 10.0 * SAME_POINT_MM:
+        raise arcs.ArcError(
+            "a line whose second point lies on the circle, where the motion does not end",
+            "that point at the intersection that is asked for",
+        )
+    rise = dot(minus(start, circle.center), circle.axis)
+    flat = along(along(circle.center, first, x), second, y)
+    return along(flat, circle.axis, rise)

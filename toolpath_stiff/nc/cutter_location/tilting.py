@@ -1,0 +1,87 @@
+"""Tool axes of a cutter-location file as roll and pitch, and moves divided where the axis turns. Degrees.
+
+A machine that is told two tool axes turns the tool in their plane, along the great circle between them. Our moves turn
+roll and pitch linearly. On the unit sphere with roll a as latitude and pitch b as longitude a geodesic of angle t has
+a'' = -sin a cos a b'^2 and b'' = 2 tan a a' b' (do Carmo, "Differential Geometry of Curves and Surfaces", 4-4), both
+together at most sqrt(4/3) tan|a| t^2 long; the linear interpolation then departs from it by at most an eighth of that.
+"""
+
+from __future__ import annotations
+
+import math
+
+from toolpath_stiff.nc.tool_axis import roll_pitch_of_axis
+
+AXIS_TOLERANCE = 1e-3  # of the length of a unit vector: four decimals and a little more
+GREAT_CIRCLE_DEG = 0.01  # how far the tool axis may leave the great circle within a move
+STEEPEST = 89.0  # deg of roll up to which that holds; at 90 pitch is not defined
+TURNED_OVER = 179.0  # deg: beyond, two axes do not say in which plane the tool turns
+
+Vector = tuple[float, float, float]
+VERTICAL: Vector = (0.0, 0.0, 1.0)
+
+
+class AxisError(Exception):
+    """What is wrong with a tool axis: found, expected."""
+
+    def __init__(self, found: str, expected: str) -> None:
+        super().__init__(found)
+        self.found, self.expected = found, expected
+
+
+def unit_axis(i: float, j: float, k: float) -> Vector:
+    """A tool axis of length 1. Raises `AxisError` if the given one is further off than `AXIS_TOLERANCE`."""
+    length = math.sqrt(i * i + j * j + k * k)
+    if abs(length - 1.0) > AXIS_TOLERANCE:
+        raise AxisError(
+            f"a tool axis {i:g},{j:g},{k:g} of length {length:.6g}", f"a unit vector, within {AXIS_TOLERANCE:g}"
+        )
+    return (i / length, j / length, k / length)
+
+
+def angles_near(axis: Vector, near: tuple[float, float]) -> tuple[float, float]:
+    """Roll and pitch of a unit tool axis, the pitch within half a turn of the one before."""
+    i, j, k = axis
+    roll, pitch = (angle + 0.0 for angle in roll_pitch_of_axis(i, j, k))  # no -0
+    if i * i + k * k < 1e-18:  # along Y any pitch gives this axis
+        return roll, near[1]
+    return roll, pitch + 360.0 * round((near[1] - pitch) / 360.0)
+
+
+def angle_between(first: Vector, second: Vector) -> float:
+    """Degrees between two unit vectors; exact for small ones too."""
+    difference = math.dist(first, second)
+    return math.degrees(2.0 * math.asin(min(1.0, difference / 2.0)))
+
+
+def division(first: Vector, second: Vector) -> int:
+    """Into how many equal parts a turn of the tool axis is divided. Raises `AxisError` where it turns over."""
+    chord = math.dist(first, second)
+    if chord < 0.008 and abs(first[1]) < 0.9 and abs(second[1]) < 0.9:
+        return 1  # half a degree and less, of a tool well away from Y: what most moves turn by
+    angle = angle_between(first, second)
+    if angle > TURNED_OVER:
+        raise AxisError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
+    steepest = math.radians(min(_steepest_roll(first, second, math.radians(angle)), STEEPEST))
+    departure = math.sqrt(4.0 / 3.0) * math.tan(steepest) * math.radians(angle) ** 2 / 8.0
+    return max(1, math.ceil(math.sqrt(departure / math.radians(GREAT_CIRCLE_DEG))))
+
+
+def _steepest_roll(first: Vector, second: Vector, angle: float) -> float:
+    """Greatest roll in degrees on the way: sin(roll) is -j, and j = j0 cos t + g sin t along the great circle."""
+    sine = max(abs(first[1]), abs(second[1]))
+    if angle > 1e-9:
+        growth = (second[1] - first[1] * math.cos(angle)) / math.sin(angle)
+        if 0.0 < math.atan2(growth, first[1]) % math.pi < angle:
+            sine = math.hypot(first[1], growth)
+    return math.degrees(math.asin(min(sine, 1.0)))
+
+
+def on_great_circle(first: Vector, second: Vector, share: float) -> Vector:
+    """The unit vector at a share of the way from one to another."""
+    angle = math.radians(angle_between(first, second))
+    if angle < 1e-9:
+        return second
+    near, far = math.sin((1.0 - share) * angle) / math.sin(angle), math.sin(share * angle) / math.sin(angle)
+    x, y, z = (near * a + far * b for a, b in zip(first, second, strict=True))
+    return (x, y, z)
