@@ -218,7 +218,7 @@ def _check_cutter_location(
         findings=tuple(sorted(findings, key=lambda f: (f.line, f.column))),
         start=reading.start,
         end=reading.state(),
-        moves=reading.recorder.moves() if reading.recorder.line else None,
+        moves=reading.recorder.moves() if len(reading.recorder) else None,
         origin=(x, y, z, a, b, c),
         complete=not reading.errors,
         dialect=CUTTER_LOCATION,

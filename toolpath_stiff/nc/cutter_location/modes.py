@@ -170,7 +170,7 @@ class Modes(ToolPath):
             raise self.fail(statement.shown, "UNITS/MM or UNITS/INCHES")
         if self.circle is not None:
             raise self.fail("UNITS/ amid an arc", "UNITS/ before CIRCLE/")
-        if not self.units_said and self.recorder.line and LENGTH_UNITS[words[0]] != 1.0:
+        if not self.units_said and len(self.recorder) and LENGTH_UNITS[words[0]] != 1.0:
             raise self.fail("UNITS/ after the first points, which were taken as mm", "UNITS/ before any point")
         self.scale, self.units_said = LENGTH_UNITS[words[0]], True
 

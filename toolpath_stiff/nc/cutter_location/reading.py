@@ -104,7 +104,7 @@ class CutterLocation(Curves):
             raise self.fail(error.found, error.expected) from None
 
     def _finish(self) -> None:
-        if not self.units_said and self.recorder.line:
+        if not self.units_said and len(self.recorder):
             self.assume(NO_UNITS)
         for noted in self.doubtful.values():
             times = f" ({noted.count} times)" if noted.count > 1 else ""
@@ -201,7 +201,7 @@ class CutterLocation(Curves):
     def _from(self, statement: Statement) -> None:
         numbers = self._numbers(statement, 3, 6)
         axis = self._axis_of(numbers)
-        if self.recorder.line:
+        if len(self.recorder):
             self.warnings.append(
                 f"line {statement.line}: FROM amid the path: the tool is taken to stand there; how it came is not said"
             )
