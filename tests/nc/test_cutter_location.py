@@ -279,8 +279,8 @@ def test_inches():
     moves = program.moves
     assert moves.end[0, 0] == pytest.approx(0.0254) and moves.feed[0] == pytest.approx(0.254 / 60)
     assert moves.tool_length[0] == pytest.approx(0.0508) and program.tools[0].diameter == pytest.approx(0.0127)
-    # The tip stands, the tool turns: the number of the feed counts degrees.
-    assert moves.feed[-1] == pytest.approx(math.radians(10) / 60)
+    # The tip stands, the tool turns: the feed's mm count as degrees, whatever the unit of the file.
+    assert moves.feed[-1] == pytest.approx(math.radians(254) / 60)
 
 
 def test_tools_lengths_and_pauses():

@@ -19,11 +19,11 @@ from toolpath_stiff.nc.cycles import Drilling, strokes
 from toolpath_stiff.nc.moves import ARC, CYCLE, RAPID, ToolUse
 from toolpath_stiff.nc.recorder import Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.units import MM_PER_INCH, m_from_mm
+from toolpath_stiff.units import m_from_mm
 
 FIRST_POINT = "the path begins at the file's first point; where the tool comes from is not said (no FROM)"
 FREE_YAW = "the turn of the tool about its own axis (yaw) is free in a cutter-location file; it is 0"
-TURN_FEED = "where the tool turns about its standing tip, the number of the feed counts degrees per minute"
+TURN_FEED = "where the tool turns about its standing tip, a feed of 1 mm/min counts as 1 degree per minute"
 PECKS = "a drilling cycle with STEP or INCR ends its rapids 0.254 mm above the last depth, as LinuxCNC does"
 NOT_MOVED = (False, False)
 
@@ -82,7 +82,7 @@ class ToolPath:
             return
         if axis == self.axis:
             if target != start:
-                self._add(line, motion, target, self.angles, self._feed(motion, False))
+                self._add(line, motion, target, self.angles, self._feed(motion))
                 self._direction = circles.minus(target, start)
             return
         whole = circles.minus(target, start)
@@ -100,7 +100,7 @@ class ToolPath:
         arc = circles.arc_to(circle, start, target)
         self._smoothness(line, circle, start)
         if axis == self.axis:
-            self._add(line, ARC, target, self.angles, self._feed(ARC, False), arc)
+            self._add(line, ARC, target, self.angles, self._feed(ARC), arc)
         else:
             self._turning(line, ARC, target, axis, lambda share: circles.part_of(arc, start, target, share), arc)
         self._direction = circles.cross(arc.normal, circles.minus(target, circle.center))
@@ -147,7 +147,7 @@ class ToolPath:
         first, angles = self.axis, self.angles
         parts = division(first, axis)
         still = arc is None and self.point == target
-        feed = self._feed(motion, still)
+        feed = self._feed(motion)
         if still and motion != RAPID:
             self.assume(TURN_FEED)
         self.assume(FREE_YAW)
@@ -188,14 +188,13 @@ class ToolPath:
             entry.material,
         )
 
-    def _feed(self, motion: int, still: bool) -> float:
-        """mm/min, or deg/min for a tip that stands still: the file's number."""
+    def _feed(self, motion: int) -> float:
+        """mm/min; for a tip that stands still the same number of degrees per minute."""
         if motion == RAPID:
             return math.nan
         if self.feed is None:
             raise NoFeedError("a cut before any feed", "FEDRAT/ with a feed above 0, or RAPID, before it")
-        feed = self.feed_per_minute(self.feed, self.per_revolution)
-        return feed / (MM_PER_INCH if still and self.scale != 1.0 else 1.0)
+        return self.feed_per_minute(self.feed, self.per_revolution)
 
     def feed_per_minute(self, feed: float, per_revolution: bool) -> float:
         """mm/min of a feed that may be per revolution."""
