@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolpath_stiff.cli.programs import RESERVED, Found, find_programs, report_folders
+from toolpath_stiff.cli.analyze import EPILOG
+from toolpath_stiff.cli.programs import RESERVED, Found, endings, find_programs, report_folders
 from toolpath_stiff.errors import InputError
 
 
@@ -31,6 +32,21 @@ def test_a_folder_stands_for_its_programs_and_counts_the_rest(jobs):
     assert [str(count) for count in counts] == [
         "jobs: 3 programs; other files are left alone: 1 without an ending, 2 .txt"
     ]
+
+
+def test_numbers_in_names_are_sorted_as_numbers(jobs):
+    for name in ("other/p10.nc", "other/p9.nc", "other/p9/10.nc", "other/p9/9.nc", "other/P9.nc"):
+        path = jobs / name
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    found, _ = find_programs(["other"])
+    assert [str(program.inside) for program in found] == [
+        "P9.nc", "b.nc", "p9/9.nc", "p9/10.nc", "p9.nc", "p10.nc",
+    ]  # fmt: skip
+
+
+def test_the_help_names_every_ending():
+    assert all(f" {ending}" in EPILOG for ending in endings())
 
 
 def test_a_file_named_twice_in_any_way_is_read_once(jobs):
@@ -82,9 +98,9 @@ def test_a_report_folder_never_takes_the_name_of_the_overview():
 
 
 names = st.sampled_from(["a", "b", "part", "part.nc", "index.html"])
-endings = st.sampled_from([".nc", ".tap", ""])
+suffixes = st.sampled_from([".nc", ".tap", ""])
 paths = st.builds(
-    lambda above, name, ending: "/".join([*above, name + ending]), st.lists(names, max_size=3), names, endings
+    lambda above, name, ending: "/".join([*above, name + ending]), st.lists(names, max_size=3), names, suffixes
 )
 
 

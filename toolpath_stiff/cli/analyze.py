@@ -39,9 +39,10 @@ files written to --out:
   report.html   the path in 3-D, linked to profile and program text; one file, no network
 
 several programs, or a folder:
-  a folder stands for the programs in it and below it, those ending in .nc .ngc .tap .cnc .gcode .gc .eia .mpf .min
-  .apt .cl .cls in any case; hidden files and linked folders are left alone. Each program has these files in a folder of
-  its own below --out (default: reports); beside them
+  a folder stands for the programs in it and below it: .nc .ngc .tap .cnc .gcode .gc .eia .mpf .min, and the
+  cutter-location files .apt .aptsource .cl .cls .clsf .ncl, in small letters or capitals; hidden files and linked
+  folders are left alone. Each program has the files above in a folder of its own below --out (default: reports), and
+  beside these folders there are
   index.html    all programs in one sortable table, drawn on one scale of stiffness; failures with their reason
   summary.csv   the same for a spreadsheet, one row a program
   A program that fails does not stop the others and is named at the end.
@@ -57,7 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("programs", nargs="+", metavar="PROGRAM", help="NC program, or a folder of them")
+    parser.add_argument(
+        "programs", nargs="+", metavar="PROGRAM", help="NC program or cutter-location file, or a folder of them"
+    )
     add_program_options(parser)
     add_machine_options(parser)
     add_load_options(parser)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,8 +11,8 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 
-# Endings that are NC programs or cutter-location files and nothing else; `.txt` is as often a note or a tool list.
-ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min", ".apt", ".cl", ".cls")
+# Endings of NC programs and of nothing else: `.txt` is as often a note or a tool list.
+NC_ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min")
 RESERVED = ("index.html", "summary.csv")  # what lies beside the report folders
 
 
@@ -69,13 +70,20 @@ def find_programs(arguments: Sequence[str]) -> tuple[list[Found], list[FolderCou
     return list(found.values()), counts
 
 
+def endings() -> tuple[str, ...]:
+    """Endings of the files that a folder stands for: NC programs, and cutter-location files."""
+    from toolpath_stiff.nc.cutter_location.statements import EXTENSIONS
+
+    return NC_ENDINGS + EXTENSIONS
+
+
 def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
     """Programs in a folder and below it; hidden ones, and folders that are symbolic links, are not entered."""
 
     def refuse(error: OSError) -> None:
         raise InputError(f"cannot read folder {str(error.filename)!r}: {error.strerror}")
 
-    inside, others = [], Counter[str]()
+    inside, others, known = [], Counter[str](), endings()
     for place, folders, files in os.walk(folder, onerror=refuse):
         folders[:] = [name for name in folders if not name.startswith(".")]
         for name in files:
@@ -83,18 +91,23 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
             if name.startswith("."):
                 continue
             # A symbolic link that leads nowhere is a program that cannot be read; a pipe would wait for ever.
-            if path.suffix.lower() in ENDINGS and (path.is_file() or path.is_symlink()):
+            if path.suffix.lower() in known and (path.is_file() or path.is_symlink()):
                 inside.append(Found(str(path), path.relative_to(folder)))
             else:
                 others[path.suffix.lower()] += 1
     if not inside:
         raise InputError(
             f"no NC program in folder {folder!r}",
-            expected=f"files ending in {', '.join(ENDINGS)}",
+            expected=f"files ending in {', '.join(known)}",
             hint="name files with another ending themselves",
         )
-    inside.sort(key=lambda program: program.inside.parts)
+    inside.sort(key=lambda program: [(_by_number(part), part) for part in program.inside.parts])
     return inside, FolderCount(folder, len(inside), tuple(sorted(others.items())))
+
+
+def _by_number(name: str) -> list[str | int]:
+    """A key that puts `part2` before `part10`."""
+    return [int(part) if i % 2 else part for i, part in enumerate(re.split("([0-9]+)", name))]
 
 
 def report_folders(programs: Sequence[Found]) -> list[Listed]:
