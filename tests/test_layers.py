@@ -19,6 +19,7 @@ RANK = {
     "units": 0,
     "errors": 0,
     "files": 1,
+    "column_files": 1,
     "nc": 2,
     "path": 3,
     "machine": 4,

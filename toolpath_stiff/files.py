@@ -10,7 +10,7 @@ from pathlib import Path
 from toolpath_stiff.errors import InputError
 
 
-def write_atomically(path: str | Path, content: str | bytes | Iterable[str]) -> Path:
+def write_atomically(path: str | Path, content: str | bytes | Iterable[str | bytes]) -> Path:
     """Write text (UTF-8, line feeds as they are), bytes or pieces of text; folders are made as needed.
 
     A symbolic link is followed. A device or pipe (`/dev/stdout`) is written to, never replaced by a file.
@@ -32,7 +32,7 @@ def write_atomically(path: str | Path, content: str | bytes | Iterable[str]) -> 
     return target
 
 
-def _write_then_rename(target: Path, content: str | bytes | Iterable[str]) -> None:
+def _write_then_rename(target: Path, content: str | bytes | Iterable[str | bytes]) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
@@ -45,12 +45,12 @@ def _write_then_rename(target: Path, content: str | bytes | Iterable[str]) -> No
         raise
 
 
-def _encoded(content: str | bytes | Iterable[str]) -> Iterator[bytes]:
+def _encoded(content: str | bytes | Iterable[str | bytes]) -> Iterator[bytes]:
     if isinstance(content, bytes):
         yield content
     else:
         for piece in [content] if isinstance(content, str) else content:
-            yield piece.encode("utf-8")
+            yield piece.encode("utf-8") if isinstance(piece, str) else piece
 
 
 def _umask() -> int:

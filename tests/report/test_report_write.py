@@ -60,7 +60,7 @@ def test_summary_is_json_without_nan_and_equals_the_analysis(analysis, tmp_path)
 
 
 def test_out_of_reach_is_null_in_json_an_empty_cell_in_csv_and_a_null_in_parquet(tmp_path):
-    pq = pytest.importorskip("pyarrow.parquet")
+    from pyarrow import parquet as pq
     beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
     write_analysis(beyond, tmp_path / "o", plots=False)
     rows = list(csv.DictReader((tmp_path / "o" / "samples.csv").open()))
@@ -98,13 +98,6 @@ def test_an_error_midway_leaves_everything_as_it_was(analysis, tmp_path, monkeyp
         write_analysis(analysis, out)
     assert tree(tmp_path) == before
     assert (tmp_path / "reports").exists() == exists
-
-
-def test_parquet_without_pyarrow_names_the_extra_and_leaves_nothing(analysis, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(InputError, match=r"toolpath-stiff\[parquet\]"):
-        write_analysis(analysis, tmp_path / "o", plots=False, table="parquet")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_in_the_place_of_the_folder_is_one_clear_error(analysis, tmp_path):

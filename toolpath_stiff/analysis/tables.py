@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.path_analysis import Analysis
-from toolpath_stiff.path.table import PATH_COLUMNS, ROWS_AT_A_TIME, csv_rows, path_columns
+from toolpath_stiff.column_files import csv_pieces, parquet_pieces
+from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ def sample_columns(analysis: Analysis, rows: slice = slice(None)) -> dict[str, N
     return {
         **path_columns(analysis.samples, rows),
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(at.stiffness[rows]),
-        "deflection_um": um_from_m(analysis.deflection[rows]),
+        "deflection_um": um_from_m(analysis.force / at.stiffness[rows]),
         **{f"strut{i + 1}_mm": mm_from_m(at.strut_lengths[rows, i]) for i in range(6)},
         "margin": at.margin[rows],
         "margin_limit": names[at.limit[rows]],
@@ -48,8 +50,11 @@ def samples_frame(analysis: Analysis) -> pd.DataFrame:
     return pd.DataFrame(sample_columns(analysis))
 
 
-def samples_csv(analysis: Analysis) -> Iterator[str]:
+def samples_csv(analysis: Analysis) -> Iterator[bytes]:
     """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
-    yield ",".join(COLUMNS) + "\n"
-    for start in range(0, len(analysis.samples), ROWS_AT_A_TIME):
-        yield csv_rows(sample_columns(analysis, slice(start, start + ROWS_AT_A_TIME)), COLUMNS)
+    return csv_pieces(partial(sample_columns, analysis), len(analysis.samples), COLUMNS)
+
+
+def samples_parquet(analysis: Analysis) -> Iterator[bytes]:
+    """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
+    return parquet_pieces(partial(sample_columns, analysis), len(analysis.samples))

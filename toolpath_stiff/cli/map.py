@@ -166,7 +166,7 @@ def map_csv(found: StiffnessMap) -> Iterator[str]:
     """`map.csv`, a slice at a time."""
     import numpy as np
 
-    from toolpath_stiff.path.table import csv_rows
+    from toolpath_stiff.column_files import csv_rows
     from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
     decimals: dict[str, int | None] = {"x_mm": 6, "y_mm": 6, "z_mm": 6, "stiffness_N_per_mm": 4, "reachable": None}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import add_program_options, read_program_for
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         write_atomically(args.out, path_csv(samples))
     else:
         for piece in path_csv(samples):
-            sys.stdout.write(piece)
+            sys.stdout.write(piece.decode())
     for warning in program.warnings:
         print(f"tps: warning: {program.name}: {warning}", file=sys.stderr)
     for word in program.unsupported:
@@ -53,10 +54,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def path_csv(samples: Samples) -> Iterator[str]:
+def path_csv(samples: Samples) -> Iterator[bytes]:
     """The CSV text in pieces."""
-    from toolpath_stiff.path.table import PATH_COLUMNS, ROWS_AT_A_TIME, csv_rows, path_columns
+    from toolpath_stiff.column_files import csv_pieces
+    from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
 
-    yield ",".join(PATH_COLUMNS) + "\n"
-    for start in range(0, len(samples), ROWS_AT_A_TIME):
-        yield csv_rows(path_columns(samples, slice(start, start + ROWS_AT_A_TIME)), PATH_COLUMNS)
+    return csv_pieces(partial(path_columns, samples), len(samples), PATH_COLUMNS)

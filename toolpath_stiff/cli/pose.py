@@ -103,7 +103,7 @@ def _decimals(name: str) -> int | None:
 
 
 def _csv(model: StiffnessModel, args: argparse.Namespace) -> int:
-    from toolpath_stiff.path.table import csv_rows
+    from toolpath_stiff.column_files import csv_rows
 
     poses = _read_poses(args.csv)
     found = _evaluate(model, poses, args.force)

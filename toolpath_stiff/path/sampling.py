@@ -17,6 +17,7 @@ IntArray = NDArray[np.int64]
 
 RAPID_FEED = 10.0 / 60.0  # m/s, assumed where no machine says otherwise
 ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
+BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
 MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
 
 
@@ -66,33 +67,70 @@ def sample_moves(
             hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
         )
     counts = pieces.astype(np.int64) + 1
+    duration = _durations(moves, length, turn, rapid_feed)
+    cutting = moves.motion != RAPID
+    columns = {
+        "length": length,
+        "duration": duration,
+        "length_before": np.cumsum(length) - length,
+        "time_before": np.cumsum(duration + moves.dwell) - (duration + moves.dwell),
+        "piece": np.where(cutting, length / pieces, 0.0),
+        "pieces": pieces,
+    }
+    samples = _empty_samples(int(counts.sum()))
+    last = np.cumsum(counts)
+    first_move, first_sample = 0, 0
+    while first_move < len(moves):
+        # At least one move, and no more samples than a block holds.
+        end = max(int(np.searchsorted(last, first_sample + BLOCK, side="right")), first_move + 1)
+        block = slice(first_move, end)
+        rows = slice(first_sample, int(last[end - 1]))
+        some = {name: column[block] for name, column in columns.items()}
+        _sample_block(moves.take(block), counts[block], some, first_move, origin, samples.take(rows))
+        first_move, first_sample = end, rows.stop
+    return samples
+
+
+def _empty_samples(n: int) -> Samples:
+    return Samples(
+        move=np.empty(n, dtype=np.int64),
+        line=np.empty(n, dtype=np.int64),
+        motion=np.empty(n, dtype=np.int64),
+        tool=np.empty(n, dtype=np.int64),
+        tool_length=np.empty(n),
+        s=np.empty(n),
+        t=np.empty(n),
+        position=np.empty((n, 3)),
+        abc=np.empty((n, 3)),
+        tangent=np.empty((n, 3)),
+        weight=np.empty(n),
+        feed=np.empty(n),
+    )
+
+
+def _sample_block(
+    moves: Moves,
+    counts: IntArray,
+    columns: dict[str, FloatArray],
+    first_move: int,
+    origin: ArrayLike,
+    into: Samples,
+) -> None:
+    """Samples of some moves, into their rows. `columns` holds what is known of each move."""
     move = np.repeat(np.arange(len(moves)), counts)
     first = np.cumsum(counts) - counts
-    u = (np.arange(len(move)) - first[move]) / pieces[move]
-    position, tangent = points_along(moves, move, u)
+    u = (np.arange(len(move)) - first[move]) / columns["pieces"][move]
+    into.position[:], into.tangent[:] = points_along(moves, move, u)
     programmed = moves.start[move, 3:] + u[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
     is_end = np.arange(len(move)) == (first + counts - 1)[move]
     programmed[is_end] = moves.end[:, 3:]
-    duration = _durations(moves, length, turn, rapid_feed)
-    time_before = np.cumsum(duration + moves.dwell) - (duration + moves.dwell)
-    length_before = np.cumsum(length) - length
-    cutting = moves.motion != RAPID
-    piece_length = np.where(cutting, length / pieces, 0.0)[move]
-    at_end = (u == 0.0) | is_end
-    return Samples(
-        move=move,
-        line=moves.line[move],
-        motion=moves.motion[move],
-        tool=moves.tool[move],
-        tool_length=moves.tool_length[move],
-        s=length_before[move] + u * length[move],
-        t=time_before[move] + u * duration[move],
-        position=position,
-        abc=place_orientations(programmed, origin),
-        tangent=tangent,
-        weight=np.where(at_end, 0.5, 1.0) * piece_length,
-        feed=moves.feed[move],
-    )
+    into.abc[:] = place_orientations(programmed, origin)
+    into.move[:] = move + first_move
+    for name in ("line", "motion", "tool", "tool_length", "feed"):
+        getattr(into, name)[:] = getattr(moves, name)[move]
+    into.s[:] = columns["length_before"][move] + u * columns["length"][move]
+    into.t[:] = columns["time_before"][move] + u * columns["duration"][move]
+    into.weight[:] = np.where((u == 0.0) | is_end, 0.5, 1.0) * columns["piece"][move]
 
 
 def _fastest_part(moves: Moves) -> FloatArray:

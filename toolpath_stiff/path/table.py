@@ -1,8 +1,7 @@
-"""The sampled path as a table in the shop's units, and rows of CSV text, fast."""
+"""The sampled path as a table in the shop's units."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,6 @@ from numpy.typing import NDArray
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.path.samples import Samples
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
-
-ROWS_AT_A_TIME = 10_000
 
 # Column -> decimals; None: a whole number or a word. A millionth of a millimetre is finer than any machine and
 # lets sums over a long path keep their digits.
@@ -49,18 +46,3 @@ def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArr
         "c_deg": abc[:, 2],
         "feed_mm_per_min": mm_per_min_from_m_per_s(samples.feed[rows]),
     }
-
-
-def csv_rows(columns: Mapping[str, NDArray[Any]], decimals: Mapping[str, int | None]) -> str:
-    """Rows of a CSV file from columns; a nan is an empty cell, minus zero is zero.
-
-    One template formats a whole row, many times faster than the `csv` module.
-    """
-    template = ",".join("%s" if decimals[name] is None else f"%.{decimals[name]}f" for name in columns) + "\n"
-    values = []
-    for name, column in columns.items():
-        digits = decimals[name]
-        # Adding 0.0 turns the minus zero of rounding into zero.
-        values.append(column.tolist() if digits is None else (np.round(column, digits) + 0.0).tolist())
-    text = "".join([template % row for row in zip(*values, strict=True)])
-    return text.replace("nan", "") if "nan" in text else text

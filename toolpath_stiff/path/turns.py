@@ -38,11 +38,12 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
         point = pose[:, :3] @ turn.T if at[3:].any() else pose[:, :3]
         return np.concatenate([point + at[:3], pose[:, 3:]], axis=1)
 
+    placed_moves = replace(moves, start=placed(moves.start), end=placed(moves.end))
+    if not moves.arc_sweep.any():  # a long program of straight moves need not hold its zeros twice
+        return placed_moves
     arc = (moves.arc_sweep != 0.0)[:, None]
     return replace(
-        moves,
-        start=placed(moves.start),
-        end=placed(moves.end),
+        placed_moves,
         arc_center=np.where(arc, moves.arc_center @ turn.T + at[:3], 0.0),
         arc_normal=moves.arc_normal @ turn.T,
     )

@@ -70,20 +70,21 @@ def _coloured_lines(
     analysis: Analysis, points: FloatArray, limits: tuple[float, float], colours: FloatArray
 ) -> list[tuple[FloatArray, dict[str, Any]]]:
     """Points and style of one line for each class of segments, in drawing order."""
-    samples = analysis.samples
-    rapid = ~samples.cutting[1:]
-    classes = segment_classes(n_per_mm_from_n_per_m(analysis.at.stiffness), limits)
-    moved = (np.diff(points, axis=0) != 0.0).any(axis=1)
-    cutting, found = moved & ~rapid, []
+    # A corner is two samples at one point: one of them is enough, and the line through it stays one line.
+    moved = (points[1:] != points[:-1]).any(axis=1)
+    points = points[np.concatenate([[True], moved])]
+    rapid = ~analysis.samples.cutting[1:][moved]
+    classes = segment_classes(n_per_mm_from_n_per_m(analysis.at.stiffness), limits)[moved]
+    found: list[tuple[FloatArray, dict[str, Any]]] = []
 
     def add(rows: BoolArray, **style: object) -> None:
         if rows.any():
             found.append((_polyline(points, np.flatnonzero(rows)), style))
 
-    add(moved & rapid, color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), zorder=2)
+    add(rapid, color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), zorder=2)
     for which in range(CLASSES - 1, -1, -1):
-        add(cutting & (classes == which), color=colours[which], linewidth=1.5, zorder=3, solid_capstyle="round")
-    add(cutting & (classes == UNREACHABLE), color=UNREACHABLE_RED, linewidth=2.2, zorder=4)
+        add(~rapid & (classes == which), color=colours[which], linewidth=1.5, zorder=3, solid_capstyle="round")
+    add(~rapid & (classes == UNREACHABLE), color=UNREACHABLE_RED, linewidth=2.2, zorder=4)
     return found
 
 

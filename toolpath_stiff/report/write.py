@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import io
 import json
 import math
 import os
@@ -64,7 +62,7 @@ def write_analysis(
     Raises
     ------
     InputError
-        The folder cannot be written; `table="parquet"` without pyarrow.
+        The folder cannot be written.
     """
     return _all_or_nothing(Path(out_dir), _contents(analysis, plots, table, required, other), OWN_FILES)
 
@@ -78,7 +76,7 @@ def write_folder(folder: str | Path, contents: Mapping[str, str | bytes], own: I
 
 
 def _all_or_nothing(
-    folder: Path, contents: Iterable[tuple[str, str | bytes | Iterable[str]]], own: Iterable[str]
+    folder: Path, contents: Iterable[tuple[str, str | bytes | Iterable[str | bytes]]], own: Iterable[str]
 ) -> list[Path]:
     try:
         made = _make_parents(folder)
@@ -115,13 +113,13 @@ def summary_with_options(analysis: Analysis, required: float | None, other: Anal
 
 def _contents(
     analysis: Analysis, plots: bool, table: str, required: float | None, other: Analysis | None
-) -> Iterable[tuple[str, str | bytes | Iterable[str]]]:
+) -> Iterable[tuple[str, str | bytes | Iterable[str | bytes]]]:
     """Names and contents of the files, one at a time."""
-    from toolpath_stiff.analysis.tables import samples_csv
+    from toolpath_stiff.analysis.tables import samples_csv, samples_parquet
 
     summary = summary_with_options(analysis, required, other)
     if table == "parquet":
-        yield "samples.parquet", _samples_parquet(analysis)
+        yield "samples.parquet", samples_parquet(analysis)
     else:
         yield "samples.csv", samples_csv(analysis)
     yield "summary.json", json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -133,24 +131,6 @@ def _contents(
         yield "path.png", path_picture(analysis)
         yield "profile.png", profile_picture(analysis, other=other, required=required)
         yield "report.html", page(analysis, summary, required=required, other=other)
-
-
-def _samples_parquet(analysis: Analysis) -> bytes:
-    from toolpath_stiff.analysis.tables import sample_columns
-
-    try:
-        pa: Any = importlib.import_module("pyarrow")
-        pq: Any = importlib.import_module("pyarrow.parquet")
-    except ImportError:
-        raise InputError(
-            "Parquet needs the package pyarrow, which is not installed",
-            hint="install it with `pip install 'toolpath-stiff[parquet]'`, or write CSV",
-        ) from None
-    # from_pandas: a nan is a value that does not exist, an empty cell in the CSV, a null here.
-    columns = {name: pa.array(values, from_pandas=True) for name, values in sample_columns(analysis).items()}
-    buffer = io.BytesIO()
-    pq.write_table(pa.table(columns), buffer)
-    return buffer.getvalue()
 
 
 def _without_nan(value: Any) -> Any:
@@ -172,7 +152,7 @@ def _make_parents(folder: Path) -> list[Path]:
 
 
 def _write_and_move(
-    folder: Path, contents: Iterable[tuple[str, str | bytes | Iterable[str]]], own: Iterable[str]
+    folder: Path, contents: Iterable[tuple[str, str | bytes | Iterable[str | bytes]]], own: Iterable[str]
 ) -> list[Path]:
     """Write to a temporary folder on the same file system, then rename: a new report folder in one go."""
     exists = folder.is_dir()

@@ -1,0 +1,71 @@
+"""Columns to files: Arrow's rows against Python's own formatting, Parquet against pyarrow's reader."""
+
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyarrow import parquet
+
+from toolpath_stiff import column_files
+from toolpath_stiff.column_files import csv_pieces, csv_rows, parquet_pieces
+
+DECIMALS = {"line": None, "word": None, "a": 6, "b": 3, "c": 0}
+
+
+def columns_of(numbers):
+    column = np.array(numbers, dtype=float)
+    words = np.array(["rapid", "feed"])[np.arange(len(column)) % 2]
+    return {"line": np.arange(len(column)), "word": words, "a": column, "b": column[::-1], "c": column}
+
+
+def text_of(pieces):
+    return b"".join(pieces).decode()
+
+
+any_number = st.floats(-1e8, 1e8) | st.just(float("nan")) | st.sampled_from([0.5, 1.5, 0.0, -0.0, -1e-9, 2.5e-7, 1e12])
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(any_number, min_size=1, max_size=50))
+def test_arrow_writes_what_python_formats(numbers):
+    columns = columns_of(numbers)
+    rows = column_files._by_arrow(columns, DECIMALS)
+    assert rows is None or rows.decode() == csv_rows(columns, DECIMALS)
+
+
+def test_decimals_are_those_of_the_printed_number():
+    columns = {"x": np.array([1.0, -0.25, np.nan, -1e-7])}
+    assert column_files._by_arrow(columns, {"x": 3}) == b"1.000\n-0.250\n\n0.000\n"
+
+
+@pytest.mark.parametrize("number", [np.inf, 1e300])
+def test_numbers_that_arrow_cannot_hold_are_written_all_the_same(number, monkeypatch):
+    monkeypatch.setattr(column_files, "FEWEST_FOR_ARROW", 1)
+    columns = {"x": np.array([1.0, number])}
+    text = text_of(csv_pieces(lambda rows: {"x": columns["x"][rows]}, 2, {"x": 1}))
+    assert [float(cell) for cell in text.split()[1:]] == [1.0, number]
+
+
+def test_blocks_join_without_seam(monkeypatch):
+    monkeypatch.setattr(column_files, "BLOCK", 7)
+    columns = columns_of(np.linspace(-5.0, 5.0, 100))
+
+    def some(rows):
+        return {name: column[rows] for name, column in columns.items()}
+
+    expected = ",".join(DECIMALS) + "\n" + csv_rows(columns, DECIMALS)
+    for fewest in (1, 1000):
+        monkeypatch.setattr(column_files, "FEWEST_FOR_ARROW", fewest)
+        assert text_of(csv_pieces(some, 100, DECIMALS)) == expected
+    table = parquet.read_table(io.BytesIO(b"".join(parquet_pieces(some, 100))))
+    assert table.num_rows == 100
+    for name, column in columns.items():
+        np.testing.assert_array_equal(table[name].to_numpy(), column)
+
+
+def test_no_rows_are_a_heading():
+    empty = columns_of([])
+    assert text_of(csv_pieces(lambda rows: empty, 0, DECIMALS)) == "line,word,a,b,c\n"
+    assert parquet.read_table(io.BytesIO(b"".join(parquet_pieces(lambda rows: empty, 0)))).num_rows == 0
