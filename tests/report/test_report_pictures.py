@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from matplotlib.image import imread
 
 from tests.report.factory import make_analysis, short, spiral
+from toolpath_stiff.report import path_picture as path_picture_module
 from toolpath_stiff.report.path_picture import path_picture
 from toolpath_stiff.report.profile_picture import extremes_by_column, profile_picture
 from toolpath_stiff.report.scale import CLASSES, UNREACHABLE, scale_limits, segment_classes
@@ -64,6 +65,16 @@ def test_unreachable_samples_are_red_and_only_they():
     pale = (0xF6, 0xC9, 0xC9)
     assert count_colour(profile_picture(beyond), pale) > 1000
     assert count_colour(profile_picture(short()), pale) == 0
+
+
+def test_a_very_long_path_keeps_its_shape_and_what_is_red(monkeypatch):
+    beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
+    whole = path_picture(beyond)
+    monkeypatch.setattr(path_picture_module, "MOST_POINTS", 200)  # of 900 mm in steps of 1 mm
+    thinned = path_picture(beyond)
+    red = (0xD6, 0x45, 0x45)
+    assert count_colour(thinned, red) == pytest.approx(count_colour(whole, red), rel=0.1)
+    assert (np.abs(pixels(thinned) - pixels(whole)).max(axis=2) > 0.3).mean() < 2e-4
 
 
 def test_required_level_and_second_machine_change_the_profile(analysis):

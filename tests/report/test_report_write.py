@@ -61,6 +61,7 @@ def test_summary_is_json_without_nan_and_equals_the_analysis(analysis, tmp_path)
 
 def test_out_of_reach_is_null_in_json_an_empty_cell_in_csv_and_a_null_in_parquet(tmp_path):
     from pyarrow import parquet as pq
+
     beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
     write_analysis(beyond, tmp_path / "o", plots=False)
     rows = list(csv.DictReader((tmp_path / "o" / "samples.csv").open()))

@@ -34,6 +34,7 @@ BoolArray = NDArray[np.bool_]
 
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views
+MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
 THINNEST = 0.38  # a view's shorter side, of the longest: a flat part still gets a readable side view
 
 
@@ -75,6 +76,8 @@ def _coloured_lines(
     points = points[np.concatenate([[True], moved])]
     rapid = ~analysis.samples.cutting[1:][moved]
     classes = segment_classes(n_per_mm_from_n_per_m(analysis.at.stiffness), limits)[moved]
+    if len(points) > MOST_POINTS:
+        points, rapid, classes = _merged(points, rapid, classes)
     found: list[tuple[FloatArray, dict[str, Any]]] = []
 
     def add(rows: BoolArray, **style: object) -> None:
@@ -86,6 +89,19 @@ def _coloured_lines(
         add(~rapid & (classes == which), color=colours[which], linewidth=1.5, zorder=3, solid_capstyle="round")
     add(~rapid & (classes == UNREACHABLE), color=UNREACHABLE_RED, linewidth=2.2, zorder=4)
     return found
+
+
+def _merged(points: FloatArray, rapid: BoolArray, classes: IntArray) -> tuple[FloatArray, BoolArray, IntArray]:
+    """Segments joined over equal stretches of the path, each in its weakest class; the shape keeps the ends.
+
+    A stretch of such a path is a pixel or two long, and matplotlib would hold three copies of every point.
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    along = np.cumsum(steps) - steps
+    stretch = np.floor(along / (along[-1] / MOST_POINTS)).astype(np.int64)
+    new = (np.diff(stretch) != 0) | (np.diff(rapid) != 0)
+    first = np.concatenate([[0], np.flatnonzero(new) + 1])
+    return np.concatenate([points[first], points[-1:]]), rapid[first], np.minimum.reduceat(classes, first)
 
 
 def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
