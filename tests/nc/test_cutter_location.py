@@ -526,8 +526,12 @@ def test_the_same_path_however_it_is_written(steps, chance, inch):
             + chance.choice(["", "  "])
         )
 
-    first = read(written(steps, plainly, plain)).moves
-    second = read(written(steps, freely, free, chance.choice(["\n", "\r\n", "\r"]), inch)).moves
+    def moves_of(text):  # without moves that are the rounding of a number written twice
+        moves = read(text).moves
+        return moves.take((moves.arc_sweep != 0) | (np.abs(moves.end - moves.start).max(axis=1) > 1e-8))
+
+    first = moves_of(written(steps, plainly, plain))
+    second = moves_of(written(steps, freely, free, chance.choice(["\n", "\r\n", "\r"]), inch))
     np.testing.assert_array_equal(first.motion, second.motion)
     np.testing.assert_allclose(first.end, second.end, atol=2e-9)
     np.testing.assert_allclose(

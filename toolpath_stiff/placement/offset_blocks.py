@@ -20,6 +20,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 OTHER_OFFSETS = WORK_OFFSETS[1:]
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
+NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
 USE_WRITE = "use --write, which transforms the program itself"
 
 
@@ -51,7 +52,8 @@ def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> Of
     Y0 R` turns the G17 plane about program zero (Fanuc's manuals, "Coordinate system rotation"); it goes after G54 and
     G17, and holds until G69. The numbers of G54 are millimetres.
     """
-    reason = _not_about_z(program, placement) or _not_g54_alone(program)
+    reason = NOT_POSTED if program.dialect == CUTTER_LOCATION else ""
+    reason = reason or _not_about_z(program, placement) or _not_g54_alone(program)
     if reason:
         return OffsetBlocks("", "", reason, reason)
     x, y, z = (_number(mm_from_m(v), decimals) for v in placement[:3])
@@ -79,8 +81,6 @@ def _not_about_z(program: Program, placement: Pose) -> str:
 
 def _not_g54_alone(program: Program) -> str:
     """Why setting G54 would not move the whole program, or ""."""
-    if program.dialect == CUTTER_LOCATION:
-        return "a cutter-location file has no work offsets: set the zero of the program posted from it, or place that"
     for number, text in enumerate(program.source, 1):
         if "5" not in text and "10" not in text:
             continue  # neither a work offset nor G10

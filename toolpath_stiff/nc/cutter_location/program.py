@@ -68,4 +68,5 @@ def read(
         assumptions=tuple(reading.assumptions),
         tools=tuple(reading.used_tools.values()),
         dialect=CUTTER_LOCATION,
+        marks=tuple(reading.marks),
     )

@@ -22,6 +22,9 @@ from toolpath_stiff.nc.cutter_location.tool_path import NoFeedError
 from toolpath_stiff.nc.moves import FEED, RAPID, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 
+# CATIA's heading of an operation, a comment; NX and Autodesk's posts have TOOL PATH/ and CSI_TOOL_PATH/.
+OPERATION = re.compile(r"\s*\$\$\s*OPERATION NAME\s*:\s*(.*\S)", re.IGNORECASE)
+HEADINGS = ("TOOL PATH", "CSI_TOOL_PATH")
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
 
 
@@ -31,6 +34,7 @@ class CutterLocation(Curves):
     def __init__(self, name: str, tools: dict[int, ToolEntry] | None) -> None:
         super().__init__(name, tools)
         self._last_word = ""
+        self.marks: list[tuple[int, str]] = []  # line and name of each operation
         self._acts: dict[str, Callable[[Statement], None]] = {
             "GOTO": self._goto,
             "": self._more_points,
@@ -79,7 +83,9 @@ class CutterLocation(Curves):
                     self._last_word = "GOTO"
                     continue
                 statement, at = read_statement(lines, at, self.name)
-                if statement is not None:
+                if statement is None:
+                    self._heading(lines[here], here + 1)
+                else:
                     self.statement = statement
                     self.seen(statement.word, statement.line)
                     self._checked(self.execute, statement)
@@ -92,6 +98,11 @@ class CutterLocation(Curves):
         if self.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[at:]):
             self.warnings.append(f"line {at}: FINI ends the file; what follows is not read")
         self._finish()
+
+    def _heading(self, comment: str, line: int) -> None:
+        found = OPERATION.match(comment)
+        if found:
+            self.marks.append((line, found[1]))
 
     def seen(self, word: str, line: int) -> None:
         """Called for every statement; the check counts them."""
@@ -134,6 +145,8 @@ class CutterLocation(Curves):
     def execute(self, statement: Statement) -> None:
         """Execute a statement."""
         word = statement.word
+        if word in HEADINGS and statement.arguments:
+            self.marks.append((statement.line, statement.arguments[0].text))
         act = self._acts.get(word)
         if act is not None:
             act(statement)
