@@ -12,6 +12,7 @@ from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.breakdown import FIGURES, weighted_figures
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.tables import ToolEntry
 
 TWO = """(PLATE)
 T1 M6
@@ -118,6 +119,15 @@ def test_a_tool_of_two_lengths_has_two_rows() -> None:
     rows = make_analysis(moves).summary()["per_tool"]
     assert [(row["tool"], row["length_mm"]) for row in rows] == [(1, None), (1, pytest.approx(80.0))]
     assert [row["cutting_length_mm"] for row in rows] == pytest.approx([200.0, 50.0])
+
+
+def test_the_approach_before_a_tools_length_is_in_force_is_the_tools_time() -> None:
+    text = "T3 M6\nG0 X100\nG43 H3 Z20\nG1 Z0 F600\nX90\n"
+    program = parse_program(text, "part.nc", tools={3: ToolEntry(3, length=100.0)})
+    analysis = analyse(load_machine("nist"), program)
+    (row,) = analysis.summary()["per_tool"]
+    assert row["length_mm"] == pytest.approx(100.0)
+    assert row["time_s"] == pytest.approx(analysis.summary()["time_s"])
 
 
 def test_the_samples_tell_their_operation() -> None:

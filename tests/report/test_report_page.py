@@ -198,6 +198,34 @@ def test_very_many_samples_are_thinned_aloud_and_keep_the_extremes(analysis, mon
     ]
 
 
+def test_the_table_of_operations_is_that_of_the_summary(analysis, parsed):
+    summary, data = analysis.summary(), parsed.data
+    rows = [attrs["data-operation"] for name, attrs in parsed.elements if "data-operation" in attrs]
+    assert rows == [str(i) for i in range(len(summary["per_operation"]))]
+    assert len(rows) == 2
+    cells = parsed.all("td")
+    for row in summary["per_operation"]:
+        assert number(row["mean_N_per_mm"]) in cells
+        assert f"{row['first_line']}-{row['last_line']}" in cells
+    assert [name for _, name in data["operations"]] == [row["name"] for row in summary["per_operation"]]
+    assert [first for first, _ in data["operations"]] == [0, int(np.argmax(analysis.operation == 2))]
+
+
+def test_one_operation_has_no_table():
+    assert not [1 for _, attrs in Page(render(short())).elements if "data-operation" in attrs]
+
+
+def test_a_thinned_page_keeps_where_operations_begin(monkeypatch):
+    monkeypatch.setattr(page_data_module, "MOST_SAMPLES", 240)
+    analysis = spiral()
+    rows = page_rows(analysis)
+    assert len(rows) < len(analysis.samples)
+    first = np.flatnonzero(np.diff(analysis.operation)) + 1
+    assert set(first) <= set(rows)
+    (_, second) = Page(render(analysis)).data["operations"]
+    assert rows[second[0]] == first[0]
+
+
 def rotary_axis_alone():
     return make_analysis([{"end": (0.0, 0.0, 0.0, 0.1, 0.0, 0.0)}])
 
@@ -226,3 +254,27 @@ def test_a_browser_draws_the_page_without_complaint(make, tmp_path):
     assert 1 <= len(rows) <= len(analysis.program.source)
     assert analysis.program.source[0] in done.stdout.replace("&lt;", "<").replace("&gt;", ">")
     assert "≥" in done.stdout or make is not spiral  # the legend is filled by the script
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+def test_a_click_shows_one_operation_alone(tmp_path):
+    # The page's policy forbids this script as any other: it goes without the policy here.
+    text = re.sub("<meta http-equiv[^>]*>", "", render(spiral()))
+    click = "<script>document.querySelector('[data-operation=\"1\"]').click()</script></body>"
+    file = tmp_path / "report.html"
+    file.write_text(text.replace("</body>", click), encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
+    profile = f"--user-data-dir={tmp_path / 'profile'}"
+    done = subprocess.run(
+        [BROWSER, *options, profile, "--dump-dom", file.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "CONSOLE" not in done.stderr
+    dom = Page(done.stdout)
+    assert [attrs.get("class") for name, attrs in dom.elements if name == "tr"].count("chosen") == 1
+    (shown,) = [attrs for _, attrs in dom.elements if attrs.get("id") == "operation-shown"]
+    assert "hidden" not in shown
+    assert "only 2 T2 ball nose" in done.stdout

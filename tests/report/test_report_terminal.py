@@ -6,7 +6,7 @@ import pytest
 
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.report.comparison import compare_summaries
-from toolpath_stiff.report.terminal import WIDTH, comparison_table, terminal_table
+from toolpath_stiff.report.terminal import MOST_OPERATIONS, WIDTH, comparison_table, terminal_table
 from toolpath_stiff.report.wording import duration, number
 
 
@@ -24,6 +24,25 @@ def test_the_table_shows_the_figures_of_the_summary(summary):
     for row in summary["per_tool"]:
         assert number(row["mean_N_per_mm"]) in text
         assert row["remark"] in text
+
+
+def test_operations_are_listed_if_there_are_several(summary):
+    lines = terminal_table(summary).splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("operation "))
+    for row, line in zip(summary["per_operation"], lines[at + 1 :], strict=False):
+        assert line.startswith(f"{row['operation']} {row['name']} ")
+        assert number(row["min_N_per_mm"]) in line
+        assert f"{row['first_line']}-{row['last_line']}" in line
+    assert "operation " not in terminal_table({**summary, "per_operation": summary["per_operation"][:1]})
+
+
+def test_many_operations_are_counted_and_long_names_cut(summary):
+    row = {**summary["per_operation"][0], "name": "long \x1b[2J name " * 20, "weakest": None, "mean_N_per_mm": None}
+    many = [{**row, "operation": i + 1} for i in range(100)]
+    text = terminal_table({**summary, "per_operation": many})
+    assert f"and {100 - MOST_OPERATIONS} more operations in summary.json" in text
+    assert max(map(len, text.splitlines())) <= WIDTH
+    assert all(c.isprintable() or c == "\n" for c in text)
 
 
 def test_warnings_are_told_in_full_and_no_line_is_too_long():

@@ -53,17 +53,28 @@ def per_operation(analysis: Analysis) -> list[dict[str, Any]]:
 
 
 def per_tool(analysis: Analysis) -> list[dict[str, Any]]:
-    """The figures of each tool that cuts, in order of use; a tool that is used with two lengths has two rows."""
+    """The figures of each tool that cuts, in order of use; a tool that cuts with two lengths has two rows.
+
+    Rapids with a length that the tool never cuts with (before G43) count with the first that it does.
+    """
     moves = analysis.moves
     remarks = {tool.number: tool.remark for tool in analysis.program.tools}
     tools, tool = np.unique(moves.tool, return_inverse=True)
     lengths, length = np.unique(moves.tool_length, return_inverse=True)  # nan, the reference tool's, is one of them
-    of_move = tool * len(lengths) + length
-    parts = _Parts(analysis, of_move, len(tools) * len(lengths))
+    many = len(lengths)
+    of_move = tool * many + length
     used, first = np.unique(of_move[moves.motion != RAPID], return_index=True)
+    order = used[np.argsort(first)].tolist()
+    first_of_tool: dict[int, int] = {}
+    for part in order:
+        first_of_tool.setdefault(part // many, part)
+    counts_with = [
+        part if part in order else first_of_tool.get(part // many, part) for part in range(len(tools) * many)
+    ]
+    parts = _Parts(analysis, np.array(counts_with)[of_move], len(counts_with))
     rows = []
-    for part in used[np.argsort(first)].tolist():
-        number, tool_length = int(tools[part // len(lengths)]), float(lengths[part % len(lengths)])
+    for part in order:
+        number, tool_length = int(tools[part // many]), float(lengths[part % many])
         about = {
             "tool": number,
             "remark": remarks.get(number, ""),

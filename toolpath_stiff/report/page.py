@@ -23,7 +23,7 @@ from toolpath_stiff.report.wording import number, plain
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
 
-SCRIPTS = ("path_data.js", "path_view.js", "profile_view.js", "listing.js")
+SCRIPTS = ("path_data.js", "path_view.js", "profile_view.js", "listing.js", "operations.js")
 
 
 def page(

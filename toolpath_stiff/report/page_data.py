@@ -62,6 +62,7 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "s": _base64(mm_from_m(samples.s).astype("<f4")),
         "kind": _base64(kind.astype("u1")),
         "tools": [[int(i), int(samples.tool[i])] for i in tool_starts],
+        "operations": _operations(analysis, samples.move),
         "weakest": [int(np.searchsorted(rows, row)) for row in weakest_places(analysis)],
         "scale": limits,
         "extend": {"low": extend in ("min", "both"), "high": extend in ("max", "both")},
@@ -83,7 +84,16 @@ def page_rows(analysis: Analysis) -> IntArray:
     stiffness = np.where(analysis.samples.cutting, analysis.at.stiffness, np.nan)
     extremes = extremes_by_column(np.arange(n, dtype=float), stiffness, MOST_SAMPLES // 6)
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too
-    return np.unique(np.concatenate([extremes, even, ends, np.array(weakest_places(analysis), dtype=np.int64)]))
+    firsts = np.searchsorted(analysis.samples.move, [row.first_move for row in analysis.operations.rows])
+    wanted = np.array([0, *weakest_places(analysis)], dtype=np.int64)
+    return np.unique(np.concatenate([extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
+
+
+def _operations(analysis: Analysis, move: IntArray) -> list[list[Any]]:
+    """First row on the page and name of each operation; `move` (n,) of the page's rows."""
+    firsts = np.searchsorted(move, [operation.first_move for operation in analysis.operations.rows])
+    names = [plain(operation.name) for operation in analysis.operations.rows]
+    return [[first, name] for first, name in zip(firsts.tolist(), names, strict=True)]
 
 
 def _other_curve(other: Analysis) -> dict[str, str]:

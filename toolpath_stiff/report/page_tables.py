@@ -7,19 +7,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.report.comparison import FIGURES
-from toolpath_stiff.report.wording import READERS, duration, number, plain
+from toolpath_stiff.report.wording import READERS, duration, number, plain, shortened
 
 TITLES = ("mean N/mm", "min N/mm", "max N/mm", "range N/mm", "mean deflection um")
 MOST_ROWS = 200  # of lines below the required stiffness; all are in summary.json
 
 
 def page_tables(summary: Mapping[str, Any], weakest: Sequence[int]) -> str:
-    """Figures, weakest places, tools, required level, comparison, assumptions, words not acted upon.
+    """Figures, weakest places, tools, operations, required level, comparison, assumptions, words not acted upon.
 
     `weakest` holds the page's rows of the weakest places.
     """
     sections = [
         ("Tools", _tools(summary["per_tool"]), True),
+        *((("Operations", _operations(summary["per_operation"]), True),) if len(summary["per_operation"]) > 1 else ()),
         ("Figures", _figures(summary), False),
         ("Weakest places", _places(summary["weakest_places"], weakest), False),
     ]
@@ -92,11 +93,42 @@ def _tools(per_tool: Sequence[Mapping[str, Any]]) -> str:
             _text(row["remark"]),
             "reference" if row["length_mm"] is None else number(row["length_mm"], 2),
             number(row["cutting_length_mm"], 1),
+            duration(row["time_s"]),
             *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
+            _weakest(row["weakest"]),
         )
         for row in per_tool
     ]
-    return _table(("tool", "remark", "length mm", "cutting mm", *TITLES), rows, range(2, 9))
+    return _table(("tool", "remark", "length mm", "cutting mm", "time", *TITLES, "weakest"), rows, range(2, 10))
+
+
+def _weakest(place: Mapping[str, Any] | None) -> str:
+    if place is None:
+        return "-"
+    return f'line {place["line"]} <code class="cut">{_text(shortened(place["text"], 26))}</code>'
+
+
+def _operations(per_operation: Sequence[Mapping[str, Any]]) -> str:
+    rows = []
+    for part, row in enumerate(per_operation[:MOST_ROWS]):
+        name = f"{row['operation']} {_text(row['name'])}"
+        rows.append(
+            (
+                f'<button type="button" class="operation" data-operation="{part}">{name}</button>',
+                f"T{row['tool']}" if row["tool"] else "-",
+                f"{row['first_line']}-{row['last_line']}",
+                number(row["cutting_length_mm"], 1),
+                duration(row["time_s"]),
+                *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
+                _weakest(row["weakest"]),
+                "-" if row["min_margin"] is None else f"{row['min_margin']:.3f}",
+            )
+        )
+    more = len(per_operation) - len(rows)
+    head = ("operation", "tool", "lines", "cutting mm", "time", *TITLES, "weakest", "margin")
+    return _table(head, rows, (*range(2, 10), 11)) + (
+        f"<p>and {more} more operations in summary.json</p>" if more > 0 else ""
+    )
 
 
 def _required(required: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis.parameter_band import NORMAL_95
 from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
 from toolpath_stiff.report.figure import (
+    DPI,
     INK,
     MUTED,
     SECOND_ORANGE,
@@ -34,9 +35,13 @@ BoolArray = NDArray[np.bool_]
 
 WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
+STRIP = 0.22  # height of the operations above the frame
+OPERATION_COLOURS = ("#d9e0e8", "#ebeff4")  # of even and odd ones
+NAME_SIZE = 8.5  # points
 CURVE_BLUE = "#2b59c3"
 BAND_LABEL = "95 % of the fitted parameters"
 MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
+MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seven pixels
 
 
 def profile_picture(analysis: Analysis, *, other: Analysis | None = None, required: float | None = None) -> bytes:
@@ -52,10 +57,10 @@ def profile_picture(analysis: Analysis, *, other: Analysis | None = None, requir
         N/m: a line, and red below it.
     """
     with house_style():
+        strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
         figure = new_figure(WIDTH, HEIGHT)
-        axes = figure.add_axes(
-            (LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, 1.0 - (TOP + BOTTOM) / HEIGHT)
-        )
+        frame = HEIGHT - TOP - BOTTOM - strip
+        axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
         s, k = profile_curve(analysis)
         band = profile_band(analysis)
         _set_limits(axes, analysis, other, required, band)
@@ -74,7 +79,9 @@ def profile_picture(analysis: Analysis, *, other: Analysis | None = None, requir
         axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
         _levels(axes, analysis, required)
         _tool_changes(axes, analysis)
-        _line_numbers(axes, analysis)
+        if strip:
+            _operations(axes, analysis, strip / frame)
+        _line_numbers(axes, analysis, 1.0 + strip / frame)
         places = weakest_places(analysis)
         spots = [(float(s[row]), float(k[row])) for row in places]
         label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
@@ -198,14 +205,60 @@ def _tool_changes(axes: Axes, analysis: Analysis) -> None:
         )
 
 
-def _line_numbers(axes: Axes, analysis: Analysis) -> None:
-    """Program lines along the upper edge, where the ticks below fall."""
+def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
+    """Named boxes above the frame, `height` of its height; lines where they begin, while these can be told apart."""
+    from matplotlib.patches import Rectangle
+
+    rows = analysis.operations.rows
+    first = np.searchsorted(analysis.samples.move, [row.first_move for row in rows])
+    edges = mm_from_m(np.append(analysis.samples.s[first], analysis.samples.s[-1]))
+    across = axes.get_xaxis_transform()
+    if len(rows) <= MOST_TOOL_LINES:
+        axes.vlines(edges[1:-1], 0, 1, transform=across, color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
+    pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
+    for row, start, stop in zip(rows, edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        colour = OPERATION_COLOURS[row.number % 2]
+        box = Rectangle((start, 1.0), stop - start, height, facecolor=colour, transform=across, clip_on=False, zorder=2)
+        axes.add_patch(box)
+        name = _fitting(f"{row.number} {plain(row.name)}", str(row.number), (stop - start) * pixels - 8.0)
+        if name:
+            axes.text(
+                start + 4.0 / pixels,
+                1.0 + height / 2.0,
+                name,
+                transform=across,
+                fontsize=NAME_SIZE,
+                va="center_baseline",
+                zorder=6,
+            )
+
+
+def _fitting(text: str, least: str, room: float) -> str:
+    """The text cut to `room` pixels; `least` if next to nothing of it would be left, or nothing at all."""
+    from matplotlib.textpath import TextPath
+
+    def width(words: str) -> float:
+        return float(TextPath((0, 0), words, size=NAME_SIZE * DPI / 72.0).get_extents().x1) if words else 0.0
+
+    if width(text) <= room:
+        return text
+    length = int(len(text) * max(room, 0.0) / width(text)) + 1
+    while length > len(least) + 4 and width(shortened(text, length)) > room:
+        length -= 1
+    if length > len(least) + 4:
+        return shortened(text, length)
+    return least if width(least) <= room else ""
+
+
+def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
+    """Program lines above the frame, at `height` of its height, where the ticks below fall."""
     end = float(analysis.samples.s[-1])
     where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
     rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
-    upper = axes.secondary_xaxis("top")
+    upper = axes.secondary_xaxis(height)
     upper.set_xticks(mm_from_m(where), [str(line) for line in analysis.samples.line[rows]])
     upper.tick_params(length=3, labelsize=9)
+    upper.spines["top"].set_visible(False)
     upper.set_xlabel("program line", fontsize=9, color=MUTED)
 
 

@@ -11,6 +11,8 @@ from toolpath_stiff.report.wording import READERS, duration, number, plain, shor
 
 WIDTH = 100
 LABEL = 14  # columns of the left-hand words
+MOST_OPERATIONS = 12  # rows; all are in summary.json
+LEAST_NAME = 24  # columns for the number and name of an operation, however wide the figures are
 
 TITLES = {
     "mean_N_per_mm": "mean N/mm",
@@ -47,6 +49,8 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
     ]
     if len(summary["per_tool"]) > 1:
         lines += _tools(summary["per_tool"])
+    if len(summary["per_operation"]) > 1:
+        lines += _operations(summary["per_operation"])
     if count := len(summary["unsupported"]):
         words = ", ".join(sorted({str(entry["word"]) for entry in summary["unsupported"]}))
         lines += _entry("not acted upon", f"{count} word{'s' if count > 1 else ''} (in summary.json): {words}")
@@ -152,6 +156,29 @@ def _tools(per_tool: Sequence[Mapping[str, Any]]) -> list[str]:
             ]
         )
     return _columns(rows, left_last=True)
+
+
+def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
+    shown = per_operation[:MOST_OPERATIONS]
+    digits = len(str(shown[-1]["operation"]))
+    rows = [["operation", "tool", "lines", "cutting mm", "time", "mean N/mm", "min", "in line"]]
+    for row in shown:
+        rows.append(
+            [
+                f"{row['operation']:>{digits}} {plain(row['name'])}",
+                f"T{row['tool']}" if row["tool"] else "-",
+                f"{row['first_line']}-{row['last_line']}",
+                number(row["cutting_length_mm"], 1),
+                duration(row["time_s"]),
+                *(number(row[name]) for name in FIGURES[:2]),
+                str(row["weakest"]["line"]) if row["weakest"] else "-",
+            ]
+        )
+    room = WIDTH - sum(2 + max(len(row[i]) for row in rows) for i in range(1, len(rows[0])))
+    for named in rows:
+        named[0] = shortened(named[0], max(room, LEAST_NAME))
+    more = len(per_operation) - len(shown)
+    return _columns(rows) + ([f"and {more} more operations in summary.json"] if more else [])
 
 
 def _columns(rows: list[list[str]], left_last: bool = False) -> list[str]:

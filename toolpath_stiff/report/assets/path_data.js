@@ -23,6 +23,17 @@ const other = data.other && { s: new Float32Array(bytes(data.other.s)), k: new F
 const cutting = (i) => (kind[i] & 7) !== RAPID;
 const MOTIONS = data.motions;
 
+// Operations: each is a stretch of samples, [first, end).
+const operations = data.operations;
+let chosenOperation = -1;
+const operationRange = (k) => [operations[k][0], k + 1 < operations.length ? operations[k + 1][0] : n];
+const operationName = (k) => `${k + 1} ${operations[k][1]}`;
+function operationOf(i) {
+  let low = 0, high = operations.length;
+  while (low < high) { const middle = (low + high) >> 1; if (operations[middle][0] <= i) low = middle + 1; else high = middle; }
+  return low - 1;
+}
+
 // "45 123": groups of thousands by thin spaces, as in the tables.
 function group(v, digits = 0) {
   if (!Number.isFinite(v)) return "-";
@@ -78,7 +89,8 @@ function describe(i) {
   const tool = data.tools.reduce((found, [start, number]) => start <= i ? number : found, 0);
   const k = kind[i] & OUT ? "out of reach" : `${group(stiffness[i])} N/mm`;
   return [`line ${line[i]} · ${k}`, `X${x} Y${y} Z${z}${turned} mm${angles ? ", deg" : ""}`,
-    `margin ${margin[i].toFixed(3)} · T${tool} · ${MOTIONS[kind[i] & 7]} · ${group(s[i], 1)} mm along`];
+    `margin ${margin[i].toFixed(3)} · T${tool} · ${MOTIONS[kind[i] & 7]} · ${group(s[i], 1)} mm along`,
+    ...(operations.length > 1 ? [`operation ${operationName(operationOf(i))}`] : [])];
 }
 function point(i, stage) {
   here = i;

@@ -16,7 +16,7 @@ class View extends Stage {
   }
   corners() {
     const out = [];
-    for (let c = 0; c < 8; c++) out.push(data.box.map(([low, high], axis) => (c >> axis) & 1 ? high : low));
+    for (let c = 0; c < 8; c++) out.push(this.box.map(([low, high], axis) => (c >> axis) & 1 ? high : low));
     return out;
   }
   project([x, y, z]) {
@@ -24,8 +24,19 @@ class View extends Stage {
     return [this.cx + this.zoom * ((x - mx) * r[0] + (y - my) * r[1]),
       this.cy - this.zoom * ((x - mx) * u[0] + (y - my) * u[1] + (z - mz) * u[2])];
   }
+  // The box of the cuts: of all, or of the operation that is looked at.
+  boxShown() {
+    if (chosenOperation < 0) return data.box;
+    const [first, end] = operationRange(chosenOperation), box = [0, 1, 2].map(() => [Infinity, -Infinity]);
+    for (let i = first; i < end; i++) if (cutting(i)) box.forEach((ends, axis) => {
+      ends[0] = Math.min(ends[0], xyz[axis][i]);
+      ends[1] = Math.max(ends[1], xyz[axis][i]);
+    });
+    return box[0][0] <= box[0][1] ? box : data.box;
+  }
   fit() {
-    this.middle = data.box.map(([low, high]) => (low + high) / 2);
+    this.box = this.boxShown();
+    this.middle = this.box.map(([low, high]) => (low + high) / 2);
     this.zoom = 1;
     this.cx = this.cy = 0;
     const seen = this.corners().map((corner) => this.project(corner));
@@ -51,22 +62,32 @@ class View extends Stage {
       sy[i] = this.cy - zoom * (x * u[0] + y * u[1] + (Z[i] - mz) * u[2]);
     }
     this.drawBox(g);
-    if (rapidsBox.checked) {
-      g.setLineDash([5, 4]);
-      this.stroke(g, RAPIDS, ink.rapid, 1);
-      g.setLineDash([]);
+    if (chosenOperation >= 0) {
+      g.globalAlpha = 0.13;
+      this.drawPath(g, 0, n);
+      g.globalAlpha = 1;
     }
-    for (let c = CLASSES - 1; c >= 0; c--) this.stroke(g, c, colours[c], this.coarse ? 1 : 1.7);
-    this.stroke(g, UNREACHED, ink.bad, 2.4);
+    this.drawPath(g, ...(chosenOperation < 0 ? [0, n] : operationRange(chosenOperation)));
     this.drawTriad(g);
     this.drawWeakest(g);
   }
-  stroke(g, which, colour, width) {
+  drawPath(g, first, end) {
+    if (rapidsBox.checked) {
+      g.setLineDash([5, 4]);
+      this.stroke(g, RAPIDS, ink.rapid, 1, first, end);
+      g.setLineDash([]);
+    }
+    for (let c = CLASSES - 1; c >= 0; c--) this.stroke(g, c, colours[c], this.coarse ? 1 : 1.7, first, end);
+    this.stroke(g, UNREACHED, ink.bad, 2.4, first, end);
+  }
+  stroke(g, which, colour, width, first, end) {
     const { sx, sy } = this, skip = this.coarse ? 2.5 : 0.5;
     let last = -2, x = 0, y = 0, pending = -1;
     g.beginPath();
     for (let j = starts[which]; j < starts[which + 1]; j++) {
       const i = segments[j];
+      if (i < first) continue;
+      if (i >= end) break;
       if (i - 1 !== last) {
         if (pending >= 0) g.lineTo(sx[pending], sy[pending]);
         x = sx[i - 1];
@@ -99,7 +120,7 @@ class View extends Stage {
     g.fillStyle = ink.muted;
     g.textAlign = "left";
     g.textBaseline = "top";
-    const text = data.box.map(([low, high], axis) => `${"XYZ"[axis]} ${low.toFixed(1)} to ${high.toFixed(1)}`).join("    ");
+    const text = this.box.map(([low, high], axis) => `${"XYZ"[axis]} ${low.toFixed(1)} to ${high.toFixed(1)}`).join("    ");
     g.fillText(`${text}  mm`, 4, 4);
   }
   drawTriad(g) {

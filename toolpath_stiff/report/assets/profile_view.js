@@ -1,5 +1,6 @@
 // ---------------------------------------------------------------- stiffness along the path
-const PAD = { left: 66, right: 12, top: 20, bottom: 34 };
+const STRIP = operations.length > 1 ? 18 : 0;  // operations above the frame
+const PAD = { left: 66, right: 12, top: 20 + STRIP, bottom: 34 };
 function ticks(low, high, most) {
   const rough = (high - low) / Math.max(1, most), power = 10 ** Math.floor(Math.log10(rough));
   const pitch = power * [1, 2, 2.5, 5, 10].find((m) => m * power >= rough), out = [];
@@ -12,6 +13,14 @@ function rowAt(array, value) {
   while (low < high) { const middle = (low + high) >> 1; if (array[middle] < value) low = middle + 1; else high = middle; }
   return low;
 }
+// The text, cut to so many pixels; if next to nothing of it is left, `least`, or nothing at all.
+function fitting(g, text, least, room) {
+  if (g.measureText(text).width <= room) return text;
+  let length = Math.floor(text.length * room / g.measureText(text).width);
+  while (length > least.length + 3 && g.measureText(`${text.slice(0, length)}\u2026`).width > room) length--;
+  if (length > least.length + 3) return `${text.slice(0, length).trimEnd()}\u2026`;
+  return g.measureText(least).width <= room ? least : "";
+}
 class Profile extends Stage {
   constructor() {
     super("profile");
@@ -20,7 +29,8 @@ class Profile extends Stage {
     this.all();
     this.listen();
   }
-  all() { this.from = s[0]; this.to = s[n - 1] > s[0] ? s[n - 1] : s[0] + 1; }
+  all() { this.show(s[0], s[n - 1]); }
+  show(from, to) { this.from = from; this.to = to > from ? to : from + 1; }
   x(value) { return PAD.left + (value - this.from) / (this.to - this.from) * (this.width - PAD.left - PAD.right); }
   y(value) { return this.height - PAD.bottom - (value - this.low) / (this.high - this.low) * (this.height - PAD.top - PAD.bottom); }
   at(i) { return [this.x(s[i]), Number.isNaN(this.k[i]) ? this.height - PAD.bottom : this.y(this.k[i])]; }
@@ -47,6 +57,7 @@ class Profile extends Stage {
     for (const i of data.weakest) { ring(g, ...this.at(i), 5, ink.panel, 4); ring(g, ...this.at(i), 5, ink.ink, 1.6); }
     g.restore();
     this.drawTools(g, left, right, top);
+    if (STRIP) this.drawOperations(g, left, right, top);
   }
   setHeights() {
     let low = Infinity, high = -Infinity;
@@ -110,9 +121,30 @@ class Profile extends Stage {
       g.moveTo(x, top);
       g.lineTo(x, this.height - PAD.bottom);
       if (start > 0) g.stroke();
-      if (number && x - last > 28 && x > left + 40) { g.fillText(`T${number}`, x, top - 2); last = x; }
+      if (number && x - last > 28 && x > left + 40 && x < right - 20) { g.fillText(`T${number}`, x, top - 2 - STRIP); last = x; }
     }
     g.setLineDash([]);
+  }
+  drawOperations(g, left, right, top) {
+    g.textAlign = "left";
+    g.textBaseline = "middle";
+    g.lineWidth = 1;
+    g.strokeStyle = ink.line;
+    let last = -Infinity;
+    operations.forEach((_, k) => {
+      const [first, end] = operationRange(k);
+      if (end === first) return;
+      const a = Math.max(left, this.x(s[first])), b = Math.min(right, end < n ? this.x(s[end]) : this.x(s[n - 1]));
+      if (b < left || a > right || b - last < 1) return;  // more than the pixels can tell apart
+      last = b;
+      g.fillStyle = k === chosenOperation ? ink.accent : k % 2 ? ink.line : ink.soft;
+      g.globalAlpha = k === chosenOperation ? 0.35 : 1;
+      g.fillRect(a, top - STRIP, b - a, STRIP - 1);
+      g.globalAlpha = 1;
+      const text = fitting(g, operationName(k), String(k + 1), b - a - 8);
+      g.fillStyle = ink.ink;
+      if (text) g.fillText(text, a + 4, top - STRIP / 2);
+    });
   }
   level(g, value, colour, dash) {
     g.beginPath();
@@ -189,12 +221,15 @@ class Profile extends Stage {
   listen() {
     const canvas = this.overlay;
     canvas.addEventListener("pointerdown", (e) => canvas.setPointerCapture(e.pointerId));
+    canvas.addEventListener("click", (e) => {
+      if (STRIP && e.offsetY < PAD.top && e.offsetY >= PAD.top - STRIP) chooseOperation(operationOf(this.sampleAt(e.offsetX)));
+    });
     canvas.addEventListener("pointermove", (e) => {
       if (e.buttons) this.move(-e.movementX / (this.width - PAD.left - PAD.right) * (this.to - this.from));
       else point(this.sampleAt(e.offsetX), this);
     });
     canvas.addEventListener("pointerleave", () => { this.tip.hidden = true; });
-    canvas.addEventListener("dblclick", () => { this.all(); this.redraw(); });
+    canvas.addEventListener("dblclick", (e) => { if (e.offsetY >= PAD.top) { this.all(); this.redraw(); } });
     canvas.addEventListener("wheel", (e) => {
       e.preventDefault();
       this.zoomAt(Math.exp(-Math.max(-120, Math.min(120, e.deltaY)) * 0.003), e.offsetX);
