@@ -1,7 +1,8 @@
 """The controller file: what belongs to the control and not to the machine. TOML; mm and degrees.
 
 Its keys are `dialect`, `block_delete`, `arc_centers`, `inch_metric`, `offsets` (a table, or a file), `tools` (a list of
-tables, or a file). LinuxCNC's own parameter file (.var) and tool table (.tbl) are read as controller files too.
+tables, or a file), `kinematics` (a table, see `posted`: the machine that programs were posted for). LinuxCNC's own
+parameter file (.var) and tool table (.tbl) are read as controller files too.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from typing import Any
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes import WORK_OFFSETS
 from toolpath_stiff.nc.dialects import DIALECTS, GENERIC, Dialect, dialect_named
+from toolpath_stiff.nc.posted import PostedKinematics, read_kinematics
 from toolpath_stiff.nc.tables import LARGEST_MM, Offsets, ToolEntry, read_offsets, read_tool_table, set_offset
 
 ALL_SWITCHES = frozenset(range(1, 10))
 TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")
-KEYS = ("dialect", "block_delete", "arc_centers", "inch_metric", "offsets", "tools")
+KEYS = ("dialect", "block_delete", "arc_centers", "inch_metric", "offsets", "tools", "kinematics")
 HOMES = ("G28", "G30")
 G70_UNITS, G20_UNITS = "G70 G71", "G20 G21"
-OTHER_KINEMATICS = ("kinematics", "posted_kinematics", "posted")
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,15 @@ class Controller:
         Block-delete switches that are on.
     offsets, tools
         Work offsets and tool table; None where the file has none.
+    kinematics
+        The machine that programs were posted for; None: A, B, C are roll, pitch, yaw of the platform.
     """
 
     dialect: Dialect = GENERIC
     switches: frozenset[int] = field(default_factory=frozenset)
     offsets: Offsets | None = None
     tools: dict[int, ToolEntry] | None = None
+    kinematics: PostedKinematics | None = None
 
     @property
     def plain(self) -> bool:
@@ -105,14 +109,9 @@ class _Reader:
 
     def controller(self) -> Controller:
         for key in self.data:
-            if key in OTHER_KINEMATICS:
-                raise self.fail(
-                    f"{key}: programs posted for another kinematics are not read",
-                    hint="post X, Y, Z of the tool tip and A, B, C as roll, pitch, yaw of the platform",
-                )
             if key not in KEYS:
                 raise self.fail(f"{key!r} is not known", ", ".join(KEYS))
-        return Controller(self._dialect(), self._switches(), self._offsets(), self._tools())
+        return Controller(self._dialect(), self._switches(), self._offsets(), self._tools(), self._kinematics())
 
     def _dialect(self) -> Dialect:
         name = self._choice("dialect", tuple(DIALECTS), "generic")
@@ -129,6 +128,10 @@ class _Reader:
         if not isinstance(value, str) or value not in choices:
             raise self.fail(f"{key} = {value!r}", " or ".join(choices))
         return value
+
+    def _kinematics(self) -> PostedKinematics | None:
+        given = self.data.get("kinematics")
+        return None if given is None else read_kinematics(given, self.fail)
 
     def _switches(self) -> frozenset[int]:
         value = self.data.get("block_delete", False)

@@ -41,6 +41,8 @@ class Frames:
         Axes of `position` that were given in machine coordinates.
     reference
         G54's zero in control coordinates, fixed at the first motion.
+    posted
+        Whether the program was posted for another machine, whose coordinates these are.
     """
 
     offsets: Offsets
@@ -55,6 +57,13 @@ class Frames:
     from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
     reference: tuple[float, float, float] | None = None
     source: str = ""
+    posted: bool = False
+
+    @property
+    def bound(self) -> bool:
+        """Whether the present point was given in machine coordinates, an axis of it at least."""
+        # The rotary axes of a machine that is not this one have one zero for both.
+        return any(self.from_machine[:3] if self.posted else self.from_machine)
 
     def to_control(self, program: list[float]) -> list[float]:
         """Control coordinates of a point in program coordinates."""

@@ -50,7 +50,7 @@ class Mover(Coordinates):
 
     def _record(self, motion: int, control: list[float], work: set[int], machine: set[int], arc: Arc | None) -> None:
         frames = self.frames
-        start, was = frames.to_setup(frames.position), any(frames.from_machine)
+        start, was = frames.to_setup(frames.position), frames.bound
         for axis in work:
             frames.from_machine[axis] = False
         for axis in machine:
@@ -69,7 +69,7 @@ class Mover(Coordinates):
             feed,
             self.tool,
             self.tool_length,
-            (was, any(frames.from_machine)),
+            (was, frames.bound),
             arc,
         )
         frames.position = control

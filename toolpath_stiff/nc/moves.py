@@ -129,6 +129,9 @@ class Program:
     dialect
         How it was read: "generic", "linuxcnc", "fanuc", "haas", or one of them as a controller file changes it;
         `CUTTER_LOCATION` for a cutter-location file.
+    kinematics
+        The kinematics that it was posted for ("table-table A C"), from which the moves were recovered; "": A, B, C are
+        roll, pitch, yaw of the platform.
     marks
         (line, name) where operations begin, ascending, in a language whose text says so otherwise than by comment
         lines; None: the comment lines of `source` say it.
@@ -146,4 +149,5 @@ class Program:
     tools: tuple[ToolUse, ...] = field(default=())
     interpreter: str = "builtin"
     dialect: str = "generic"
+    kinematics: str = ""
     marks: tuple[tuple[int, str], ...] | None = None

@@ -96,7 +96,7 @@ def _suits(state: Interpreter) -> bool:
         and state.unsettled is None
         and not state.arc_absolute
         and not frames.rotated
-        and not any(frames.from_machine)
+        and not frames.bound
     )
 
 

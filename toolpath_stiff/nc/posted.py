@@ -1,0 +1,236 @@
+"""The kinematics that a program was posted for: rotary axes on tables and heads, their directions and pivots.
+
+Read from `[kinematics]` of a controller file (mm there, SI here); `posted_moves` recovers the tool from it. Types as in
+R.-S. Lee, C.-H. She, "Developing a postprocessor for three types of five-axis machine tools", Int J Adv Manuf Technol
+13 (1997) 658-665: both axes on the table, both on the spindle, one on each; and machines with one rotary axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.tables import LARGEST_MM
+from toolpath_stiff.units import m_from_mm, mm_from_m
+
+TABLE, HEAD = "table", "head"
+PROGRAM, MACHINE = "program", "machine"
+# Type -> its axes, the one nearest the machine's base first: the name of its table in the file, and what it turns.
+TYPES: dict[str, tuple[tuple[str, str], ...]] = {
+    "table-table": (("primary", TABLE), ("secondary", TABLE)),
+    "head-head": (("primary", HEAD), ("secondary", HEAD)),
+    "head-table": (("head", HEAD), ("table", TABLE)),
+    "table": (("table", TABLE),),
+    "head": (("head", HEAD),),
+}
+LETTERS = "ABC"
+DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+PLACE_KEYS = {TABLE: "point_mm", HEAD: "pivot_mm"}
+TOLERANCE_MM, LEAST_TOLERANCE_MM, LARGEST_TOLERANCE_MM = 1e-3, 1e-5, 1.0
+PARALLEL = 1e-6  # sine of the angle between two axes that are one
+
+Vector = tuple[float, float, float]
+Fail = Callable[[str, str], InputError]
+
+
+@dataclass(frozen=True)
+class RotaryAxis:
+    """A rotary axis of the machine that a program was posted for.
+
+    Attributes
+    ----------
+    letter
+        A, B or C: the program's word.
+    turns
+        "table" (the work) or "head" (the tool).
+    direction
+        Unit vector in the machine's axes. A positive angle turns the tool against the work by the right hand about it
+        (ISO 841): a head turns so itself, a table the other way.
+    point
+        m; of a table a point of its axis with all rotary axes at 0; of a head the way from the spindle's gauge line to
+        a point of its axis, at 0 too. None: not given.
+    rollover
+        Whether the axis takes the shorter way round to any angle.
+    """
+
+    letter: str
+    turns: str
+    direction: Vector
+    point: Vector | None
+    rollover: bool = False
+
+    @property
+    def column(self) -> int:
+        """Its place among A, B, C."""
+        return LETTERS.index(self.letter)
+
+    def describe(self) -> str:
+        """A few words: "A turns the table about (1, 0, 0)"."""
+        direction = ", ".join(f"{v:.6g}" for v in self.direction)
+        return f"{self.letter} turns the {self.turns} about ({direction})"
+
+
+@dataclass(frozen=True)
+class PostedKinematics:
+    """The machine that a program was posted for.
+
+    Attributes
+    ----------
+    type
+        A key of `TYPES`.
+    axes
+        In the order of `TYPES`.
+    tcp
+        Whether X Y Z are the tool tip's on the part (tool centre point control), or the numbers of the machine's axes.
+    points
+        Coordinates of the tables' points: "program", those of G54, or "machine".
+    tolerance
+        m, how far a divided move may be from the true curve.
+    """
+
+    type: str
+    axes: tuple[RotaryAxis, ...]
+    tcp: bool
+    points: str = PROGRAM
+    tolerance: float = m_from_mm(TOLERANCE_MM)
+
+    @property
+    def from_tool_to_work(self) -> tuple[RotaryAxis, ...]:
+        """The axes in the order in which the tool meets them on its way to the work."""
+        heads = [axis for axis in self.axes if axis.turns == HEAD]
+        return (*reversed(heads), *(axis for axis in self.axes if axis.turns == TABLE))
+
+    @property
+    def label(self) -> str:
+        """Type and letters: "table-table A C"."""
+        return " ".join([self.type, *(axis.letter for axis in self.axes)])
+
+    def assumption(self) -> str:
+        """What was made of X Y Z A B C, a sentence for people."""
+        axes = ", ".join(axis.describe() for axis in self.axes)
+        where = "the tip on the part (tool centre point control)" if self.tcp else "the machine's axes"
+        return (
+            f"posted for another kinematics ({self.label}): X Y Z are those of {where}; {axes}, positive angles of the "
+            "tool against the work by the right hand (ISO 841). Tool tip and tool axis are recovered, moves with "
+            f"turning axes divided within {mm_from_m(self.tolerance):g} mm; the free yaw about the tool is 0"
+        )
+
+
+def read_kinematics(table: object, fail: Fail) -> PostedKinematics:
+    """The kinematics of a controller file's `[kinematics]`; `fail(found, expected)` makes the error that names it."""
+    if not isinstance(table, dict):
+        raise fail(f"kinematics = {table!r}", "a table [kinematics] with type, tcp and the rotary axes")
+    return _Reader(table, fail).kinematics()
+
+
+class _Reader:
+    """One `[kinematics]` table."""
+
+    def __init__(self, table: Mapping[str, Any], fail: Fail) -> None:
+        self.table, self.fail = table, fail
+
+    def kinematics(self) -> PostedKinematics:
+        kind = self._needed("type", f"one of {', '.join(TYPES)}")
+        if not isinstance(kind, str) or kind not in TYPES:
+            raise self.fail(f"kinematics.type = {kind!r}", ", ".join(TYPES))
+        parts = TYPES[kind]
+        known = ("type", "tcp", "points", "tolerance_mm", *(key for key, _ in parts))
+        for key in self.table:
+            if key not in known:
+                raise self.fail(f"kinematics.{key} is not known in the type {kind!r}", ", ".join(known))
+        tcp = self._needed("tcp", "true (X Y Z are the tool tip on the part) or false (of the machine's axes)")
+        if not isinstance(tcp, bool):
+            raise self.fail(f"kinematics.tcp = {tcp!r}", "true or false")
+        axes = tuple(self._axis(key, turns, tcp) for key, turns in parts)
+        _check_pair(axes, parts, self.fail)
+        return PostedKinematics(kind, axes, tcp, self._points(axes), self._tolerance())
+
+    def _needed(self, key: str, expected: str) -> Any:
+        if key not in self.table:
+            raise self.fail(f"kinematics.{key} is missing", expected)
+        return self.table[key]
+
+    def _points(self, axes: tuple[RotaryAxis, ...]) -> str:
+        placed = any(axis.turns == TABLE and axis.point is not None for axis in axes)
+        expected = '"program" (coordinates of G54) or "machine": what point_mm is'
+        points = self._needed("points", expected) if placed else self.table.get("points", PROGRAM)
+        if points not in (PROGRAM, MACHINE):
+            raise self.fail(f"kinematics.points = {points!r}", expected)
+        return str(points)
+
+    def _tolerance(self) -> float:
+        value = self._number("kinematics.tolerance_mm", self.table.get("tolerance_mm", TOLERANCE_MM))
+        if not LEAST_TOLERANCE_MM <= value <= LARGEST_TOLERANCE_MM:
+            raise self.fail(
+                f"kinematics.tolerance_mm = {value:g}", f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}"
+            )
+        return m_from_mm(value)
+
+    def _axis(self, key: str, turns: str, tcp: bool) -> RotaryAxis:
+        where, place = f"kinematics.{key}", PLACE_KEYS[turns]
+        part = self._needed(key, f"[{where}] with letter, {place}")
+        known = ("letter", "axis", "reversed", "rollover", place)
+        if not isinstance(part, dict):
+            raise self.fail(f"{where} = {part!r}", f"a table [{where}] with {', '.join(known)}")
+        for name in part:
+            if name not in known:
+                raise self.fail(f"{where}.{name} is not known", ", ".join(known))
+        letter = part.get("letter")
+        if not isinstance(letter, str) or letter not in tuple(LETTERS):
+            raise self.fail(f"{where}.letter = {letter!r}" if letter else f"{where}.letter is missing", "A, B or C")
+        if place not in part and not tcp:
+            what = (
+                "a point of the table's axis"
+                if turns == TABLE
+                else "[x, y, z] from the gauge line to the axis; z: the pivot length"
+            )
+            raise self.fail(f"{where}.{place} is missing, and tcp is false", what)
+        sign = -1.0 if self._flag(where, part, "reversed") else 1.0
+        x, y, z = self._direction(f"{where}.axis", part.get("axis", "xyz"[LETTERS.index(letter)]))
+        point = self._vector(f"{where}.{place}", part[place]) if place in part else None
+        metres = None if point is None else (m_from_mm(point[0]), m_from_mm(point[1]), m_from_mm(point[2]))
+        direction = (sign * x + 0.0, sign * y + 0.0, sign * z + 0.0)
+        return RotaryAxis(letter, turns, direction, metres, self._flag(where, part, "rollover"))
+
+    def _flag(self, where: str, part: Mapping[str, Any], key: str) -> bool:
+        value = part.get(key, False)
+        if not isinstance(value, bool):
+            raise self.fail(f"{where}.{key} = {value!r}", "true or false")
+        return value
+
+    def _direction(self, where: str, value: object) -> Vector:
+        if isinstance(value, str) and value in DIRECTIONS:
+            return DIRECTIONS[value]
+        if not isinstance(value, list):
+            raise self.fail(f"{where} = {value!r}", '"x", "y", "z" or a vector [i, j, k]')
+        i, j, k = self._vector(where, value)
+        length = math.hypot(i, j, k)
+        if length < PARALLEL:
+            raise self.fail(f"{where} = {value!r} has no direction", "a vector [i, j, k]")
+        return (i / length, j / length, k / length)
+
+    def _vector(self, where: str, value: object) -> Vector:
+        if not isinstance(value, list) or len(value) != 3:
+            raise self.fail(f"{where} = {value!r}", "three numbers [x, y, z]")
+        x, y, z = (self._number(where, v) for v in value)
+        return (x, y, z)
+
+    def _number(self, where: str, value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_MM:
+            raise self.fail(f"{where} = {value!r}", f"a number within +-{LARGEST_MM:g}")
+        return float(value)
+
+
+def _check_pair(axes: tuple[RotaryAxis, ...], parts: tuple[tuple[str, str], ...], fail: Fail) -> None:
+    """Raise the error of two axes that are one, or that one letter moves."""
+    if len(axes) < 2:
+        return
+    first, second = (f"kinematics.{key}" for key, _ in parts)
+    if axes[0].letter == axes[1].letter:
+        raise fail(f"{first}.letter and {second}.letter are both {axes[0].letter!r}", "two letters")
+    (a, b, c), (d, e, f) = axes[0].direction, axes[1].direction
+    if math.hypot(b * f - c * e, c * d - a * f, a * e - b * d) < PARALLEL:
+        raise fail(f"{first}.axis and {second}.axis are parallel", "two directions")

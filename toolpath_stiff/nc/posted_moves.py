@@ -1,0 +1,351 @@
+"""Tool tip and tool axis on the part, from the machine axes that a program was posted for. SI.
+
+The chain runs from the tool to the work. With all rotary axes at 0 the tip stands at the numbers X of the linear axes,
+its axis along +z, and part and machine coordinates are one. Each rotary axis then turns tip q and axis k by its angle t
+about its line, which has the direction n and goes through c:
+
+    q' = c + R(n, t) (q - c),    k' = R(n, t) k,    R right-handed (ISO 841: the tool against the work)
+
+Heads first, from the spindle back to the column: their lines ride with the linear axes, c = X + pivot + L z with L the
+tool's length from the gauge line. Then tables, from the base to the work: c stays. It is the forward kinematics of
+R.-S. Lee, C.-H. She, Int J Adv Manuf Technol 13 (1997) 658-665, written with rotations about lines.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.curves import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.moves import FEED, RAPID, Moves
+from toolpath_stiff.nc.posted import HEAD, LETTERS, PostedKinematics, RotaryAxis
+from toolpath_stiff.units import deg_from_rad, mm_from_m, rad_from_deg
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+AXIS_STEP = rad_from_deg(1.0)  # largest turn of the rotary axes in one piece
+SAME_PLACE = 1e-12  # m and rad: rounding, not motion
+UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
+MOST_PIECES = 10_000_000
+HALF_TURN = math.pi * (1.0 + 1e-9)
+Z = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class ToolPoses:
+    """Tips (n, 3) in m and unit vectors of the tool's axis (n, 3), tip to spindle, in part coordinates."""
+
+    tip: FloatArray
+    axis: FloatArray
+
+
+def tool_poses(
+    kinematics: PostedKinematics,
+    xyz: FloatArray,
+    abc: FloatArray,
+    tool_length: FloatArray | float = math.nan,
+) -> ToolPoses:
+    """Where the tool stands on the part: the forward kinematics of the machine that a program was posted for.
+
+    Parameters
+    ----------
+    kinematics
+        With its tables' points in the coordinates of `xyz`.
+    xyz
+        (n, 3) m, X Y Z as programmed; `kinematics.tcp` says what they are.
+    abc
+        (n, 3) rad, A B C as programmed.
+    tool_length
+        (n,) or one, m, from the spindle's gauge line to the tip; heads without tool centre point control alone need it.
+    """
+    axis = np.tile(Z, (len(xyz), 1))
+    tip = np.array(xyz, dtype=float)
+    for rotary in kinematics.from_tool_to_work:
+        angle = abc[:, rotary.column]
+        axis = _turned(axis, rotary, angle)
+        if not kinematics.tcp:
+            center = _line_point(rotary, xyz, tool_length)
+            # Where nothing turns the numbers stay to their last digit, and a tool's unknown length does not matter.
+            tip = np.where((angle != 0.0)[:, None], center + _turned(tip - center, rotary, angle), tip)
+    return ToolPoses(tip, axis)
+
+
+def roll_pitch(axis: FloatArray) -> FloatArray:
+    """Roll and pitch (n, 2), rad, of tool axes (n, 3) in their order, at a yaw of 0; see `tool_axis`.
+
+    Pitch runs on over half a turn, and stays what it was where the axis lies along y and has none.
+    """
+    i, j, k = axis.T
+    across = np.hypot(i, k)
+    pitch = np.arctan2(i, k)
+    known = np.where(across > UPRIGHT, np.arange(len(axis)), -1)
+    last = np.maximum.accumulate(known) if len(axis) else known
+    pitch = np.where(last >= 0, pitch[last], 0.0)
+    return np.stack([np.arctan2(-j, across), np.unwrap(pitch)], axis=1) + 0.0
+
+
+def recover_moves(
+    moves: Moves, kinematics: PostedKinematics, tool_lengths: Mapping[int, float], name: str = "program"
+) -> Moves:
+    """Moves of the tool on the part, from those of the machine that the program was posted for.
+
+    Parameters
+    ----------
+    moves
+        As programmed: X Y Z A B C of the posted machine, relative to G54's zero.
+    kinematics
+        Its tables' points relative to G54's zero, too.
+    tool_lengths
+        Tool number -> m, for moves without a length of their own (G43).
+    name
+        The program's name, for messages.
+
+    Returns
+    -------
+    Moves of tip, roll and pitch (yaw 0), in part coordinates: those of G54 with all rotary axes at 0. A move is divided
+    where rotary axes turn, so that straight pieces (arcs under tool centre point control: arcs) stay within
+    `kinematics.tolerance` of the true curve and no piece turns by more than a degree; each keeps its move's line, and
+    their times add up to the move's. Arcs with standing rotary axes are turned as a whole. What moves neither tip nor
+    tool axis has no row; its time is added to the dwell before it. `from_machine` is False throughout.
+
+    Raises
+    ------
+    InputError
+        A letter that the kinematics does not have turns; a head's tool has no length; too many pieces.
+    """
+    if not len(moves):
+        return moves
+    _check_letters(moves, kinematics, name)
+    moves = _shorter_way(moves, kinematics)
+    length = _lengths_at_heads(moves, kinematics, tool_lengths, name)
+    count = _pieces(moves, kinematics, length)
+    if count.sum() > MOST_PIECES:
+        worst = int(moves.line[np.argmax(count)])
+        raise InputError(
+            f"dividing moves with turning axes within {mm_from_m(kinematics.tolerance):g} mm gives "
+            f"{float(count.sum()):.0f} pieces",
+            expected=f"at most {MOST_PIECES}",
+            hint="give a larger kinematics.tolerance_mm in the controller file",
+            file=name,
+            line=worst,
+        )
+    move = np.repeat(np.arange(len(moves)), count + 1)
+    step = np.arange(len(move)) - np.repeat(np.cumsum(count + 1) - (count + 1), count + 1)
+    u = step / count[move]
+    last = step == count[move]
+    programmed = points_along(moves, move, u)[0]
+    angles = moves.start[move, 3:] + u[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
+    angles[last] = moves.end[:, 3:]
+    found = tool_poses(kinematics, programmed, angles, length[move])
+    pose = np.zeros((len(move), 6))
+    pose[:, :3] = _without_rounding(found.tip)
+    pose[:, 3:5] = _without_rounding(roll_pitch(found.axis))
+    start, end = np.flatnonzero(~last), np.flatnonzero(step > 0)
+    pieces = _on_the_part(moves, kinematics, length, move[start], u[start])
+    pieces = replace(pieces, start=pose[start], end=pose[end])
+    return _with_times(pieces, moves, move[start], count, last[end])
+
+
+def turns_far(moves: Moves, kinematics: PostedKinematics) -> list[tuple[int, str, float]]:
+    """Cutting moves in which an axis without roll-over turns by more than half a turn: line, letter, degrees."""
+    found = []
+    for rotary in kinematics.axes:
+        turn = np.abs(moves.end[:, 3 + rotary.column] - moves.start[:, 3 + rotary.column])
+        far = np.flatnonzero((turn > HALF_TURN) & (moves.motion != RAPID) & (not rotary.rollover))
+        found += [(int(moves.line[i]), rotary.letter, deg_from_rad(float(turn[i]))) for i in far]
+    return sorted(found)
+
+
+def _turned(vectors: FloatArray, rotary: RotaryAxis, angle: FloatArray) -> FloatArray:
+    """Vectors (n, 3) turned by angles (n,) about the axis' direction: Rodrigues' formula."""
+    n = np.array(rotary.direction)
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    along = (vectors[:, 0] * n[0] + vectors[:, 1] * n[1] + vectors[:, 2] * n[2])[:, None] * n
+    return np.asarray(along + cos * (vectors - along) + sin * np.cross(n, vectors))
+
+
+def _line_point(rotary: RotaryAxis, xyz: FloatArray, tool_length: FloatArray | float) -> FloatArray:
+    """(n, 3) a point of the rotary axis at the numbers X Y Z of the linear axes."""
+    assert rotary.point is not None
+    if rotary.turns == HEAD:
+        reach = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(xyz),))
+        return np.asarray(xyz + np.array(rotary.point) + reach[:, None] * Z)
+    return np.broadcast_to(np.array(rotary.point), xyz.shape)
+
+
+def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> None:
+    letters = [axis.letter for axis in kinematics.axes]
+    for column, letter in enumerate(LETTERS):
+        used = (moves.start[:, 3 + column] != 0.0) | (moves.end[:, 3 + column] != 0.0)
+        if letter not in letters and used.any():
+            raise InputError(
+                f"{letter} turns, and the kinematics that the program was posted for has {' and '.join(letters)} alone",
+                expected=f"no {letter} words",
+                hint="see [kinematics] of the controller file",
+                file=name,
+                line=int(moves.line[np.argmax(used)]),
+            )
+
+
+def _shorter_way(moves: Moves, kinematics: PostedKinematics) -> Moves:
+    """Axes with roll-over go to their angle the shorter way; where they stand then is the same."""
+    end = moves.end.copy()
+    for rotary in kinematics.axes:
+        if rotary.rollover:
+            column = 3 + rotary.column
+            turn = end[:, column] - moves.start[:, column]
+            far = np.abs(turn) > math.pi
+            end[far, column] -= (2.0 * math.pi * np.round(turn / (2.0 * math.pi)))[far]
+    return replace(moves, end=end)
+
+
+def _turning(moves: Moves) -> FloatArray:
+    """(n, 3) rad, how far each rotary axis turns within each move."""
+    return np.asarray(np.abs(moves.end[:, 3:] - moves.start[:, 3:]))
+
+
+def _lengths_at_heads(
+    moves: Moves, kinematics: PostedKinematics, tool_lengths: Mapping[int, float], name: str
+) -> FloatArray:
+    """(n,) m, gauge line to tip: G43's, else the tool table's; needed wherever a head is tilted."""
+    length = moves.tool_length.copy()
+    for tool in np.unique(moves.tool[np.isnan(length)]):
+        length[np.isnan(length) & (moves.tool == tool)] = tool_lengths.get(int(tool), math.nan)
+    heads = [3 + axis.column for axis in kinematics.axes if axis.turns == HEAD]
+    if kinematics.tcp or not heads:
+        return length
+    tilted = (moves.start[:, heads] != 0.0).any(axis=1) | (moves.end[:, heads] != 0.0).any(axis=1)
+    missing = tilted & np.isnan(length)
+    if missing.any():
+        first = int(np.argmax(missing))
+        raise InputError(
+            f"the head is tilted, and the length of tool {moves.tool[first]} is not known: the pivot is the pivot "
+            "length and the tool's length above the tip",
+            expected="the tool's length from the gauge line to the tip",
+            hint="add it to the tool table (--tools FILE, or [[tools]] of the controller file)",
+            file=name,
+            line=int(moves.line[first]),
+        )
+    return length
+
+
+def _pieces(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> IntArray:
+    """(n,) into how many pieces each move is divided.
+
+    A curve with |q''| <= a (per share of the move) is within a / (8 m^2) of m equal chords. A turn at the rate w about
+    a line at the distance r adds 2 w |q'| + w^2 r to the bound of |q''|, and w r to that of |q'|.
+    """
+    turning = _turning(moves)
+    used = [axis.column for axis in kinematics.axes]
+    count = np.ceil(turning[:, used].sum(axis=1) / AXIS_STEP - 1e-9)
+    if not kinematics.tcp:
+        bend = _bend(moves, kinematics, length)
+        bent = (turning[:, used] > 0.0).any(axis=1)
+        count = np.where(bent, np.maximum(count, np.ceil(np.sqrt(bend / (8.0 * kinematics.tolerance)) - 1e-9)), 0.0)
+    return np.maximum(count, 1.0).astype(np.int64)
+
+
+def _bend(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> FloatArray:
+    """(n,) m, a bound of the tip's |q''| over a move that runs from 0 to 1."""
+    turning = _turning(moves)
+    linear, bend = _linear_bounds(moves)
+    ends = [np.array(pose[:, :3]) for pose in (moves.start, moves.end)]
+    rides = [np.zeros_like(point) for point in ends]  # of the tip from X, by the heads so far
+    speed, ride_speed = linear, np.zeros(len(moves))
+    for rotary in kinematics.from_tool_to_work:
+        rate = turning[:, rotary.column]
+        head = rotary.turns == HEAD
+        points = rides if head else ends
+        reach, turned = np.zeros(len(moves)), []
+        for point, pose in zip(points, (moves.start, moves.end), strict=True):
+            center = _line_point(rotary, np.zeros_like(point) if head else pose[:, :3], length)
+            turns = (rate != 0.0) | (pose[:, 3 + rotary.column] != 0.0)
+            # A head that stands upright may have a tool of unknown length.
+            out = np.where(turns[:, None], point - center, 0.0)
+            reach = np.maximum(reach, np.linalg.norm(out, axis=1))
+            turned.append(np.where(turns[:, None], center + _turned(out, rotary, pose[:, 3 + rotary.column]), point))
+        # No point of the move is farther than half of it from one of its ends.
+        reach = reach + (ride_speed if head else speed) / 2.0
+        bend = bend + 2.0 * rate * (ride_speed if head else speed) + rate**2 * reach
+        if head:
+            rides, ride_speed = turned, ride_speed + rate * reach
+            ends = [pose[:, :3] + ride for pose, ride in zip((moves.start, moves.end), rides, strict=True)]
+            speed = linear + ride_speed
+        else:
+            ends, speed = turned, speed + rate * reach
+    return bend
+
+
+def _linear_bounds(moves: Moves) -> tuple[FloatArray, FloatArray]:
+    """(n,) m, bounds of |X'| and |X''| of the linear axes over a move that runs from 0 to 1."""
+    speed, bend = move_lengths(moves), np.zeros(len(moves))
+    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
+    if len(arcs):
+        frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
+        radius = np.maximum(frame.radius_start, frame.radius_end)
+        growth = np.abs(frame.radius_end - frame.radius_start)
+        bend[arcs] = radius * sweep**2 + 2.0 * growth * sweep
+        speed[arcs] = np.sqrt((radius * sweep) ** 2 + growth**2 + frame.climb**2)
+    return speed, bend
+
+
+def _without_rounding(points: FloatArray) -> FloatArray:
+    """Points (n, k) in which a step below `SAME_PLACE` is none: the point before stands in its place."""
+    moved = np.ones(len(points), dtype=bool)
+    moved[1:] = (np.abs(np.diff(points, axis=0)) > SAME_PLACE).any(axis=1)
+    return points[np.maximum.accumulate(np.where(moved, np.arange(len(points)), 0))]
+
+
+def _on_the_part(
+    moves: Moves, kinematics: PostedKinematics, length: FloatArray, move: IntArray, share: FloatArray
+) -> Moves:
+    """One row a piece, which begins at its share of its move; arcs that stay arcs; the ends are still the moves'."""
+    arc = moves.arc_sweep != 0.0
+    turning = (_turning(moves) > 0.0).any(axis=1)
+    stays = arc & (~turning | kinematics.tcp)
+    center, normal = moves.arc_center, moves.arc_normal
+    rows = np.flatnonzero(stays)
+    if not kinematics.tcp and len(rows):
+        # Turned as a whole: the centre as a point of the linear axes, the normal as the way to another one.
+        abc = moves.start[rows, 3:]
+        here, there = (
+            tool_poses(kinematics, center[rows] + along, abc, length[rows]).tip for along in (0.0, normal[rows])
+        )
+        center, normal = center.copy(), normal.copy()
+        center[rows], normal[rows] = here, (there - here) / np.linalg.norm(there - here, axis=1)[:, None]
+    climb = np.zeros(len(moves))
+    climb[rows] = arc_frame(moves, rows).climb
+    risen = center[move] + (climb[move] * share)[:, None] * normal[move]  # the plane of the piece's start
+    pieces = np.bincount(move, minlength=len(moves))
+    return replace(
+        moves.take(move),
+        motion=np.where(arc & ~stays, FEED, moves.motion)[move],
+        arc_sweep=np.where(stays, moves.arc_sweep / pieces, 0.0)[move],
+        arc_center=np.where(stays[move][:, None], risen, 0.0),
+        arc_normal=np.where(stays[:, None], normal, 0.0)[move],
+        from_machine=np.zeros((len(move), 2), dtype=bool),
+    )
+
+
+def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, last: BoolArray) -> Moves:
+    """The pieces that move tip or tool axis, with feeds and dwells that keep the time of every move."""
+    length, turn = move_lengths(moves), _turning(moves).max(axis=1)
+    share = (np.where(length > 0.0, length, turn) / moves.feed / count)[move]  # s; nan: a rapid
+    way = move_lengths(pieces)
+    # Where the tip on the part runs as far as the axes do (tool centre point control, or none turns): as programmed.
+    same = np.isclose(way * count[move], length[move], rtol=1e-9, atol=0.0)
+    way = np.where(way > 0.0, way, _turning(pieces).max(axis=1))
+    feed = np.where(same, pieces.feed, way / share)
+    kept = way > 0.0
+    waits = np.where(last, moves.dwell[move], 0.0) + np.where(kept, 0.0, np.nan_to_num(share))
+    before = np.cumsum(kept) - 1  # a pause before the first move is none
+    dwell = np.zeros(int(kept.sum()))
+    np.add.at(dwell, before[before >= 0], waits[before >= 0])
+    return replace(replace(pieces, feed=feed).take(kept), dwell=dwell)

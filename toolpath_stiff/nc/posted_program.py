@@ -1,0 +1,171 @@
+"""A program posted for another machine: what of it can be known on the part, and what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
+from toolpath_stiff.nc.posted import MACHINE, TABLE, PostedKinematics, RotaryAxis
+from toolpath_stiff.nc.posted_moves import recover_moves, turns_far
+from toolpath_stiff.nc.tables import Offsets
+
+Pose = tuple[float, float, float, float, float, float]
+MOST_LINES = 5  # named in one sentence
+OWN_ZERO = (
+    "G54 as the program or the controller file sets it is that of the machine that the program was posted for; it does "
+    "not say where the work sits here"
+)
+OWN_POINTS = (
+    "G53, G28 and G30 go to points of the machine that the program was posted for, as it stands about the work; their "
+    "place on this machine means nothing"
+)
+
+
+@dataclass(frozen=True)
+class OnThePart:
+    """Moves in part coordinates, and the sentences that go with them."""
+
+    moves: Moves
+    warnings: tuple[str, ...]
+    assumptions: tuple[str, ...]
+
+
+def recovered(program: Program, kinematics: PostedKinematics, origin: Pose, source: str) -> Program:
+    """A program as read for its own machine, with the moves of the tool on the part.
+
+    Parameters
+    ----------
+    program
+        Its origin is G54's zero on the posted machine, if its `origin_source` is "program".
+    kinematics
+        Of the posted machine.
+    origin, source
+        Where the work sits on this machine, m and rad, and who says so.
+
+    Raises
+    ------
+    InputError
+        See `on_the_part`.
+    """
+    zero = program.origin if program.origin_source == "program" else None
+    part = on_the_part(program.moves, kinematics, zero, program.tools, program.name)
+    return replace(
+        program,
+        moves=part.moves,
+        origin=origin,
+        origin_source=source,
+        warnings=(*program.warnings, *part.warnings),
+        assumptions=(*program.assumptions, *part.assumptions),
+        kinematics=kinematics.label,
+    )
+
+
+def on_the_part(
+    moves: Moves, kinematics: PostedKinematics, zero: Pose | None, tools: Iterable[ToolUse], name: str
+) -> OnThePart:
+    """Moves of the posted machine, recovered on the part.
+
+    Parameters
+    ----------
+    moves
+        Of the posted machine's axes, relative to G54's zero.
+    kinematics
+        Of the posted machine.
+    zero
+        G54's zero in the posted machine's coordinates, m; None: not known.
+    tools
+        The tools of the program, with their lengths.
+    name
+        The program's name, for messages.
+
+    Raises
+    ------
+    InputError
+        The program does not suit the kinematics, points in machine coordinates need G54, or a cut goes to a point
+        that is not known on the part.
+    """
+    placed = _points_at(kinematics, zero, name)
+    kept, warnings, assumptions = _known_points(moves, placed, zero, name)
+    assumptions = [kinematics.assumption(), *assumptions, *([OWN_ZERO] if zero is not None else [])]
+    far = turns_far(kept, kinematics)
+    if far:
+        line, letter, degrees = far[0]
+        warnings.append(
+            f"line {line}: {letter} turns by {degrees:.0f} degrees within one cut"
+            + (f", and {len(far) - 1} more cuts turn as far" if far[1:] else "")
+            + f"; if the control takes the shorter way, say rollover = true for {letter} in the controller file"
+        )
+    lengths = {tool.number: tool.length for tool in tools}
+    return OnThePart(recover_moves(kept, placed, lengths, name), tuple(warnings), tuple(assumptions))
+
+
+def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: str) -> None:
+    """Raise `InputError` for work offsets with A, B, C under tool centre point control: controls differ in them."""
+    if kinematics.tcp and any(any(offset.axes[3:]) for offset in offsets.table):
+        raise InputError(
+            "a work offset with A, B or C, and tool centre point control (kinematics.tcp = true): controls differ in "
+            "what X Y Z are then",
+            expected="work offsets of X Y Z alone",
+            file=name,
+        )
+
+
+def _points_at(kinematics: PostedKinematics, zero: Pose | None, name: str) -> PostedKinematics:
+    """The kinematics with its tables' points relative to G54's zero."""
+    used = any(axis.turns == TABLE and axis.point is not None for axis in kinematics.axes) and not kinematics.tcp
+    if kinematics.points != MACHINE or not used:
+        return kinematics
+    if zero is None:
+        raise InputError(
+            'kinematics.points = "machine" needs the place of G54 on the machine that the program was posted for',
+            expected="G54 in the controller file's [offsets], or G10 L2 P1 in the program",
+            hint='or give the points in program coordinates: points = "program"',
+            file=name,
+        )
+    return replace(kinematics, axes=tuple(_moved(axis, zero) for axis in kinematics.axes))
+
+
+def _moved(axis: RotaryAxis, zero: Pose) -> RotaryAxis:
+    """An axis whose point on a table is given from another zero."""
+    if axis.turns != TABLE or axis.point is None:
+        return axis
+    x, y, z = (p - o for p, o in zip(axis.point, zero[:3], strict=True))
+    return replace(axis, point=(x, y, z))
+
+
+def _known_points(
+    moves: Moves, kinematics: PostedKinematics, zero: Pose | None, name: str
+) -> tuple[Moves, list[str], list[str]]:
+    """The moves whose ends are known on the part, with warnings and assumptions about those to machine points."""
+    fixed = moves.from_machine.any(axis=1)
+    if not fixed.any():
+        return moves, [], []
+    if zero is not None and not kinematics.tcp:
+        return moves, [], [OWN_POINTS]
+    reason = (
+        "tool centre point control does not hold there"
+        if kinematics.tcp
+        else "the place of G54 on that machine is not known"
+    )
+    cuts = fixed & (moves.motion != RAPID)
+    if cuts.any():
+        raise InputError(
+            f"a cut that begins or ends at a point of the machine that the program was posted for (G53, G28, G30): "
+            f"{reason}",
+            expected="rapids alone there, and X Y Z in the move after them",
+            hint="" if kinematics.tcp else "give G54 in the controller file's [offsets]",
+            file=name,
+            line=int(moves.line[np.argmax(cuts)]),
+        )
+    lines = np.unique(moves.line[fixed])
+    shown = ", ".join(str(line) for line in lines[:MOST_LINES])
+    more = f" and {len(lines) - MOST_LINES} more" if len(lines) > MOST_LINES else ""
+    warning = (
+        f"line{'s' if len(lines) > 1 else ''} {shown}{more}: rapids to or from points of the machine that the program "
+        f"was posted for (G53, G28, G30) are left out of the path: {reason}"
+    )
+    return moves.take(~fixed), [warning], []
