@@ -177,7 +177,7 @@ def test_inline_offsets_and_linuxcnc_s_own_files(tmp_path):
         ('dialect = "mazak"', "generic or linuxcnc or fanuc or haas"),
         ("dialect = 3", "generic or linuxcnc"),
         ("colour = 3", "'colour' is not known"),
-        ('kinematics = "table-table"', "another kinematics"),
+        ('kinematics = "table-table"', "a table .kinematics"),
         ("block_delete = [0]", "switches 1 to 9"),
         ("block_delete = [true]", "switches 1 to 9"),
         ("offsets = 3", "a table G54"),

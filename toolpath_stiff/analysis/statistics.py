@@ -65,6 +65,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
     return {
         "program": analysis.program.name,
         "interpreter": analysis.program.interpreter,
+        "kinematics": analysis.program.kinematics,
         "machine": analysis.machine.name,
         "load": str(analysis.load),
         "force_N": analysis.force,

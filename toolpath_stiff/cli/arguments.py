@@ -120,7 +120,8 @@ def add_program_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--controller",
         metavar="FILE",
-        help="what belongs to the control (TOML: dialect, block_delete, offsets, tools; or LinuxCNC's .var or .tbl)",
+        help="what belongs to the control (TOML: dialect, block_delete, offsets, tools, the kinematics "
+        "that the program was posted for; or LinuxCNC's .var or .tbl)",
     )
     group.add_argument(
         "--dialect",

@@ -74,7 +74,12 @@ def run(args: argparse.Namespace) -> int:
         block_delete=args.block_delete,
         controller=controller,
     )
-    document = {"program": name, "dialect": checked.dialect or controller.label, **_document(args, checked, machine)}
+    document = {
+        "program": name,
+        "dialect": checked.dialect or controller.label,
+        "kinematics": controller.kinematics.label if controller.kinematics and not checked.dialect else "",
+        **_document(args, checked, machine),
+    }
     if args.json:
         json.dump(document, sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
         sys.stdout.write("\n")
@@ -122,7 +127,8 @@ def _figures(found: Figures) -> dict[str, Any]:
 
 def _text(document: dict[str, Any]) -> str:
     """The same for people."""
-    lines = [f"{document['program']}, read as {document['dialect']}"]
+    posted = f", posted for {document['kinematics']}" if document["kinematics"] else ""
+    lines = [f"{document['program']}, read as {document['dialect']}{posted}"]
     if not document["complete"]:
         lines.append("NOT READ TO ITS END AS IT STANDS: figures are those of the blocks that could be read")
     lines.append("\nfindings:")

@@ -16,8 +16,9 @@ from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_locat
 from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Unsupported
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, ToolUse, Unsupported
 from toolpath_stiff.nc.plain_lines import G_COLUMN
+from toolpath_stiff.nc.posted import PostedKinematics
 from toolpath_stiff.nc.reader import ZERO
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets
@@ -159,7 +160,11 @@ def check_lines(
     if looks_like_cutter_location(lines, name):
         return _check_cutter_location(lines, name, origin or default_origin, block_delete, controller)
     place, default = None if origin is None else _to_mm(origin), _to_mm(default_origin)
-    frames = Frames(copy.deepcopy(controller.offsets or Offsets()), place, default)
+    posted = controller.kinematics
+    if posted is None:
+        frames = Frames(copy.deepcopy(controller.offsets or Offsets()), place, default)
+    else:  # first in the coordinates of the machine that the program was posted for
+        frames = Frames(copy.deepcopy(controller.offsets or Offsets()), None, ZERO, posted=True)
     interpreter = Interpreter(name, frames, copy.deepcopy(controller.tools), controller.dialect)
     switches = ALL_SWITCHES if block_delete else controller.switches
     run = _CheckingRun(interpreter, lines, name, switches)
@@ -176,20 +181,45 @@ def check_lines(
     errors = run.errors if foreign is None else [foreign]
     if not errors and not interpreter.recorder.cuts:
         errors = [InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)]
+    warnings, assumptions = [*warnings, *interpreter.warnings], list(interpreter.assumptions)
+    moves = interpreter.recorder.moves() if len(interpreter.recorder) else None
+    at = frames.origin
+    if posted is not None:
+        at = default if place is None else place
+        moves, refused, more, assumed = _on_the_part(moves, posted, frames, interpreter.used_tools.values(), name)
+        errors, warnings, assumptions = [*errors, *refused], [*warnings, *more], [*assumptions, *assumed]
     findings = [_of_error(error) for error in errors]
-    findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in (*warnings, *interpreter.warnings)]
-    findings += [Finding(0, 0, "assumption", text, NOTE) for text in interpreter.assumptions]
-    x, y, z, a, b, c = frames.origin
+    findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in warnings]
+    findings += [Finding(0, 0, "assumption", text, NOTE) for text in assumptions]
+    x, y, z, a, b, c = at
     return Checked(
         used=tuple(UsedCode(*run.first[code], code, code_meaning(code), NOTE, run.count[code]) for code in run.first),
         unsupported=tuple(_of_unsupported(word) for word in interpreter.unsupported),
         findings=tuple(sorted(findings, key=lambda f: (f.line, f.column))),
         start=start,
         end=modal_state(interpreter),
-        moves=interpreter.recorder.moves() if len(interpreter.recorder) else None,
+        moves=moves,
         origin=(m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c)),
         complete=not errors,
     )
+
+
+def _on_the_part(
+    moves: Moves | None, kinematics: PostedKinematics, frames: Frames, tools: Iterable[ToolUse], name: str
+) -> tuple[Moves | None, list[InputError], tuple[str, ...], tuple[str, ...]]:
+    """Moves of the posted machine on the part, None where that is refused; errors, warnings, assumptions."""
+    from toolpath_stiff.nc.posted_program import check_rotary_offsets, on_the_part
+
+    if moves is None:
+        return None, [], (), ()
+    x, y, z = (m_from_mm(v) for v in frames.origin[:3])
+    zero = (x, y, z, 0.0, 0.0, 0.0) if frames.source == "program" else None
+    try:
+        check_rotary_offsets(frames.offsets, kinematics, name)
+        part = on_the_part(moves, kinematics, zero, tools, name)
+    except InputError as error:
+        return None, [error], (), ()
+    return part.moves, [], part.warnings, part.assumptions
 
 
 def _check_cutter_location(

@@ -249,7 +249,7 @@ def _pieces(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> I
         bend = _bend(moves, kinematics, length)
         bent = (turning[:, used] > 0.0).any(axis=1)
         count = np.where(bent, np.maximum(count, np.ceil(np.sqrt(bend / (8.0 * kinematics.tolerance)) - 1e-9)), 0.0)
-    return np.maximum(count, 1.0).astype(np.int64)
+    return np.asarray(np.maximum(count, 1.0), dtype=np.int64)
 
 
 def _bend(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> FloatArray:

@@ -141,7 +141,7 @@ def _known_points(
     moves: Moves, kinematics: PostedKinematics, zero: Pose | None, name: str
 ) -> tuple[Moves, list[str], list[str]]:
     """The moves whose ends are known on the part, with warnings and assumptions about those to machine points."""
-    fixed = moves.from_machine.any(axis=1)
+    fixed = np.asarray(moves.from_machine.any(axis=1))
     if not fixed.any():
         return moves, [], []
     if zero is not None and not kinematics.tcp:

@@ -59,14 +59,15 @@ def read_program(
     rs274
         Path of the program `rs274`, if it is not on PATH.
     controller
-        Dialect, block-delete switches, work offsets and tools of the control; the two files above win over its tables.
+        Dialect, block-delete switches, work offsets and tools of the control, and the kinematics that the program was
+        posted for; the two files above win over its tables.
 
     Raises
     ------
     InputError
         With file, line and column, what was found and what was expected.
     """
-    return _read(
+    return _read_on_part(
         read_lines(path),
         Path(path).name,
         str(path),
@@ -97,7 +98,32 @@ def parse_program(
     """Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`."""
     lines = split_lines(text, name)
     tables = (offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools)
-    return _read(lines, name, "", origin, default_origin, *tables, block_delete, interpreter, rs274, controller)
+    return _read_on_part(lines, name, "", origin, default_origin, *tables, block_delete, interpreter, rs274, controller)
+
+
+def _read_on_part(
+    lines: tuple[str, ...],
+    name: str,
+    path: str,
+    origin: Iterable[float] | None,
+    default_origin: Iterable[float],
+    offsets: Offsets,
+    tools: dict[int, ToolEntry] | None,
+    block_delete: bool,
+    interpreter: str,
+    rs274: str | None,
+    controller: Controller,
+) -> Program:
+    """Read a program; one that was posted for another machine in that one's coordinates first, then on the part."""
+    rest = (offsets, tools, block_delete, interpreter, rs274, controller)
+    if controller.kinematics is None or looks_like_cutter_location(lines, name):
+        return _read(lines, name, path, origin, default_origin, *rest)
+    from toolpath_stiff.nc.posted_program import check_rotary_offsets, recovered
+
+    check_rotary_offsets(offsets, controller.kinematics, name)
+    program = _read(lines, name, path, None, ZERO, *rest)
+    place, source = (default_origin, "default") if origin is None else (origin, "option")
+    return recovered(program, controller.kinematics, _six(place), source)
 
 
 def _read(
@@ -211,6 +237,7 @@ def _read_built_in(
     controller: Controller,
 ) -> Program:
     frames = Frames(copy.deepcopy(offsets), None if origin is None else _to_mm(origin), _to_mm(default_origin))
+    frames.posted = controller.kinematics is not None
     interpreter = Interpreter(name, frames, copy.deepcopy(tools), controller.dialect)
     warnings = ProgramRun(interpreter, lines, name, ALL_SWITCHES if block_delete else controller.switches).run()
     if not interpreter.recorder.cuts:

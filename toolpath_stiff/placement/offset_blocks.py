@@ -52,8 +52,7 @@ def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> Of
     Y0 R` turns the G17 plane about program zero (Fanuc's manuals, "Coordinate system rotation"); it goes after G54 and
     G17, and holds until G69. The numbers of G54 are millimetres.
     """
-    reason = NOT_POSTED if program.dialect == CUTTER_LOCATION else ""
-    reason = reason or _not_about_z(program, placement) or _not_g54_alone(program)
+    reason = _not_here(program) or _not_about_z(program, placement) or _not_g54_alone(program)
     if reason:
         return OffsetBlocks("", "", reason, reason)
     x, y, z = (_number(mm_from_m(v), decimals) for v in placement[:3])
@@ -65,6 +64,18 @@ def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> Of
     if not upright:
         return OffsetBlocks(linuxcnc, "", "", f"G68 does not turn arcs of G18 and G19: {USE_WRITE}")
     return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}\nG17 G54 G68 X0 Y0 R{turn}")
+
+
+def _not_here(program: Program) -> str:
+    """Why the program has no G54 of this machine's control, or ""."""
+    if program.dialect == CUTTER_LOCATION:
+        return NOT_POSTED
+    if not program.kinematics:
+        return ""
+    return (
+        f"the program is posted for another kinematics ({program.kinematics}), whose control its G54 belongs to: "
+        "post it for this machine"
+    )
 
 
 def _not_about_z(program: Program, placement: Pose) -> str:

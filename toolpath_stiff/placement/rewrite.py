@@ -119,7 +119,14 @@ def rewrite_program(
 
 
 def check_rewritable(program: Program) -> None:
-    """Raise `InputError` for a file that is no program of a control."""
+    """Raise `InputError` for a file that is no program of a control, or one of another machine's."""
+    if program.kinematics:
+        raise InputError(
+            f"a program posted for another kinematics ({program.kinematics}) is not rewritten: its words are those of "
+            "that machine's axes",
+            hint="place it without --write, set the work so in the CAM system, and post it for this machine",
+            file=program.name,
+        )
     if program.dialect == CUTTER_LOCATION:
         raise InputError(
             "a cutter-location file is not rewritten: it is no program that a control runs",

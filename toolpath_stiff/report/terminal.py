@@ -34,6 +34,7 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
     lines = [
         *_entry("program", summary["program"]),
         *(_entry("read by", READERS[summary["interpreter"]]) if summary["interpreter"] != "builtin" else ()),
+        *(_entry("posted for", f"{summary['kinematics']}, recovered") if summary["kinematics"] else ()),
         *_entry("machine", _machine(summary)),
         *_entry("load", f"{summary['load']}, {summary['force_N']:g} N"),
         *_entry("program zero", _origin(summary)),

@@ -20,6 +20,7 @@ def not_for(controller: Controller, offsets_given: bool, block_delete: bool) -> 
     given = (
         ("a dialect", controller.dialect.name != "generic"),
         ("work offsets", offsets_given),
+        ("posted kinematics", controller.kinematics is not None),
         ("block-delete switches", block_delete or bool(controller.switches)),
     )
     return tuple(f"{what} mean nothing to a cutter-location file and are not used" for what, asked in given if asked)
