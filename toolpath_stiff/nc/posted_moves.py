@@ -269,7 +269,7 @@ def _bend(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> Flo
             turns = (rate != 0.0) | (pose[:, 3 + rotary.column] != 0.0)
             # A head that stands upright may have a tool of unknown length.
             out = np.where(turns[:, None], point - center, 0.0)
-            reach = np.maximum(reach, np.linalg.norm(out, axis=1))
+            reach = np.maximum(reach, np.linalg.norm(np.cross(rotary.direction, out), axis=1))  # from the line
             turned.append(np.where(turns[:, None], center + _turned(out, rotary, pose[:, 3 + rotary.column]), point))
         # No point of the move is farther than half of it from one of its ends.
         reach = reach + (ride_speed if head else speed) / 2.0
@@ -340,7 +340,7 @@ def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, la
     share = (np.where(length > 0.0, length, turn) / moves.feed / count)[move]  # s; nan: a rapid
     way = move_lengths(pieces)
     # Where the tip on the part runs as far as the axes do (tool centre point control, or none turns): as programmed.
-    same = np.isclose(way * count[move], length[move], rtol=1e-9, atol=0.0)
+    same = (way > 0.0) & np.isclose(way * count[move], length[move], rtol=1e-9, atol=0.0)
     way = np.where(way > 0.0, way, _turning(pieces).max(axis=1))
     feed = np.where(same, pieces.feed, way / share)
     kept = way > 0.0
