@@ -98,12 +98,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Analyse one program, or hand several, or a folder, to `batch`."""
     from toolpath_stiff.cli.programs import find_programs
+    from toolpath_stiff.cli.workers import job_count
 
     found, counts = find_programs(args.programs)
+    jobs = job_count(args.jobs, len(found))
     if counts or len(found) > 1:
         from toolpath_stiff.cli.batch import run_batch
 
-        return run_batch(args, found, counts)
+        return run_batch(args, found, counts, jobs)
     return _run_single(args, found[0].file)
 
 

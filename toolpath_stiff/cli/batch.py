@@ -17,7 +17,7 @@ from toolpath_stiff.cli.analyze import BELOW_REQUIRED, Models, analyse_and_write
 from toolpath_stiff.cli.arguments import controller_for
 from toolpath_stiff.cli.programs import RESERVED, FolderCount, Found, Listed, report_folders
 from toolpath_stiff.cli.progress import say
-from toolpath_stiff.cli.workers import answers, job_count, one_thread
+from toolpath_stiff.cli.workers import answers, one_thread
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.report.batch import PAGE_MARK, TABLE_MARK, Outcome, figures_of, summary_csv, terminal_summary
 
@@ -34,15 +34,14 @@ class Setting:
     out: Path
 
 
-def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence[FolderCount]) -> int:
-    """Analyse the programs, write the overview, print; the exit code.
+def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence[FolderCount], jobs: int) -> int:
+    """Analyse the programs, `jobs` at a time, write the overview, print; the exit code.
 
     Raises
     ------
     InputError
         An argument is wrong; nothing has been started then.
     """
-    jobs = job_count(args.jobs, len(found))
     one_thread()
     programs, setting = report_folders(found), Setting(args, Path(args.out or "reports"))
     _check(setting)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -123,6 +124,9 @@ class _Worker(Generic[Item, Answer]):
     def end(self) -> str:
         """How the process ended."""
         self.process.join(LEAVE_SECONDS)
+        if self.process.is_alive():  # it has closed the pipe, and can answer no more
+            self.process.kill()
+            self.process.join()
         code = self.process.exitcode
         if code is not None and code < 0:
             try:
@@ -136,8 +140,9 @@ class _Worker(Generic[Item, Answer]):
 def _stop(busy: Sequence[_Worker[Item, Answer]]) -> None:
     for worker in busy:
         worker.process.terminate()
+    deadline = time.monotonic() + LEAVE_SECONDS
     for worker in busy:
-        worker.process.join(LEAVE_SECONDS)
+        worker.process.join(max(0.0, deadline - time.monotonic()))
         if worker.process.is_alive():
             worker.process.kill()
 
