@@ -57,6 +57,15 @@ def figures(moves: Moves, rapid_feed: float = RAPID_FEED) -> Figures:
     )
 
 
+def figures_of_parts(
+    moves: Moves, of_move: NDArray[np.int64], count: int, rapid_feed: float = RAPID_FEED
+) -> list[Figures]:
+    """The same of moves in `count` parts, each of them in the part that `of_move` (n,) says."""
+    order = np.argsort(of_move, kind="stable")
+    ends = np.searchsorted(of_move[order], np.arange(count + 1))
+    return [figures(moves.take(order[ends[part] : ends[part + 1]]), rapid_feed) for part in range(count)]
+
+
 def extents(moves: Moves) -> Extents:
     """Smallest and largest x, y, z (mm) and a, b, c (degrees) on the way, the bulges of arcs included."""
     if not len(moves):

@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import add_json_option, add_program_options, controller_for, positive_number
@@ -13,7 +14,6 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import m_per_s_from_mm_per_min
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis.program_check import Figures
     from toolpath_stiff.nc.checking import Checked, Finding
 
 EPILOG = """\
@@ -45,13 +45,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strut-speed", type=positive_number("mm/min", 1e6), metavar="MM/MIN", help="largest speed of a strut"
     )
-    add_json_option(parser, "print JSON: used, unsupported, findings, extents_mm, lengths_mm, times_s, modal state")
+    add_json_option(
+        parser,
+        "print JSON: used, unsupported, findings, extents_mm, lengths_mm, times_s, tools, operations, modal state",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Check and print."""
-    from pathlib import Path
-
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.nc.checking import ERROR, check_lines
     from toolpath_stiff.nc.source import read_lines
@@ -66,8 +67,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--strut-speed without a machine", hint="name one with --machine")
     controller = controller_for(args)
     name = Path(args.program).name
+    lines = read_lines(args.program)
     checked = check_lines(
-        read_lines(args.program),
+        lines,
         name,
         origin=args.origin,
         default_origin=machine.default_origin if machine else (0.0,) * 6,
@@ -78,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
         "program": name,
         "dialect": checked.dialect or controller.label,
         "kinematics": controller.kinematics.label if controller.kinematics and not checked.dialect else "",
-        **_document(args, checked, machine),
+        **_document(args, checked, lines, machine),
     }
     if args.json:
         json.dump(document, sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
@@ -88,15 +90,18 @@ def run(args: argparse.Namespace) -> int:
     return 1 if any(finding["severity"] == ERROR for finding in document["findings"]) else 0
 
 
-def _document(args: argparse.Namespace, checked: Checked, machine: Any) -> dict[str, Any]:
+def _document(args: argparse.Namespace, checked: Checked, lines: tuple[str, ...], machine: Any) -> dict[str, Any]:
     """What `--json` prints."""
+    from toolpath_stiff.analysis.check_parts import check_parts, figure_rows
     from toolpath_stiff.analysis.program_check import Figures, figures, machine_findings, radii_findings
 
     findings: list[Finding] = list(checked.findings)
     found = Figures({}, {}, {}, {})
     speed: dict[str, float] = {}
+    rapid_feed = [machine.rapid_feed] if machine else []
+    tools, operations = check_parts(checked, lines, Path(args.program).name, *rapid_feed)
     if checked.moves is not None:
-        found = figures(checked.moves, *([machine.rapid_feed] if machine else []))
+        found = figures(checked.moves, *rapid_feed)
         findings += radii_findings(checked.moves)
         if machine is not None:
             limit = None if args.strut_speed is None else m_per_s_from_mm_per_min(args.strut_speed)
@@ -108,25 +113,19 @@ def _document(args: argparse.Namespace, checked: Checked, machine: Any) -> dict[
         "used": [asdict(code) for code in checked.used],
         "unsupported": [asdict(word) for word in checked.unsupported],
         "findings": [asdict(finding) for finding in findings],
-        **_figures(found),
+        **figure_rows(found),
+        "tools": tools,
+        "operations": operations,
         "fastest_strut": speed,
         "modal_start": checked.start,
         "modal_end": checked.end,
     }
 
 
-def _figures(found: Figures) -> dict[str, Any]:
-    return {
-        "extents_mm": {axis: found.cutting_extents[axis] for axis in "xyz" if found.cutting_extents},
-        "extents_deg": {axis: found.cutting_extents[axis] for axis in "abc" if found.cutting_extents},
-        "extents_with_rapids_mm": {axis: found.all_extents[axis] for axis in "xyz" if found.all_extents},
-        "lengths_mm": found.lengths,
-        "times_s": found.times,
-    }
-
-
 def _text(document: dict[str, Any]) -> str:
     """The same for people."""
+    from toolpath_stiff.report.check_text import check_tables
+
     posted = f", posted for {document['kinematics']}" if document["kinematics"] else ""
     lines = [f"{document['program']}, read as {document['dialect']}{posted}"]
     if not document["complete"]:
@@ -155,6 +154,8 @@ def _text(document: dict[str, Any]) -> str:
     if document["fastest_strut"]:
         speed = document["fastest_strut"]
         lines.append(f"  fastest strut in a cut: {speed['mm_per_min']:.0f} mm/min, line {speed['line']}")
+    tables = check_tables(document["tools"], document["operations"])
+    lines += ["\nextents of cuts in mm, by tool and operation:", *(f"  {line}" for line in tables)] if tables else []
     lines.append("\nmodal state at the start, at the end:")
     for key, value in document["modal_start"].items():
         lines.append(f"  {key:<18} {value:<10} {document['modal_end'][key]}")

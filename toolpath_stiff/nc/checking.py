@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes import code_meaning, would_change
@@ -87,6 +87,10 @@ class Checked:
         Whether the whole program was read.
     dialect
         What the file was taken for, where that is not the control's dialect.
+    remarks
+        What the tool table says of the tools that were used, by number.
+    marks
+        Where operations begin, as in `Program`.
     """
 
     used: tuple[UsedCode, ...]
@@ -98,6 +102,8 @@ class Checked:
     origin: Pose
     complete: bool
     dialect: str = ""
+    remarks: dict[int, str] = field(default_factory=dict)
+    marks: tuple[tuple[int, str], ...] | None = None
 
 
 class _CheckingRun(ProgramRun):
@@ -201,6 +207,7 @@ def check_lines(
         moves=moves,
         origin=(m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c)),
         complete=not errors,
+        remarks={tool.number: tool.remark for tool in interpreter.used_tools.values()},
     )
 
 
@@ -252,6 +259,7 @@ def _check_cutter_location(
         origin=(x, y, z, a, b, c),
         complete=not reading.errors,
         dialect=CUTTER_LOCATION,
+        marks=tuple(reading.marks),
     )
 
 

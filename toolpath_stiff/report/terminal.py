@@ -74,7 +74,7 @@ def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> st
     rows.append(["extrapolated", *(f"{s['extrapolated_share']:.1%}" for s in (summary, other)), ""])
     if any(s["out_of_reach_samples"] for s in (summary, other)):
         rows.append(["out of reach", *(number(s["out_of_reach_samples"]) for s in (summary, other)), ""])
-    return "\n".join(_columns(rows))
+    return "\n".join(aligned(rows))
 
 
 def _entry(label: str, text: str) -> list[str]:
@@ -156,7 +156,7 @@ def _tools(per_tool: Sequence[Mapping[str, Any]]) -> list[str]:
                 shortened(plain(row["remark"]), 30),
             ]
         )
-    return _columns(rows, left_last=True)
+    return aligned(rows, left_last=True)
 
 
 def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -175,14 +175,17 @@ def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
                 str(row["weakest"]["line"]) if row["weakest"] else "-",
             ]
         )
-    room = WIDTH - sum(2 + max(len(row[i]) for row in rows) for i in range(1, len(rows[0])))
-    for named in rows:
-        named[0] = shortened(named[0], max(room, LEAST_NAME))
     more = len(per_operation) - len(shown)
-    return _columns(rows) + ([f"and {more} more operations in summary.json"] if more else [])
+    return aligned(first_column_fitted(rows)) + ([f"and {more} more operations in summary.json"] if more else [])
 
 
-def _columns(rows: list[list[str]], left_last: bool = False) -> list[str]:
+def first_column_fitted(rows: list[list[str]], indent: int = 0) -> list[list[str]]:
+    """The same with the first column cut to what the others and `indent` leave, but not below `LEAST_NAME`."""
+    room = WIDTH - indent - sum(2 + max(len(row[i]) for row in rows) for i in range(1, len(rows[0])))
+    return [[shortened(row[0], max(room, LEAST_NAME)), *row[1:]] for row in rows]
+
+
+def aligned(rows: list[list[str]], left_last: bool = False) -> list[str]:
     """Align: the first column (and the last, if asked) to the left, the others to the right."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     widths[0] = max(widths[0], LABEL)
