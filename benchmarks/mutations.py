@@ -1,7 +1,8 @@
 """`python -m benchmarks.mutations`: the built-in reader on programs with bytes dropped, doubled and swapped.
 
 Each mutated program must either be read or be refused with its line: no traceback, no hang, no growth of memory. Exit
-code 1 if one is not. Mutated are openings of the programs in `programs/`, read in every dialect, seeded.
+code 1 if one is not. Mutated are openings of the programs in `programs/`, cutter-location files among them, read in
+every dialect, seeded.
 """
 
 from __future__ import annotations
@@ -43,12 +44,14 @@ def _alarm(number: int, frame: FrameType | None) -> None:
     raise Hang
 
 
-def openings() -> list[bytes]:
-    """A short and a longer opening of every program."""
+def openings() -> list[tuple[str, bytes]]:
+    """A short and a longer opening of every program, each with a name of its kind."""
     found = []
-    for path in sorted(PROGRAMS.glob("*.nc")):
+    for path in sorted([*PROGRAMS.glob("*.nc"), *PROGRAMS.glob("*.apt")]):
         lines = path.read_bytes().splitlines(keepends=True)
-        found += [b"".join(lines[:count]) for count in LINES]
+        # Circles and cycles come late in a cutter-location file.
+        pieces = [lines[:count] for count in LINES] if path.suffix == ".nc" else [lines[:30], lines[-45:], lines]
+        found += [(f"part{path.suffix}", b"".join(piece)) for piece in pieces]
     return found
 
 
@@ -68,11 +71,11 @@ def mutated(opening: bytes, chance: random.Random) -> bytes:
     return bytes(content)
 
 
-def outcome(content: bytes, dialect: str) -> str:
+def outcome(name: str, content: bytes, dialect: str) -> str:
     """`read`, `refused`, or what went wrong."""
     signal.alarm(PATIENCE)
     try:
-        parse_program(content.decode("latin-1"), "part.nc", controller=Controller(DIALECTS[dialect], tools=TOOLS))
+        parse_program(content.decode("latin-1"), name, controller=Controller(DIALECTS[dialect], tools=TOOLS))
     except InputError as error:
         whole = error.line is not None or any(words in str(error) for words in OF_THE_WHOLE)
         return "refused" if whole else f"no line: {error}"
@@ -102,9 +105,10 @@ def main() -> int:
     counts: Counter[str] = Counter()
     wrong, slowest, settled = [], 0.0, 0.0
     for number in range(args.n):
-        content, dialect = mutated(chance.choice(originals), chance), dialects[number % len(dialects)]
+        name, opening = chance.choice(originals)
+        content, dialect = mutated(opening, chance), dialects[number % len(dialects)]
         begin = time.process_time()
-        found = outcome(content, dialect)
+        found = outcome(name, content, dialect)
         slowest = max(slowest, time.process_time() - begin)
         counts[found.split(":")[0]] += 1
         if found not in ("read", "refused"):

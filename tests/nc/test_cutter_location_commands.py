@@ -15,6 +15,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.cutter_location import reading
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.dialects import DIALECTS
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
@@ -40,6 +41,16 @@ def test_sample_has_the_lengths_of_its_geometry():
     np.testing.assert_allclose(lean, 12, atol=1e-3)
     assert not program.warnings and [tool.number for tool in program.tools] == [8, 9, 10]
     np.testing.assert_allclose([tool.length for tool in program.tools], [0.12, 0.095, 0.13])
+
+
+def test_long_files_give_the_same_moves(monkeypatch):
+    """Moves are packed now and then; pauses, tools and arcs go on over that."""
+    text = SAMPLE.read_text().replace("RAPID\n", "DELAY/1\nRAPID\n")
+    whole = parse_program(text, "part.apt").moves
+    monkeypatch.setattr(reading, "PACKED_AT", 1)
+    packed = parse_program(text, "part.apt").moves
+    for column in vars(whole):
+        np.testing.assert_array_equal(getattr(packed, column), getattr(whole, column))
 
 
 def test_operations_are_those_of_the_file():

@@ -102,10 +102,14 @@ class Recorder:
         """Add moves at once, each of some length."""
         if not len(moves):
             return
-        if self.line:
-            self.parts.append(self._close())
+        self.pack()
         self.parts.append(moves)
         self.cuts = self.cuts or bool((moves.motion != RAPID).any())
+
+    def pack(self) -> None:
+        """The lists to arrays, which take a fifth of their memory."""
+        if self.line:
+            self.parts.append(self._close())
 
     def add_dwell(self, seconds: float) -> None:
         """A pause after the last move; before the first move nothing waits."""

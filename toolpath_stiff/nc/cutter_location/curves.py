@@ -6,7 +6,6 @@ import math
 
 from toolpath_stiff.nc.cutter_location import circles
 from toolpath_stiff.nc.cutter_location.circles import Circle
-from toolpath_stiff.nc.cutter_location.cycles import Cycle
 from toolpath_stiff.nc.cutter_location.modes import Modes
 from toolpath_stiff.nc.cutter_location.statements import Nested, Statement, nested, number_of
 from toolpath_stiff.nc.cutter_location.tilting import AxisError, Vector, unit_axis
@@ -23,7 +22,6 @@ class Curves(Modes):
         super().__init__(name, tools)
         self.followed: Circle | None = None  # whose arc the last GOTO made
         self.direction: Vector | None = None  # of INDIRV
-        self.cycle: Cycle | None = None
         self._swept = 0.0  # rad, along the circle
 
     def _circle(self, statement: Statement) -> None:

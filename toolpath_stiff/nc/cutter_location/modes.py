@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location import vocabulary
 from toolpath_stiff.nc.cutter_location.circles import Circle
+from toolpath_stiff.nc.cutter_location.cycles import Cycle
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number, number_of
 from toolpath_stiff.nc.cutter_location.tilting import VERTICAL, Vector, unit_axis
 from toolpath_stiff.nc.cutter_location.tool_path import ToolPath
@@ -55,6 +56,7 @@ class Modes(ToolPath):
         self.multax: bool | None = None
         self.next_axis: Vector = VERTICAL  # of a point that gives none
         self.axis_said = True  # false where MULTAX/OFF leaves open how the tool stands
+        self.cycle: Cycle | None = None
         self.circle: Circle | None = None  # waits for its GOTO
         self.circle_line = 0
         self.rapid = 0  # line of the RAPID that waits for its motion
@@ -110,6 +112,8 @@ class Modes(ToolPath):
             raise self.fail(statement.shown, "RAPID alone")
         if self.circle is not None:
             raise self.fail("RAPID before the GOTO of a circle", "an arc at a feed")
+        if self.cycle is not None:
+            raise self.fail("RAPID within a drilling cycle: is the next point a hole?", "CYCLE/OFF before it")
         self.rapid = statement.line
 
     def _no_circle(self, what: str) -> None:
@@ -184,10 +188,16 @@ class Modes(ToolPath):
 
     def _cutcom(self, statement: Statement) -> None:
         words = self._words(statement)
-        if any(word in ("ON", "LEFT", "RIGHT") for word in words):
+        if words != ["OFF"]:
             found, hint = vocabulary.COMPENSATION
             raise self.fail(f"{statement.shown} {found}, which is not supported", "", hint)
         self._note(self.noted, statement, "cutter compensation is off")
+
+    def _mode(self, statement: Statement) -> None:
+        if self._words(statement) != ["MILL"]:
+            found, hint = vocabulary.TURNING
+            raise self.fail(f"{statement.shown} {found}", "MODE/MILL", hint)
+        self._note(self.noted, statement, "milling")
 
     def _shift(self, statement: Statement) -> None:
         if statement.arguments and all(is_number(word) for word in self._words(statement)):

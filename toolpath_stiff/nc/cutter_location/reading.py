@@ -13,6 +13,7 @@ from toolpath_stiff.nc.cutter_location.cycles import Cycle, read_cycle
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS, NO_UNITS
 from toolpath_stiff.nc.cutter_location.statements import (
     Statement,
+    is_number,
     number_of,
     plain_point,
     read_statement,
@@ -25,6 +26,7 @@ from toolpath_stiff.nc.tables import ToolEntry
 # CATIA's heading of an operation, a comment; NX and Autodesk's posts have TOOL PATH/ and CSI_TOOL_PATH/.
 OPERATION = re.compile(r"\s*\$\$\s*OPERATION NAME\s*:\s*(.*\S)", re.IGNORECASE)
 HEADINGS = ("TOOL PATH", "CSI_TOOL_PATH")
+PACKED_AT = 50_000  # moves
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
 
 
@@ -59,6 +61,7 @@ class CutterLocation(Curves):
             "DWELL": self._delay,
             "CYCLE": self._cycle_word,
             "CUTCOM": self._cutcom,
+            "MODE": self._mode,
             "TRANS": self._shift,
             "ORIGIN": self._shift,
             "MSYS": self._frame_word,
@@ -73,6 +76,8 @@ class CutterLocation(Curves):
         at = 0
         while at < len(lines) and not self.ended:
             here = at
+            if len(self.recorder.line) > PACKED_AT:
+                self.recorder.pack()
             try:
                 numbers = plain_point(lines[at])
                 if numbers is not None:
@@ -159,8 +164,18 @@ class CutterLocation(Curves):
             self._note(self.doubtful, statement, vocabulary.DOUBTFUL[word])
         elif LIKE_G_CODE.match(word) or (not statement.arguments and " " in word):
             raise self.fail(f"{statement.shown!r} is no statement of a cutter-location file", "a word of APT's")
+        elif word.startswith(vocabulary.LIKE_MOTION) or self._carries_point(statement):
+            raise self.fail(
+                f"{statement.shown}: {word} {vocabulary.UNKNOWN}, and may move the tool",
+                vocabulary.GEOMETRY,
+                "take the line out if it does not",
+            )
         else:
             self._note(self.doubtful, statement, f"{word} {vocabulary.UNKNOWN}, and not acted upon")
+
+    def _carries_point(self, statement: Statement) -> bool:
+        numbers = sum(is_number(argument.text) for argument in statement.arguments)
+        return numbers == len(statement.arguments) >= vocabulary.NUMBERS_OF_A_POINT
 
     # -- points ------------------------------------------------------------------------------------------------------
 

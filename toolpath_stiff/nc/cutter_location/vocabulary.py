@@ -30,6 +30,7 @@ ACTED_UPON = {
     "DELAY": "pause",
     "DWELL": "pause",
     "CYCLE": "drilling cycle",
+    "MODE": "milling, not turning",
     "FINI": "end of the file",
     "": "further points of the GOTO before it",
 }
@@ -44,22 +45,8 @@ _FRAME = "where the points' coordinate system lies in the part; the points are t
 
 # Harmless: listed as not acted upon.
 HARMLESS = {
-    **dict.fromkeys(
-        (
-            "PARTNO",
-            "PPRINT",
-            "REMARK",
-            "TITLES",
-            "TITLE",
-            "TPRINT",
-            "MFGNO",
-            "TOOL PATH",
-            "END-OF-PATH",
-            "MODE",
-            "LETTER",
-        ),
-        _HEADING,
-    ),
+    **dict.fromkeys(("PARTNO", "PPRINT", "REMARK", "TITLES", "TITLE", "TPRINT", "MFGNO", "LETTER"), _HEADING),
+    **dict.fromkeys(("TOOL PATH", "CSI_TOOL_PATH", "END-OF-PATH"), _HEADING),
     **dict.fromkeys(("INTOL", "OUTTOL", "OUTOL", "TOLER", "LINTOL", "MAXDP", "NUMPTS", "THICK", "MCHTOL"), _TOLERANCE),
     **dict.fromkeys(("STOP", "OPSTOP", "END", "BREAK"), _STOP),
     **dict.fromkeys(("PAINT", "DISPLY", "PLOT", "VERIFY", "CLPRNT"), _DRAWING),
@@ -95,6 +82,7 @@ REFUSED = {
     "POLYNO": ("is a polynomial", "have the CAM system write points"),
 }
 SHIFTS = {"TRANS": _SHIFT, "ORIGIN": _SHIFT}  # refused unless they are zero
+TURNING = ("is not milling", "this is a mill")
 COMPENSATION = ("is cutter compensation", "have the CAM system write the path of the tool centre")
 
 # Read, not acted upon, and a warning: what they do hangs on the machine.
@@ -106,6 +94,9 @@ DOUBTFUL = {
     "OPSKIP": "statements that the operator may leave out: they are read",
 }
 UNKNOWN = "is not known"
+# An unknown word that begins like one of a motion or a feed, or that carries a point, is not passed over.
+LIKE_MOTION = ("GO", "RAP", "FED", "CIR", "ARC", "MOV", "HEL", "CYC", "TLA", "TLO", "TLL", "TLR", "UNI", "MUL", "FRO")
+NUMBERS_OF_A_POINT = 3
 
 
 def meaning(word: str) -> str:
