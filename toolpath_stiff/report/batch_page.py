@@ -25,7 +25,7 @@ OTHER_MEAN, CHANGE = "mean on the other machine, N/mm", "how much higher the mea
 
 HOW_TO_READ = (
     "Each bar runs from the lowest to the highest stiffness along the load on the cutting moves, all on one scale. "
-    "A click on a heading sorts, a second one the other way round, a third gives the order of the command line back."
+    "Click a heading to sort, again to reverse, once more for the order given."
 )
 
 
@@ -196,7 +196,9 @@ def _table(good: Sequence[Outcome]) -> str:
     key = _key(scale)
     body = (
         f'<p class="muted">{escaped(HOW_TO_READ)}</p><p class="muted">{key}</p>'
-        f'<table id="programs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+        # A box that scrolls by itself keeps the headings in sight; with a tabindex the keyboard can scroll it.
+        '<div class="scroll" role="region" aria-label="Table of programs" tabindex="0">'
+        f'<table id="programs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
     )
     return section("Stiffness of each program", body)
 
