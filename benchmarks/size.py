@@ -1,0 +1,237 @@
+"""`python -m benchmarks.size`: programs of up to a million lines: reading, analysing, writing; CPU time and memory.
+
+One core. Rounds interleave what is compared, each ratio is taken within its round, the medians are printed. Bars: at
+least 12 times pygcode's own parse-and-process throughput on 200,000 lines; `tps analyze` of a million lines within 30 s
+of CPU and 1.5 GB with all its files (two samples a move: one at each end); a line of a million as cheap as one of
+10,000 (within 1.5); CSV and Parquet at the speed of the columnar library's own writers (0.8 of it, or more).
+"""
+
+from __future__ import annotations
+
+import os
+
+for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[variable] = "1"
+
+# ruff: noqa: E402 - the thread limits above must come first
+import argparse
+import io
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from benchmarks.__main__ import describe_machine
+from benchmarks.size_programs import KINDS, program
+from toolpath_stiff.nc import parse_program
+
+FASTER, FLAT, CPU_SECONDS, GIGABYTES, COLUMNAR = 12.0, 1.5, 30.0, 1.5, 0.8
+LENGTHS = (10_000, 30_000, 100_000, 300_000, 1_000_000)
+
+
+@dataclass
+class Report:
+    """Lines of the table, and whether all bars are cleared."""
+
+    lines: list[str] = field(default_factory=list)
+    passed: bool = True
+
+    def add(self, *lines: str) -> None:
+        """Add lines, and print them."""
+        self.lines += lines
+        print("\n".join(lines), flush=True)
+
+    def bar(self, cleared: bool, text: str) -> str:
+        """The text of a bar, marked if it is not cleared."""
+        self.passed &= cleared
+        return text if cleared else f"{text}: NOT CLEARED"
+
+
+def cpu(work: Callable[[], object]) -> float:
+    """CPU seconds of a call."""
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
+def pygcode_alone(text: str) -> None:
+    """What a script around pygcode does: every line through `Line`, every block through `Machine`."""
+    from pygcode import Line, Machine
+
+    machine = Machine()
+    for line in text.splitlines():
+        if line != "%":
+            machine.process_block(Line(line).block)
+
+
+def reading(report: Report, lines: int, rounds: int) -> None:
+    """Throughput against pygcode's own."""
+    report.add(
+        f"## Reading, {lines:,} lines",
+        "",
+        "| program | pygcode's Line and Machine, lines/s | one by one, lines/s | tps, lines/s | tps / pygcode | bar |",
+        "| --- | ---: | ---: | ---: | ---: | --- |",
+    )
+    for kind in KINDS:
+        text = program(kind, lines)
+        slow = program(kind, lines // 10)
+        ours, theirs, single, ratios = [], [], [], []
+        parse_program(text)
+        for _ in range(rounds):
+            theirs.append(lines / cpu(lambda text=text: pygcode_alone(text)))
+            ours.append(lines / cpu(lambda text=text: parse_program(text)))
+            single.append(lines // 10 / cpu(lambda slow=slow: one_by_one(slow)))
+            ratios.append(ours[-1] / theirs[-1])
+        ratio = statistics.median(ratios)
+        bar = report.bar(ratio >= FASTER, f"{FASTER:g} or more")
+        figures = " | ".join(f"{statistics.median(rates):,.0f}" for rates in (theirs, single, ours))
+        report.add(f"| {kind} | {figures} | {ratio:.1f} | {bar} |")
+
+
+def one_by_one(text: str) -> None:
+    """Our reader without its fast way."""
+    from toolpath_stiff.nc.frames import Frames
+    from toolpath_stiff.nc.interpreter import Interpreter
+    from toolpath_stiff.nc.reader import ZERO
+    from toolpath_stiff.nc.source import split_lines
+    from toolpath_stiff.nc.subprograms import ProgramRun
+    from toolpath_stiff.nc.tables import Offsets
+
+    interpreter = Interpreter("p", Frames(Offsets(), None, ZERO), None)
+    ProgramRun(interpreter, split_lines(text, "p"), "p", frozenset(), fast=False).run()
+    interpreter.recorder.moves()
+
+
+def lengths(report: Report, longest: int, rounds: int) -> None:
+    """Cost of a line in programs of growing length."""
+    sizes = [n for n in LENGTHS if n <= longest]
+    names = " | ".join(f"{n:,} lines" for n in sizes)
+    report.add(
+        "",
+        "## Cost of a line, microseconds of CPU",
+        "",
+        f"| program | {names} | dearest / cheapest | bar |",
+        f"| --- |{' ---: |' * len(sizes)} ---: | --- |",
+    )
+    for kind in KINDS:
+        texts = [program(kind, n) for n in sizes]
+        rows = [
+            [1e6 * cpu(lambda t=t: parse_program(t)) / n for t, n in zip(texts, sizes, strict=True)]
+            for _ in range(rounds)
+        ]
+        costs = [statistics.median(column) for column in zip(*rows, strict=True)]
+        ratio = max(costs) / min(costs)
+        bar = report.bar(ratio <= FLAT, f"{FLAT:g} or less")
+        report.add(f"| {kind} | {' | '.join(f'{c:.2f}' for c in costs)} | {ratio:.2f} | {bar} |")
+
+
+def analysing(report: Report, lines: int, folder: Path) -> None:
+    """Whole commands in processes of their own."""
+    report.add(
+        "",
+        f"## `tps analyze` of {lines:,} lines, all files, pictures and page included",
+        "",
+        "| program | samples as | CPU s | peak memory, GB | bar |",
+        "| --- | --- | ---: | ---: | --- |",
+    )
+    for kind in KINDS:
+        file = folder / f"{kind}.nc"
+        file.write_text(program(kind, lines), encoding="ascii")
+        for table in ("csv", "parquet"):
+            seconds, gigabytes = whole_command(
+                ["analyze", str(file), "--origin", "0,0,800", "--format", table, "--out", str(folder / "report")]
+            )
+            bar = report.bar(
+                seconds <= CPU_SECONDS and gigabytes <= GIGABYTES, f"{CPU_SECONDS:g} s, {GIGABYTES:g} GB or less"
+            )
+            report.add(f"| {kind} | {table} | {seconds:.1f} | {gigabytes:.2f} | {bar} |")
+
+
+def whole_command(arguments: list[str]) -> tuple[float, float]:
+    """CPU seconds and peak memory (GB) of a `tps` command."""
+    child = subprocess.Popen([sys.executable, "-m", "toolpath_stiff", *arguments], stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode:
+        raise SystemExit(f"tps {' '.join(arguments)} ended with {child.returncode}")
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024 / 1e9
+
+
+def writing(report: Report, lines: int, rounds: int) -> None:
+    """Our tables against pyarrow's and pandas' own writers, from the same analysis to bytes in memory."""
+    import pyarrow as pa
+    import pyarrow.csv as pc
+    import pyarrow.parquet as pq
+
+    from toolpath_stiff.analysis import analyse
+    from toolpath_stiff.analysis.tables import sample_columns, samples_csv, samples_frame, samples_parquet
+    from toolpath_stiff.machine import load_machine
+
+    analysis = analyse(load_machine("nist"), parse_program(program("5-axis", lines)), origin=(0, 0, 0.8, 0, 0, 0))
+    rows = len(analysis.samples)
+
+    def table() -> pa.Table:
+        return pa.table({name: pa.array(values) for name, values in sample_columns(analysis).items()})
+
+    ways: dict[str, Callable[[], object]] = {
+        "tps csv": lambda: sum(map(len, samples_csv(analysis))),
+        "pyarrow csv": lambda: pc.write_csv(table(), io.BytesIO()),
+        "pandas csv": lambda: samples_frame(analysis).iloc[: rows // 10].to_csv(float_format="%.6f"),
+        "tps parquet": lambda: sum(map(len, samples_parquet(analysis))),
+        "pyarrow parquet": lambda: pq.write_table(table(), io.BytesIO()),
+    }
+    share = {"pandas csv": 10}  # a tenth of the rows is enough of it
+    for work in ways.values():  # what they load is not their speed
+        work()
+    taken: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(rounds):
+        for name, work in ways.items():
+            taken[name].append(share.get(name, 1) * cpu(work))
+    report.add(
+        "",
+        f"## Writing {rows:,} samples",
+        "",
+        "| format | tps, rows/s | pyarrow, rows/s | pandas, rows/s | tps / pyarrow | bar |",
+        "| --- | ---: | ---: | ---: | ---: | --- |",
+    )
+    for form in ("csv", "parquet"):
+        pairs = zip(taken[f"tps {form}"], taken[f"pyarrow {form}"], strict=True)
+        ratio = statistics.median(theirs / ours for ours, theirs in pairs)
+        rates = [
+            f"{rows / statistics.median(taken[name]):,.0f}" if name in taken else ""
+            for name in (f"tps {form}", f"pyarrow {form}", f"pandas {form}")
+        ]
+        bar = report.bar(ratio >= COLUMNAR, f"{COLUMNAR:g} or more")
+        report.add(f"| {form} | {' | '.join(rates)} | {ratio:.2f} | {bar} |")
+
+
+def main() -> int:
+    """Measure and print; `--out FILE` also writes the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.size", description=__doc__)
+    parser.add_argument("--lines", type=int, default=200_000, help="lines of the programs read (default: 200000)")
+    parser.add_argument("--longest", type=int, default=1_000_000, help="lines of the longest (default: 1000000)")
+    parser.add_argument("--rounds", type=int, default=3, help="interleaved rounds (default: 3)")
+    parser.add_argument("--out", help="write the table to this file as well")
+    args = parser.parse_args()
+    report = Report()
+    report.add("# Size", "", describe_machine(), "")
+    reading(report, args.lines, args.rounds)
+    lengths(report, args.longest, args.rounds)
+    with tempfile.TemporaryDirectory() as folder:
+        analysing(report, args.longest, Path(folder))
+    writing(report, args.lines, args.rounds)
+    report.add("", "A bar that is not cleared is marked; the exit code is then 1.")
+    if args.out:
+        text = "\n".join(report.lines)
+        Path(args.out).write_text(
+            f"{text}\n\nMade by `python -m benchmarks.size --out {args.out}`.\n", encoding="utf-8"
+        )
+    return 0 if report.passed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
