@@ -125,11 +125,7 @@ def test_classes_cover_the_scale_in_order():
     assert classes[-1] == CLASSES - 1
     assert (np.diff(classes) >= 0).all()
     assert len(np.unique(classes)) == CLASSES
-    assert segment_classes(np.array([1.0, np.nan, 99.0, 99.0]), (10.0, 20.0)).tolist() == [
-        UNREACHABLE,
-        UNREACHABLE,
-        CLASSES - 1,
-    ]
+    assert segment_classes(np.array([1.0, np.nan, 99.0]), (10.0, 20.0)).tolist() == [0, UNREACHABLE, CLASSES - 1]
 
 
 @settings(max_examples=60, deadline=None)

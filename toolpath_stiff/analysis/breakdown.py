@@ -57,7 +57,7 @@ def per_tool(analysis: Analysis) -> list[dict[str, Any]]:
 
     Rapids with a length that the tool never cuts with (before G43) count with the first that it does.
     """
-    moves = analysis.moves
+    moves = analysis.program.moves
     remarks = {tool.number: tool.remark for tool in analysis.program.tools}
     tools, tool = np.unique(moves.tool, return_inverse=True)
     lengths, length = np.unique(moves.tool_length, return_inverse=True)  # nan, the reference tool's, is one of them
@@ -89,7 +89,7 @@ class _Parts:
 
     def __init__(self, analysis: Analysis, of_move: IntArray, count: int) -> None:
         self.analysis = analysis
-        samples, moves = analysis.samples, analysis.moves
+        samples, moves = analysis.samples, analysis.program.moves
         first = np.searchsorted(samples.move, np.arange(len(moves)))
         last = np.append(first[1:], len(samples)) - 1
         length, cutting = samples.s[last] - samples.s[first], moves.motion != RAPID

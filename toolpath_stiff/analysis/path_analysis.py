@@ -43,7 +43,7 @@ class Analysis:
         Where program zero sits (m, rad) and who said so: "option", "program" or "default".
     load, force, step
         Direction of the load; its size in N; distance of the samples in m.
-    moves, samples
+    samples
         The path in machine coordinates.
     at
         Stiffness, struts, reach at every sample.
@@ -58,10 +58,14 @@ class Analysis:
     load: Load
     force: float
     step: float
-    moves: Moves
     samples: Samples
     at: PoseStiffness
     warnings: tuple[str, ...]
+
+    @property
+    def moves(self) -> Moves:
+        """The moves in machine coordinates; made anew each time, for a long program is a fifth of all memory."""
+        return place(self.program.moves, self.origin)
 
     @property
     def machine(self) -> Machine:
@@ -173,7 +177,6 @@ def analyse(
         load=direction,
         force=force,
         step=step,
-        moves=moves,
         samples=samples,
         at=at,
         warnings=(*program.warnings, *instruments_set_aside(model), *_warnings(samples, at)),

@@ -48,10 +48,9 @@ def path_picture(analysis: Analysis) -> bytes:
     with house_style():
         from matplotlib import colormaps
 
-        points = mm_from_m(analysis.samples.position)
-        limits = scale_limits(analysis)
-        lines = _coloured_lines(analysis, points, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)))
-        middle, span = _frame(points[analysis.samples.cutting])
+        samples, limits = analysis.samples, scale_limits(analysis)
+        lines = _coloured_lines(analysis, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)))
+        middle, span = _frame(mm_from_m(samples.position[samples.cutting]))
         figure, views, corner = _lay_out(span)
         places = weakest_places(analysis)
         for axes, (across, up, title) in zip(
@@ -60,22 +59,23 @@ def path_picture(analysis: Analysis) -> bytes:
             _set_up(axes, across, up, title, middle, span)
             for xyz, style in lines:
                 axes.plot(xyz[:, across], xyz[:, up], **style)
-            spots = [(float(points[row, across]), float(points[row, up])) for row in places]
-            label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places])
+            spots = [(float(x), float(y)) for x, y in mm_from_m(samples.position[places][:, [across, up]])]
+            label_places(axes, spots, [f"line {samples.line[row]}" for row in places])
         add_heading(figure, analysis)
         _legend(figure, corner, analysis, limits)
         return png_bytes(figure)
 
 
 def _coloured_lines(
-    analysis: Analysis, points: FloatArray, limits: tuple[float, float], colours: FloatArray
+    analysis: Analysis, limits: tuple[float, float], colours: FloatArray
 ) -> list[tuple[FloatArray, dict[str, Any]]]:
     """Points and style of one line for each class of segments, in drawing order."""
     # A corner is two samples at one point: one of them is enough, and the line through it stays one line.
-    moved = (points[1:] != points[:-1]).any(axis=1)
-    points = points[np.concatenate([[True], moved])]
-    rapid = ~analysis.samples.cutting[1:][moved]
-    classes = segment_classes(n_per_mm_from_n_per_m(analysis.at.stiffness), limits)[moved]
+    samples, stiffness = analysis.samples, analysis.at.stiffness
+    moved = np.flatnonzero((samples.position[1:] != samples.position[:-1]).any(axis=1))
+    points = mm_from_m(samples.position[np.append(moved, moved[-1] + 1 if len(moved) else 0)])
+    rapid = ~samples.cutting[moved + 1]
+    classes = segment_classes(n_per_mm_from_n_per_m(0.5 * (stiffness[moved] + stiffness[moved + 1])), limits)
     if len(points) > MOST_POINTS:
         points, rapid, classes = _merged(points, rapid, classes)
     found: list[tuple[FloatArray, dict[str, Any]]] = []

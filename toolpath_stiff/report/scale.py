@@ -51,14 +51,13 @@ def _scaled_samples(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
 
 
 def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntArray:
-    """(n - 1,) class 0 to CLASSES - 1 of the segments between n samples, from the mean of their ends.
+    """(n,) class 0 to CLASSES - 1 of segments of the path.
 
-    `stiffness` and `limits` in N/mm; values beyond the limits take the end classes; UNREACHABLE where an end is nan.
+    `stiffness` and `limits` in N/mm; values beyond the limits take the end classes; UNREACHABLE where there is none.
     """
     low, high = limits
-    mean = 0.5 * (stiffness[1:] + stiffness[:-1])
-    missing = np.isnan(mean)
-    part = (np.where(missing, low, mean) - low) / (high - low)
+    missing = np.isnan(stiffness)
+    part = (np.where(missing, low, stiffness) - low) / (high - low)
     classes = np.clip((part * CLASSES).astype(np.int64), 0, CLASSES - 1)
     return np.where(missing, UNREACHABLE, classes)
 
