@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 AVAILABLE = shutil.which("rs274") is not None
-CALL = re.compile(r"^\s*\d+\s+N\S+\s+(\w+)\((.*)\)\s*$")
+CALL = re.compile(r"^\s*\d+\s+N\S*\s+(\w+)\((.*)\)\s*$")
 # Comments that make LinuxCNC run Python, and user M codes that it runs as programs: never given to it.
 UNSAFE = re.compile(r";\s*py|\(\s*py|M1\d\d\b", re.IGNORECASE)
 

@@ -38,7 +38,7 @@ class Coordinates(BlockReader):
     polar
         The last programmed radius (mm) and angle (degrees), nan before there is one; None: Cartesian words (G15).
     unsettled
-        "G68" or "G69", whichever changed the numbers of the present X and Y last, until both are programmed anew.
+        "G68", "G69" or "G10", whichever turned the numbers of the present X and Y last, until both are programmed.
     """
 
     def __init__(self, name: str, frames: Frames, dialect: Dialect = GENERIC) -> None:
@@ -227,6 +227,13 @@ class Coordinates(BlockReader):
     def _settle(self, words: dict[int, float]) -> None:
         """Refuse what a control may take for another point: X and Y had other numbers before the rotation changed."""
         named = XY & words.keys()
+        if self.unsettled == "G10" and not (self.absolute and named == XY):
+            raise self.fail(
+                None,
+                "G10 turned the work offset in force, and the next move does not name both X and Y: LinuxCNC would "
+                "take the old numbers for them",
+                "absolute X and Y in the first move after it",
+            )
         if not named:
             return
         word = self.values[AXES[min(named)]]

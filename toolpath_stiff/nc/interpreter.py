@@ -74,6 +74,7 @@ class Interpreter(Zeros):
         """Everything modal, in LinuxCNC's order; units first, so that an F beside G20 is in inches."""
         units = codes.get("units")
         if units is not None:
+            self._check_unit_change(units == "G20", codes.groups["units"][1])
             self.inch = units == "G20"
         feed_mode = codes.get("feed mode")
         if feed_mode is not None:
@@ -107,6 +108,10 @@ class Interpreter(Zeros):
         self.retract = codes.get("cycle return") or self.retract
         if any(group.startswith("M ") for group in codes.groups) or any(w.letter == "M" for w in self.block.words):
             self._drop_m_parameters(codes)
+
+    def _check_unit_change(self, inch: bool, word: Word) -> None:
+        if inch != self.inch and self.frames.tool:
+            raise self.fail(word, "while a tool length is in force: LinuxCNC would take its number anew", "G49 before it")
 
     def _subprogram(self, codes: Codes) -> None:
         """M98 and M99: whoever runs the blocks acts upon them, after the block's own moves."""
@@ -190,6 +195,8 @@ class Interpreter(Zeros):
             self.selected = int(chosen)
         if change is not None:
             self.tool = self.selected
+            self.renamed = change == "M61"
+            self.height_lost = self.height_lost or (change == "M6" and self.length_changed)
 
     def _dwell(self, word: Word) -> None:
         seconds = self._seconds("X" if self.dialect.dwell != SECONDS and self.has("X") else "P")
@@ -212,12 +219,17 @@ class Interpreter(Zeros):
         else:
             length = self._table_length(word)
         self.tool_length = length
+        self.length_changed = True
         self.frames.set_tool(0.0 if math.isnan(length) else length)
 
     def _table_length(self, word: Word) -> float:
         """Length of the tool that G43 names by H, or of the one in the spindle."""
         number = self.take("H")
         tool = self.tool if number is None else int(number)
+        if number is None and self.renamed:
+            raise self.fail(
+                word, "without H after M61: controls differ in whose length it takes", f"G43 H{tool}, or T and M6"
+            )
         if number is not None and (number < 0 or number != int(number)):
             raise self.fail(self.values["H"], "is no tool number", "a whole number")
         if self.tools is None:
@@ -235,6 +247,9 @@ class Interpreter(Zeros):
         rotation = codes.groups.get("rotation")
         if rotation is not None and rotation[0] == "G68":
             takers.append(rotation)
+        length = codes.groups.get("tool length")
+        if length is not None and length[0] == "G43.1":  # LinuxCNC would move to that Z too
+            takers.append(length)
         moving = codes.groups.get(MOTION)
         if len(takers) > 1 or (takers and moving and moving[0] != "G80"):
             other = moving[0] if moving and len(takers) == 1 else takers[0][0]
@@ -261,8 +276,8 @@ class Interpreter(Zeros):
         machine_word = next((w for c, w in codes.once if c == "G53"), None)
         if given is not None:
             if given[0] != self.motion and given[0] in CYCLES:
-                level = self.sticky.get("level") if self.motion in CYCLES else None
-                self.sticky = {} if level is None else {"level": level}
+                kept = ("level", "unit") if self.motion in CYCLES else ()
+                self.sticky = {name: self.sticky[name] for name in kept if name in self.sticky}
             self.motion = None if given[0] == "G80" else given[0]
         axes = any(self.has(letter) for letter in AXES)
         if self.motion is None:

@@ -36,7 +36,10 @@ class Mover(Coordinates):
         self.feed: float | None = None
         self.speed = 0.0
         self.tool, self.selected = 0, 0
+        self.renamed = False  # the tool in the spindle is M61's
         self.tool_length = math.nan
+        # LinuxCNC's rs274 forgets a change of length since the last move at M6: it would start the next cut elsewhere.
+        self.length_changed = self.height_lost = False
         self.sticky: dict[str, float] = {}
         self._heights = (True, 0.0, 0.0)  # of the last hole: whether in G90, R plane, bottom
 
@@ -50,6 +53,9 @@ class Mover(Coordinates):
 
     def _record(self, motion: int, control: list[float], work: set[int], machine: set[int], arc: Arc | None) -> None:
         frames = self.frames
+        self.length_changed = False
+        if self.height_lost:
+            self._find_height(motion, 2 in work or 2 in machine)
         start, was = frames.to_setup(frames.position), frames.bound
         for axis in work:
             frames.from_machine[axis] = False
@@ -75,6 +81,15 @@ class Mover(Coordinates):
         frames.position = control
         if added:
             self.note_tool()
+
+    def _find_height(self, motion: int, named: bool) -> None:
+        if motion != RAPID:
+            raise self.fail(
+                None,
+                "a cut before any Z, after a tool length that changed between the last move and M6",
+                "G0 with Z before it",
+            )
+        self.height_lost = not named
 
     def note_tool(self) -> None:
         """Keep the tool in the spindle among those that moved."""
@@ -202,6 +217,12 @@ class Mover(Coordinates):
         if normal in words:
             self.sticky["Z"] = words.pop(normal)
         self._check_cycle(code, normal)
+        if self.sticky.setdefault("unit", self._scale) != self._scale:
+            raise self.fail(
+                None,
+                f"{code} after a change between G20 and G21: controls differ in whether the run keeps its heights",
+                "G80 before it, and R and Z anew",
+            )
         frames = self.frames
         here = frames.to_program(frames.position)[normal]
         # The level from which a run of cycles began: G91's R counts from it, G98 returns to it.

@@ -94,6 +94,7 @@ def _suits(state: Interpreter) -> bool:
         state.feed_mode in ("G93", "G94")
         and state.polar is None
         and state.unsettled is None
+        and not state.height_lost
         and not state.arc_absolute
         and not frames.rotated
         and not frames.bound
@@ -334,5 +335,6 @@ class _Lines:
             state.feed = float(self.feed[last])
         if control is not None:
             state.frames.position = control[self.end].tolist()
+            state.length_changed = False
         state.call, state.returns = None, False
         return self.end

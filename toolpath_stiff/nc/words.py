@@ -22,6 +22,7 @@ WORD = re.compile(rf"([A-Z])({NUMBER})(E[+-]?\d+)?", re.ASCII)
 LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTUVWXYZ")
 COMMENT = re.compile("[();]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
+HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
 
 
 class Word(NamedTuple):
@@ -155,7 +156,8 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
         if exponent:
             # An exponent stands without blanks; `X1 E5` is two words, and not a hundred metres.
             begin = match.start(3)
-            if letter in NO_EXPONENT or columns[begin] - columns[begin - 1] > 1:
+            apart = columns[begin] - columns[begin - 1] > 1
+            if letter in NO_EXPONENT or apart or HAS_E_WORD.search(compact):
                 end = begin
             else:
                 number += exponent

@@ -30,6 +30,8 @@ class Zeros(Mover):
         if rotation is not None:
             if level == 20:
                 raise self.fail(self.values["R"], "does not go with L20", "L2")
+            if index == self.frames.active and rotation != offset.rotation:
+                self.unsettled = "G10"
             offset.rotation = rotation
         words = self._axis_words()
         if level == 20:
