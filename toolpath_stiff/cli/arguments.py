@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 Pose = tuple[float, float, float, float, float, float]
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
+SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
+ALL_BLOCKS = "all"
 LOADS_HELP = "tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ"
 
 
@@ -91,6 +94,24 @@ def range_argument(text: str) -> tuple[float, float]:
     return low, high
 
 
+def switches_argument(text: str) -> frozenset[int] | bool:
+    """Block-delete switches, `2,3`; `all` is what the option means without a value."""
+    if text == ALL_BLOCKS:
+        return True
+    if not SWITCHES.fullmatch(text):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected switches 1 to 9, as 2,3")
+    return frozenset(map(int, text.split(",")))
+
+
+def whole_options(arguments: Sequence[str]) -> list[str]:
+    """`--block-delete` before anything but switches is the whole option: what follows is a program."""
+    following = [*arguments[1:], ""]
+    return [
+        f"{word}={ALL_BLOCKS}" if word == "--block-delete" and not SWITCHES.fullmatch(after) else word
+        for word, after in zip(arguments, following, strict=True)
+    ]
+
+
 def load_argument(text: str) -> str:
     """Check `--load` early; the analysis parses it again."""
     from toolpath_stiff.analysis.loads import parse_load
@@ -129,7 +150,15 @@ def add_program_options(parser: argparse.ArgumentParser) -> None:
         help="how the control reads what others read otherwise: X10 without a decimal point, the time of G4 P, "
         "G70 and G71, `;` (default: the controller file's, else generic)",
     )
-    group.add_argument("--block-delete", action="store_true", help="leave out blocks that begin with /")
+    group.add_argument(
+        "--block-delete",
+        nargs="?",
+        const=True,
+        default=False,
+        type=switches_argument,
+        metavar="N,N",
+        help="leave out blocks that begin with / (with 2,3: those that begin with /2 or /3; / is /1)",
+    )
     group.add_argument(
         "--interpreter",
         choices=("builtin", "linuxcnc", "auto"),

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from toolpath_stiff import __version__
+from toolpath_stiff.cli.arguments import whole_options
 from toolpath_stiff.errors import TpsError
 
 
@@ -115,7 +116,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     parser = build_parser(chosen)
     try:
-        args = parser.parse_args(arguments)
+        args = parser.parse_args(whole_options(arguments))
         if args.command is None:
             parser.print_help()
             return 2

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes import code_meaning, would_change
-from toolpath_stiff.nc.controller import ALL_SWITCHES, UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.codes import WORK_OFFSETS, code_meaning, would_change
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
 from toolpath_stiff.nc.cutter_location.checking import CheckedCutterLocation
 from toolpath_stiff.nc.cutter_location.program import not_for
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
@@ -157,7 +157,7 @@ def check_lines(
     *,
     origin: Iterable[float] | None = None,
     default_origin: Iterable[float] = ZERO,
-    block_delete: bool = False,
+    block_delete: Switches = False,
     controller: Controller = UNKNOWN_CONTROL,
 ) -> Checked:
     """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone."""
@@ -172,8 +172,7 @@ def check_lines(
     else:  # first in the coordinates of the machine that the program was posted for
         frames = Frames(copy.deepcopy(controller.offsets or Offsets()), None, ZERO, posted=True)
     interpreter = Interpreter(name, frames, copy.deepcopy(controller.tools), controller.dialect)
-    switches = ALL_SWITCHES if block_delete else controller.switches
-    run = _CheckingRun(interpreter, lines, name, switches)
+    run = _CheckingRun(interpreter, lines, name, switches_on(block_delete, controller))
     start = modal_state(interpreter)
     warnings: list[str] = []
     foreign = foreign_program(lines, name)
@@ -287,7 +286,8 @@ def _line_in(text: str) -> int:
 def modal_state(interpreter: Interpreter) -> dict[str, str]:
     """What is in force, as codes and words."""
     frames, feed = interpreter.frames, interpreter.feed
-    offset = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")[frames.active]
+    standard = len(WORK_OFFSETS)
+    offset = WORK_OFFSETS[frames.active] if frames.active < standard else f"G54.1 P{frames.active - standard + 1}"
     return {
         "motion": interpreter.motion or "none",
         "plane": interpreter.plane,

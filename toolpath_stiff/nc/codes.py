@@ -25,6 +25,7 @@ G_GROUPS: dict[str, str] = {
     **dict.fromkeys(("G40",), CUTTER),
     **dict.fromkeys(("G43", "G43.1", "G49"), LENGTH),
     **dict.fromkeys(("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"), OFFSET),
+    **dict.fromkeys(("G54.1", "G154"), OFFSET),
     **dict.fromkeys(("G98", "G99"), RETRACT),
     **dict.fromkeys(("G4", "G10", "G28", "G28.1", "G30", "G30.1", "G52", "G53"), ONCE),
     **dict.fromkeys(("G92", "G92.1", "G92.2", "G92.3"), ONCE),
@@ -36,6 +37,7 @@ G_GROUPS: dict[str, str] = {
     "G50": "scaling",
 }
 INCH_METRIC = {"G70": "G20", "G71": "G21"}  # where the dialect has them
+ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
 # Harmless G codes: the path does not change, the user is told.
@@ -92,10 +94,10 @@ M_GROUPS: dict[str, str] = {
     **dict.fromkeys(("M6", "M61"), M_TOOL),
     **dict.fromkeys(("M3", "M4", "M5", "M19"), M_SPINDLE),
     **dict.fromkeys(("M7", "M8", "M9"), M_COOLANT),
-    **dict.fromkeys(("M98", "M99"), M_SUBPROGRAM),
+    **dict.fromkeys(("M97", "M98", "M99"), M_SUBPROGRAM),
     **dict.fromkeys(("M48", "M49", "M50", "M51", "M52", "M53"), "overrides"),
 }
-M_QUIET = ("M0", "M1", "M2", "M30", "M60", "M6", "M61", "M3", "M4", "M5", "M98", "M99")
+M_QUIET = ("M0", "M1", "M2", "M30", "M60", "M6", "M61", "M3", "M4", "M5", "M97", "M98", "M99")
 M_HARMLESS = {
     "M7": "coolant",
     "M8": "coolant",
@@ -109,7 +111,6 @@ M_HARMLESS = {
     "M53": "overrides",
 }
 M_REFUSED = {
-    "M97": ("a call of a block within the program", "make it a subprogram of its own (O number, M98, M99)"),
     "M70": ("saved modal state", "post the program without M70 to M73"),
     "M71": ("saved modal state", "post the program without M70 to M73"),
     "M72": ("saved modal state", "post the program without M70 to M73"),
@@ -128,6 +129,7 @@ MEANINGS = {
     "G19": "plane YZ", "G20": "inch", "G21": "mm", "G28": "to the first reference point",
     "G30": "to the second reference point", "G40": "cutter compensation off", "G43": "tool length",
     "G43.1": "tool length in the block", "G49": "tool length off", "G52": "local shift", "G53": "machine coordinates",
+    "G54.1": "additional work offset", "G154": "additional work offset (Haas)",
     "G68": "rotated coordinates", "G69": "rotation off", "G73": "chip-breaking drilling", "G80": "motion mode off",
     "G81": "drilling", "G82": "drilling with dwell", "G83": "peck drilling", "G85": "boring, feed out",
     "G89": "boring with dwell, feed out", "G90": "absolute", "G91": "incremental", "G90.1": "absolute arc centres",
@@ -135,7 +137,7 @@ MEANINGS = {
     "G95": "feed per revolution", "G98": "cycles return to their level", "G99": "cycles return to R",
     "M0": "stop", "M1": "optional stop", "M2": "end", "M30": "end", "M60": "stop", "M3": "spindle on",
     "M4": "spindle on, reversed", "M5": "spindle off", "M6": "tool change", "M61": "tool number",
-    "M98": "subprogram call", "M99": "subprogram end",
+    "M97": "call by line number (Haas)", "M98": "subprogram call", "M99": "subprogram end",
 }  # fmt: skip
 # What a code that is not acted upon would change, by its beginning.
 CHANGES = (

@@ -17,12 +17,21 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes import WORK_OFFSETS
 from toolpath_stiff.nc.dialects import DIALECTS, GENERIC, Dialect, dialect_named
 from toolpath_stiff.nc.posted import PostedKinematics, read_kinematics
-from toolpath_stiff.nc.tables import LARGEST_MM, Offsets, ToolEntry, read_offsets, read_tool_table, set_offset
+from toolpath_stiff.nc.tables import (
+    HOMES,
+    LARGEST_MM,
+    Offsets,
+    ToolEntry,
+    additional_offset,
+    is_offset,
+    read_offsets,
+    read_tool_table,
+    set_offset,
+)
 
 ALL_SWITCHES = frozenset(range(1, 10))
 TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")
 KEYS = ("dialect", "block_delete", "arc_centers", "inch_metric", "offsets", "tools", "kinematics")
-HOMES = ("G28", "G30")
 G70_UNITS, G20_UNITS = "G70 G71", "G20 G21"
 
 
@@ -62,11 +71,26 @@ class Controller:
 
 
 UNKNOWN_CONTROL = Controller()
+Switches = bool | frozenset[int]  # block-delete switches that are on; True: all, False: those of the controller file
 
 
-def check_plain(controller: Controller) -> None:
+def switches_on(block_delete: Switches, controller: Controller) -> frozenset[int]:
+    """The block-delete switches that are on: those asked for, else the controller file's."""
+    if isinstance(block_delete, bool):
+        return ALL_SWITCHES if block_delete else controller.switches
+    if not block_delete <= ALL_SWITCHES:
+        raise InputError(f"block-delete switches {sorted(block_delete)}", expected="1 to 9")
+    return block_delete
+
+
+def plain(block_delete: Switches, controller: Controller) -> bool:
+    """Whether LinuxCNC's interpreter would read the program as the control does: it has one switch and its dialect."""
+    return controller.plain and switches_on(block_delete, controller) in (frozenset(), ALL_SWITCHES)
+
+
+def check_plain(block_delete: Switches, controller: Controller) -> None:
     """Raise `InputError` if LinuxCNC's interpreter would read the program otherwise than the control."""
-    if not controller.plain:
+    if not plain(block_delete, controller):
         raise InputError(
             f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {controller.dialect.name!r}, "
             "or it has single block-delete switches",
@@ -152,8 +176,13 @@ class _Reader:
         offsets = Offsets()
         for name, values in given.items():
             most = 6 if name in HOMES else 7
-            if name not in (*WORK_OFFSETS, *HOMES):
-                raise self.fail(f"offsets.{name} is not an offset", f"{', '.join((*WORK_OFFSETS, *HOMES))}")
+            if additional_offset(name) in offsets.additional:
+                raise self.fail(f"offsets.{name!r} is there twice: G54.1 and G154 name the same offsets")
+            if not is_offset(name):
+                raise self.fail(
+                    f"offsets.{name} is not an offset",
+                    f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)',
+                )
             if not isinstance(values, list) or not 1 <= len(values) <= most:
                 raise self.fail(f"offsets.{name} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r")
             set_offset(offsets, name, [self._number(f"offsets.{name}", value) for value in values])

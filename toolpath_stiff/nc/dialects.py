@@ -51,6 +51,10 @@ class Dialect:
         Whether I, J, K are absolute at the start (G90.1).
     g70, inch_metric
         Why G70 and G71 are refused; whether they are inch and metric units.
+    additional
+        The codes that take additional work offsets.
+    local_calls
+        Whether M97 calls a block by its N number.
     feed_needs_point
         Units in which F without a decimal point hangs on a parameter, and is refused.
     """
@@ -66,6 +70,8 @@ class Dialect:
     arc_absolute: bool = False
     g70: tuple[str, str] = UNITS_OR_CYCLE
     inch_metric: bool = False
+    additional: tuple[str, ...] = ("G54.1", "G154")
+    local_calls: bool = False
     feed_needs_point: tuple[str, ...] = ()
 
 
@@ -74,7 +80,7 @@ DIALECTS = {
     dialect.name: dialect
     for dialect in (
         GENERIC,
-        Dialect("linuxcnc", keeps_heights=False, repeats_in_p=False, g70=LATHE_CYCLE),
+        Dialect("linuxcnc", keeps_heights=False, repeats_in_p=False, g70=LATHE_CYCLE, additional=()),
         Dialect(
             "fanuc",
             increments=True,
@@ -85,6 +91,7 @@ DIALECTS = {
             cycle_repeats="KL",
             semicolon=False,
             inch_metric=True,
+            additional=("G54.1",),
             feed_needs_point=("inch",),
         ),
         Dialect(
@@ -96,6 +103,8 @@ DIALECTS = {
             repeats_in_p=False,
             semicolon=False,
             g70=HOLE_PATTERN,
+            additional=("G154",),
+            local_calls=True,
             feed_needs_point=("mm", "inch"),
         ),
     )

@@ -28,7 +28,7 @@ class Frames:
     option, default
         Where G54's zero sits on the machine as the caller says, and unless anyone says; mm and degrees.
     active
-        Index of the work offset in force.
+        Index of the work offset in force, as `Offsets.at` counts.
     g92
         Shift of G92 or G52; `g92_kept` remembers it while G92.2 suspends it.
     rotation
@@ -67,7 +67,7 @@ class Frames:
 
     def to_control(self, program: list[float]) -> list[float]:
         """Control coordinates of a point in program coordinates."""
-        offset = self.offsets.table[self.active]
+        offset = self.offsets.at(self.active)
         if self.rotation is not None:
             program = _about(self.rotation, program, self.rotation[2])
         moved = [p + g for p, g in zip(program, self.g92, strict=True)]
@@ -77,7 +77,7 @@ class Frames:
 
     def to_program(self, control: list[float]) -> list[float]:
         """Program coordinates of a point in control coordinates."""
-        offset = self.offsets.table[self.active]
+        offset = self.offsets.at(self.active)
         moved = [c - o for c, o in zip(control, offset.axes, strict=True)]
         if offset.rotation:
             moved[0], moved[1] = _turned(moved[0], moved[1], -offset.rotation)
@@ -92,7 +92,7 @@ class Frames:
     @property
     def turned(self) -> float:
         """Degrees by which the program's X and Y axes are turned from the control's: work offset and G68."""
-        return self.offsets.table[self.active].rotation + (self.rotation[2] if self.rotation else 0.0)
+        return self.offsets.at(self.active).rotation + (self.rotation[2] if self.rotation else 0.0)
 
     def turn_direction(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A direction of the program's axes in control axes."""

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.blocks import AXES, Codes
-from toolpath_stiff.nc.codes import ARCS, CYCLES, M_SUBPROGRAM, MOTION, WORK_OFFSETS
+from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, ARCS, CYCLES, M_SUBPROGRAM, MOTION, WORK_OFFSETS
 from toolpath_stiff.nc.dialects import GENERIC, SECONDS, Dialect
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.motion import SECONDS_PER_DAY
@@ -24,11 +24,12 @@ USES_AXES = ("G10", "G28", "G30", "G52", "G92")  # non-modal codes that take the
 
 @dataclass(frozen=True)
 class Call:
-    """A subprogram call: its P, its L (None: not given), and the column of its M98."""
+    """A subprogram call: its P, its L (None: not given), the column of its M98; `local`: it is M97, P an N number."""
 
     number: int
     repeats: int | None
     column: int
+    local: bool = False
 
 
 class Interpreter(Zeros):
@@ -89,11 +90,8 @@ class Interpreter(Zeros):
         self._polar_mode(codes.get("polar"))
         self._tool_length(codes)
         self._subprogram(codes)
-        offset = codes.get("work offset")
-        if offset is not None and WORK_OFFSETS.index(offset) != self.frames.active:
-            self._refuse_while_rotated(codes.groups["work offset"][1], "takes another work offset")
-            self.frames.active = WORK_OFFSETS.index(offset)
-            self._forget_polar()
+        if "work offset" in codes.groups:
+            self._work_offset(*codes.groups["work offset"])
         if codes.get("path control"):
             self.take("P")
             self.take("Q")
@@ -111,7 +109,9 @@ class Interpreter(Zeros):
 
     def _check_unit_change(self, inch: bool, word: Word) -> None:
         if inch != self.inch and self.frames.tool:
-            raise self.fail(word, "while a tool length is in force: LinuxCNC would take its number anew", "G49 before it")
+            raise self.fail(
+                word, "while a tool length is in force: LinuxCNC would take its number anew", "G49 before it"
+            )
 
     def _subprogram(self, codes: Codes) -> None:
         """M98 and M99: whoever runs the blocks acts upon them, after the block's own moves."""
@@ -124,12 +124,18 @@ class Interpreter(Zeros):
             if self.has("P"):
                 raise self.fail(self.values["P"], "makes M99 return to another block, which is not supported", "M99")
             return
+        if code == "M97" and not self.dialect.local_calls:
+            raise self.fail(
+                word,
+                "is Haas' call of a block by its N number",
+                hint="give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)",
+            )
         if any(other in ("G4", "G10") for other, _ in codes.once):
             raise self.fail(word, "beside a code that wants the P word too", "two blocks")
         number, repeats = self._whole("P", word), self._whole("L", word)
         if number is None:
-            raise self.fail(word, "without P", "P with the number of the subprogram")
-        self.call = Call(number, repeats, word.column)
+            raise self.fail(word, "without P", "P with the number of what it calls")
+        self.call = Call(number, repeats, word.column, local=code == "M97")
 
     def _whole(self, letter: str, word: Word) -> int | None:
         value = self.take(letter)
@@ -138,6 +144,31 @@ class Interpreter(Zeros):
         if value != int(value) or value < 1:
             raise self.fail(self.values[letter], f"beside {word.text} is no count", "a whole number from 1")
         return int(value)
+
+    def _work_offset(self, code: str, word: Word) -> None:
+        index = WORK_OFFSETS.index(code) if code in WORK_OFFSETS else self._additional_offset(code, word)
+        if index != self.frames.active:
+            self._refuse_while_rotated(word, "takes another work offset")
+            self.frames.active = index
+            self._forget_polar()
+
+    def _additional_offset(self, code: str, word: Word) -> int:
+        """Index of the offset that G54.1 P or G154 P names; the controller file or G10 must have said where it is."""
+        if code not in self.dialect.additional:
+            known = " or ".join(self.dialect.additional)
+            raise self.fail(
+                word, f"is not a code of the dialect {self.dialect.name}", f"{known} P" if known else "G54 to G59.3"
+            )
+        number = self._whole("P", word)
+        if number is None or number > ADDITIONAL_OFFSETS[code]:
+            raise self.fail(word, "needs the number of its offset", f"P1 to P{ADDITIONAL_OFFSETS[code]}")
+        if number not in self.frames.offsets.additional:
+            raise self.fail(
+                word,
+                f"P{number} is an offset that nothing defines",
+                hint=f'give it in the controller file: [offsets] "{code} P{number}" = [x, y, z]',
+            )
+        return len(WORK_OFFSETS) + number - 1
 
     def _plane(self, codes: Codes) -> None:
         plane = codes.get("plane")
@@ -196,7 +227,7 @@ class Interpreter(Zeros):
         if change is not None:
             self.tool = self.selected
             self.renamed = change == "M61"
-            self.height_lost = self.height_lost or (change == "M6" and self.length_changed)
+            self.height_lost = self.height_lost or self.length_changed
 
     def _dwell(self, word: Word) -> None:
         seconds = self._seconds("X" if self.dialect.dwell != SECONDS and self.has("X") else "P")

@@ -235,7 +235,7 @@ class _Lines:
         """(n + 1, 6) control coordinates before the first line and after each."""
         state = self.state
         frames = state.frames
-        offset = frames.offsets.table[frames.active].axes
+        offset = frames.offsets.at(frames.active).axes
         control = np.empty((self.n + 1, 6))
         for axis, letter in enumerate("XYZABC"):
             if letter not in self.values:
@@ -267,7 +267,7 @@ class _Lines:
         first, second, normal = arcs.PLANES[state.plane]
         vector = (float(normal == 0), float(normal == 1), float(normal == 2))
         scale = state.length_scale
-        offset, shift, reference = frames.offsets.table[frames.active].axes, frames.g92, frames.fix_reference()
+        offset, shift, reference = frames.offsets.at(frames.active).axes, frames.g92, frames.fix_reference()
         letters = ("XYZ"[first], "XYZ"[second], "IJK"[first], "IJK"[second], "R", "IJK"[normal])
         nothing = np.full(self.n, math.nan)
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()

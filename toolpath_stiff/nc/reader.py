@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.controller import ALL_SWITCHES, UNKNOWN_CONTROL, Controller, check_plain
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
 from toolpath_stiff.nc.cutter_location import program as cutter_location
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
@@ -20,9 +20,7 @@ from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
-Given = tuple[
-    tuple[str, ...], str, str, Iterable[float] | None, Iterable[float], Offsets, dict[int, ToolEntry] | None, bool
-]
+Given = tuple[tuple[str, ...], str, str, Iterable[float] | None, Iterable[float], Offsets, dict[int, ToolEntry] | None]
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
@@ -34,7 +32,7 @@ def read_program(
     default_origin: Iterable[float] = ZERO,
     offsets_file: str | Path | None = None,
     tool_table: str | Path | None = None,
-    block_delete: bool = False,
+    block_delete: Switches = False,
     interpreter: str = "builtin",
     rs274: str | None = None,
     controller: Controller = UNKNOWN_CONTROL,
@@ -53,7 +51,8 @@ def read_program(
     tool_table
         Tool lengths: a LinuxCNC tool table or CSV.
     block_delete
-        Leave out blocks that begin with a slash.
+        Leave out blocks that begin with a slash: True, all of them; switches 1 to 9, those of theirs (`/` is `/1`);
+        False, those of the controller file's.
     interpreter
         "builtin"; "linuxcnc", LinuxCNC's own (`rs274`); "auto", the first and, where it refuses, the second.
     rs274
@@ -90,7 +89,7 @@ def parse_program(
     default_origin: Iterable[float] = ZERO,
     offsets: Offsets | None = None,
     tools: dict[int, ToolEntry] | None = None,
-    block_delete: bool = False,
+    block_delete: Switches = False,
     interpreter: str = "builtin",
     rs274: str | None = None,
     controller: Controller = UNKNOWN_CONTROL,
@@ -134,7 +133,7 @@ def _read(
     default_origin: Iterable[float],
     offsets: Offsets,
     tools: dict[int, ToolEntry] | None,
-    block_delete: bool,
+    block_delete: Switches,
     interpreter: str,
     rs274: str | None,
     controller: Controller,
@@ -157,22 +156,22 @@ def _read(
     foreign = foreign_program(lines, name)
     if foreign is not None:
         raise foreign
-    given = (lines, name, path, origin, default_origin, offsets, tools, block_delete)
+    given = (lines, name, path, origin, default_origin, offsets, tools)
     if interpreter == "linuxcnc":
-        check_plain(controller)
-        return _read_by_linuxcnc(*given, rs274)
+        check_plain(block_delete, controller)
+        return _read_by_linuxcnc(*given, bool(switches_on(block_delete, controller)), rs274)
     try:
-        return _read_built_in(*given, controller)
+        return _read_built_in(*given, switches_on(block_delete, controller), controller)
     except InputError as error:
         foreign = foreign_program(lines, name, error.line)
         if foreign is not None:
             raise foreign from None
-        if interpreter == "builtin" or not controller.plain:
+        if interpreter == "builtin" or not plain(block_delete, controller):
             raise
-        return _second_opinion(error, given, rs274)
+        return _second_opinion(error, given, bool(switches_on(block_delete, controller)), rs274)
 
 
-def _second_opinion(error: InputError, given: Given, rs274: str | None) -> Program:
+def _second_opinion(error: InputError, given: Given, block_delete: bool, rs274: str | None) -> Program:
     """What the built-in interpreter refused with `error`, by the second one if it is there and the program harmless."""
     from toolpath_stiff.nc.linuxcnc.reading import refusal
     from toolpath_stiff.nc.linuxcnc.runner import find_rs274
@@ -191,7 +190,7 @@ def _second_opinion(error: InputError, given: Given, rs274: str | None) -> Progr
             line=error.line,
             column=error.column,
         ) from None
-    return _read_by_linuxcnc(*given, found)
+    return _read_by_linuxcnc(*given, block_delete, found)
 
 
 def _read_by_linuxcnc(
@@ -233,13 +232,13 @@ def _read_built_in(
     default_origin: Iterable[float],
     offsets: Offsets,
     tools: dict[int, ToolEntry] | None,
-    block_delete: bool,
+    switches: frozenset[int],
     controller: Controller,
 ) -> Program:
     frames = Frames(copy.deepcopy(offsets), None if origin is None else _to_mm(origin), _to_mm(default_origin))
     frames.posted = controller.kinematics is not None
     interpreter = Interpreter(name, frames, copy.deepcopy(tools), controller.dialect)
-    warnings = ProgramRun(interpreter, lines, name, ALL_SWITCHES if block_delete else controller.switches).run()
+    warnings = ProgramRun(interpreter, lines, name, switches).run()
     if not interpreter.recorder.cuts:
         raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)
     g54 = offsets.table[0].given or frames.offsets.table[0].given

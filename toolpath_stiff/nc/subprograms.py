@@ -2,7 +2,8 @@
 
 Subprograms are those of Fanuc's controls: O numbers within the file, after the main program or before it, called by
 `M98 P1000 L2` or, with the repeats before the four digits of the number, `M98 P21000`; they end with M99. LinuxCNC
-reads the first form alike. Modal state goes through a call unchanged, as it does on both.
+reads the first form alike. `M97 P100` (Haas) calls the block N100 of the file, up to an M99. Modal state goes through
+a call unchanged.
 """
 
 from __future__ import annotations
@@ -22,15 +23,16 @@ DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older cont
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
 MOST_REPEATS = 9999
 FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
+SEQUENCE = re.compile(r"\s*(?:/\d?\s*)?[nN]\s*(\d+)(?![\d.])")
 HEAD = re.compile(r"\s*/?\s*[oO:]\s*(\d+)\s*(?:[(;].*)?$")
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
 
 
 @dataclass
 class _Level:
-    """A subprogram that runs: its number, first line (from 0), where to go on, and how often it runs again."""
+    """A subprogram that runs: its name, first line (from 0), where to go on, and how often it runs again."""
 
-    number: int
+    name: str
     first: int
     back: int
     again: int
@@ -63,6 +65,7 @@ class ProgramRun:
         self.switches = switches
         self._levels: list[_Level] = []
         self._programs: dict[int, int] | None = None
+        self._sequence: dict[int, list[int]] | None = None
         self._called: dict[int, Block] = {}  # blocks of subprograms by line, from 0: each is read once
         self._blocks = 0
 
@@ -142,7 +145,7 @@ class ProgramRun:
 
     def _unended(self, at: int) -> InputError:
         level = self._levels[-1]
-        return self._fail(at, f"the subprogram O{level.number} of line {level.first + 1} has no end", "M99")
+        return self._fail(at, f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end", "M99")
 
     def _end(self, at: int, what: str, ended: bool = False) -> list[str]:
         """A warning if anything but tape marks and the subprograms that ran follows the end."""
@@ -161,22 +164,49 @@ class ProgramRun:
 
     def _enter(self, at: int, call: Call) -> int:
         """The line at which the called subprogram begins."""
-        number, repeats = self._target(at, call)
-        if any(level.number == number for level in self._levels):
-            raise self._fail(at, f"M98 calls O{number}, which is running: it would never end", column=call.column)
+        if call.local:
+            name, repeats, first = f"N{call.number}", call.repeats or 1, self._block_numbered(at, call)
+        else:
+            number, repeats = self._target(at, call)
+            name, first = f"O{number}", self._heads()[number] + 1
+        code = "M97" if call.local else "M98"
+        if not 1 <= repeats <= MOST_REPEATS:
+            raise self._fail(at, f"{code} with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
+        if any(level.name == name for level in self._levels):
+            raise self._fail(at, f"{code} calls {name}, which is running: it would never end", column=call.column)
         if len(self._levels) == DEEPEST:
             raise self._fail(at, f"more than {DEEPEST} subprograms within each other", column=call.column)
-        first = self._heads()[number]
-        if first == self._main:
-            raise self._fail(at, f"M98 calls O{number}, the main program itself", column=call.column)
-        self._levels.append(_Level(number, first, at + 1, repeats - 1))
-        return first + 1
+        if not call.local and first == self._main + 1:
+            raise self._fail(at, f"M98 calls {name}, the main program itself", column=call.column)
+        self._levels.append(_Level(name, first, at + 1, repeats - 1))
+        return first
+
+    def _block_numbered(self, at: int, call: Call) -> int:
+        """The line (from 0) of the block with M97's N number. Raises `InputError` unless there is one."""
+        if self._sequence is None:
+            self._sequence = {}
+            for index, line in enumerate(self.lines):
+                match = SEQUENCE.match(line)
+                if match:
+                    self._sequence.setdefault(int(match[1]), []).append(index)
+        found = self._sequence.get(call.number, [])
+        if len(found) != 1:
+            places = ", ".join(str(index + 1) for index in found)
+            raise self._fail(
+                at,
+                f"M97 calls N{call.number}, which is in the lines {places}"
+                if found
+                else f"M97 calls N{call.number}, and the file has no such block",
+                "one block with that number",
+                column=call.column,
+            )
+        return found[0]
 
     def _leave(self) -> int:
         level = self._levels[-1]
         if level.again:
             level.again -= 1
-            return level.first + 1
+            return level.first
         self._levels.pop()
         return level.back
 
@@ -204,10 +234,7 @@ class ProgramRun:
                 hint="give the number of repeats as L",
                 column=call.column,
             )
-        number, repeats = known[0]
-        if not 1 <= repeats <= MOST_REPEATS:
-            raise self._fail(at, f"M98 with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
-        return number, repeats
+        return known[0]
 
     def _heads(self) -> dict[int, int]:
         """Program number -> line (from 0) of its O word; what follows the last tape mark is no program."""

@@ -9,13 +9,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes import WORK_OFFSETS
+from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, WORK_OFFSETS
 
 AXES = "XYZABC"
 LARGEST_MM = 1e5
 # LinuxCNC's parameter file (manual, "Parameters"): G54 is 5221 to 5230, each further offset 20 on; X Y Z A B C U V W R.
 FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
 HOME_G28, HOME_G30 = 5161, 5181
+HOMES = ("G28", "G30")
+ADDITIONAL = re.compile(r"(G54\.1|G154) ?P([1-9]\d{0,2})")
 
 
 @dataclass
@@ -41,11 +43,17 @@ class WorkOffset:
 
 @dataclass
 class Offsets:
-    """Work offsets in the order of `WORK_OFFSETS`, and the reference points of G28 and G30."""
+    """Work offsets in the order of `WORK_OFFSETS`, additional ones by their P, reference points of G28 and G30."""
 
     table: list[WorkOffset] = field(default_factory=lambda: [WorkOffset() for _ in WORK_OFFSETS])
+    additional: dict[int, WorkOffset] = field(default_factory=dict)
     home_g28: list[float] = field(default_factory=lambda: [0.0] * 6)
     home_g30: list[float] = field(default_factory=lambda: [0.0] * 6)
+
+    def at(self, index: int) -> WorkOffset:
+        """The offset of an index: of `WORK_OFFSETS`, and beyond them G54.1 P1, P2 and so on."""
+        standard = len(self.table)
+        return self.table[index] if index < standard else self.additional[index - standard + 1]
 
 
 def _lines(path: str | Path, what: str) -> list[str]:
@@ -131,6 +139,17 @@ def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tupl
     return rows
 
 
+def is_offset(name: str) -> bool:
+    """Whether a table may set it: a work offset or a reference point."""
+    return name in (*WORK_OFFSETS, *HOMES) or additional_offset(name) is not None
+
+
+def additional_offset(name: str) -> int | None:
+    """The P of `G54.1 P3` or `G154 P3`, which name the same offset; None for any other name."""
+    found = ADDITIONAL.fullmatch(name)
+    return int(found[2]) if found and int(found[2]) <= ADDITIONAL_OFFSETS[found[1]] else None
+
+
 def read_offsets(path: str | Path) -> Offsets:
     """Work offsets from a file. Raises `InputError` with the line.
 
@@ -145,13 +164,13 @@ def read_offsets(path: str | Path) -> Offsets:
     offsets = Offsets()
     for line, text in filled:
         parameter = re.fullmatch(r"(\d+)\s+(\S+)", text)
-        assignment = re.fullmatch(r'"?([Gg][\d.]+)"?\s*=\s*\[(.*)\]', text)
+        assignment = re.fullmatch(r'"?([Gg][\d.]+(?: ?[Pp]\d+)?)"?\s*=\s*\[(.*)\]', text)
         if parameter:
             _set_parameter(offsets, int(parameter[1]), _number(parameter[2], parameter[1], path, line))
-        elif assignment and assignment[1].upper() in (*WORK_OFFSETS, "G28", "G30"):
+        elif assignment and is_offset(assignment[1].upper()):
             name = assignment[1].upper()
             values = [_number(v.strip(), name, path, line) for v in assignment[2].split(",") if v.strip()]
-            most = 7 if name in WORK_OFFSETS else 6
+            most = 6 if name in HOMES else 7
             if not 1 <= len(values) <= most:
                 raise InputError(
                     f"{name} has {len(values)} numbers", expected=f"1 to {most}", file=str(path), line=line
@@ -160,7 +179,7 @@ def read_offsets(path: str | Path) -> Offsets:
         else:
             raise InputError(
                 f"{text!r} is not an offset",
-                expected="G54 = [x, y, z, a, b, c, r] (to G59.3, G28, G30), or LinuxCNC's `5221 12.5`",
+                expected="G54 = [x, y, z, a, b, c, r] (to G59.3, G28, G30, G54.1 P1), or LinuxCNC's `5221 12.5`",
                 file=str(path),
                 line=line,
             )
@@ -168,15 +187,20 @@ def read_offsets(path: str | Path) -> Offsets:
 
 
 def set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
-    """Set G54 to G59.3 from x, y, z, a, b, c, r, or the reference points G28 and G30; missing ones are 0."""
+    """Set an offset (x, y, z, a, b, c, r) or a reference point, G28 or G30; missing numbers are 0."""
     axes = [*values[:6], *[0.0] * (6 - len(values[:6]))]
     if name == "G28":
         offsets.home_g28 = axes
     elif name == "G30":
         offsets.home_g30 = axes
     else:
-        rotation = values[6] if len(values) > 6 else 0.0
-        offsets.table[WORK_OFFSETS.index(name)] = WorkOffset(axes, rotation, given=True)
+        offset = WorkOffset(axes, values[6] if len(values) > 6 else 0.0, given=True)
+        if name in WORK_OFFSETS:
+            offsets.table[WORK_OFFSETS.index(name)] = offset
+        else:
+            number = additional_offset(name)
+            assert number is not None
+            offsets.additional[number] = offset
 
 
 def _set_parameter(offsets: Offsets, number: int, value: float) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from toolpath_stiff.nc.codes import WORK_OFFSETS
+from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, WORK_OFFSETS
 from toolpath_stiff.nc.coordinates import XY
 from toolpath_stiff.nc.motion import Mover
 from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.tables import ToolEntry, WorkOffset
 from toolpath_stiff.nc.words import Word
 
 
@@ -15,11 +15,16 @@ class Zeros(Mover):
 
     def _g10(self, word: Word) -> None:
         level, number = self.take("L"), self.take("P")
+        if self.dialect.increments:
+            self._fanuc_g10(word, level, number)
+            return
         if level == 1:
             self._g10_tool(word, number)
             return
         if level not in (2, 20):
             raise self.fail(word, f"with L{level:g}" if level is not None else "without L", "L2, L20 (offsets) or L1")
+        if number == 0 and self.frames.active >= len(WORK_OFFSETS):
+            raise self.fail(word, "P0 while an additional offset is in force", "P1 to P9")
         self._refuse_while_rotated(word, "sets a work offset")
         self._forget_polar()
         if number is None or number != int(number) or not 0 <= number <= len(WORK_OFFSETS):
@@ -39,6 +44,34 @@ class Zeros(Mover):
         else:
             for axis, value in words.items():
                 offset.axes[axis] = value
+        offset.given = True
+
+    def _fanuc_g10(self, word: Word, level: float | None, number: float | None) -> None:
+        """Fanuc's and Haas' G10: L2 sets G54 to G59, L20 the additional offsets, L10 the length of the tool of an H.
+
+        Sources: Fanuc's operator's manuals ("Programmable data input"), Haas' mill operator's manual (G10).
+        """
+        if level not in (2, 10, 20):
+            raise self.fail(word, f"with L{level:g}" if level is not None else "without L", "L2, L20 or L10")
+        most = {2: 6, 10: 999, 20: max(ADDITIONAL_OFFSETS[code] for code in self.dialect.additional)}[int(level)]
+        if number is None or number != int(number) or not 1 <= number <= most:
+            raise self.fail(word, f"L{level:g} without a number that it knows", f"P1 to P{most}")
+        if not self.absolute:
+            raise self.fail(word, "in incremental mode (G91), where it adds", "G90")
+        if level == 10:
+            length = self.take("R")
+            if length is None:
+                raise self.fail(word, "L10 without the length", "R")
+            self.tools = {} if self.tools is None else self.tools
+            self.tools.setdefault(int(number), ToolEntry(int(number))).length = length * self._scale
+            return
+        self._refuse_while_rotated(word, "sets a work offset")
+        self._forget_polar()
+        offsets = self.frames.offsets
+        index = int(number) - 1
+        offset = offsets.table[index] if level == 2 else offsets.additional.setdefault(index + 1, WorkOffset())
+        for axis, value in self._axis_words().items():
+            offset.axes[axis] = value
         offset.given = True
 
     def _offset_from_here(self, index: int, words: dict[int, float]) -> None:

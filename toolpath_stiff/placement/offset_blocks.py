@@ -13,12 +13,12 @@ import numpy as np
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Pose
-from toolpath_stiff.nc.codes import WORK_OFFSETS, code_name
+from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, WORK_OFFSETS, code_name
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
 from toolpath_stiff.nc.words import read_block
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
-OTHER_OFFSETS = WORK_OFFSETS[1:]
+OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
 NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
 USE_WRITE = "use --write, which transforms the program itself"

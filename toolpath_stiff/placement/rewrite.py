@@ -18,6 +18,7 @@ from toolpath_stiff.analysis.path_analysis import Analysis, analyse
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Pose
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.frames import Pose as ShopPose
 from toolpath_stiff.nc.interpreter import Interpreter
@@ -69,7 +70,7 @@ def rewrite_program(
     linearise: float | None = None,
     offsets: Offsets | None = None,
     tools: dict[int, ToolEntry] | None = None,
-    block_delete: bool = False,
+    block_delete: Switches = False,
 ) -> Rewritten:
     """Write a program so that at the original origin it does what it does, untouched, at a placement.
 
@@ -114,7 +115,8 @@ def rewrite_program(
         decimals,
         None if linearise is None else mm_from_m(linearise),
     )
-    pieces = list(_rewritten_lines(rewriter, text, program.name, block_delete))
+    switches = switches_on(block_delete, UNKNOWN_CONTROL)
+    pieces = list(_rewritten_lines(rewriter, text, program.name, switches))
     return Rewritten("".join(pieces), encoding, tuple(rewriter.notes))
 
 
@@ -141,7 +143,7 @@ def check_decimals(decimals: int | None) -> None:
         raise InputError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
 
 
-def _rewritten_lines(rewriter: Rewriter, text: str, name: str, block_delete: bool) -> Iterator[str]:
+def _rewritten_lines(rewriter: Rewriter, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
     """Lines with their ends; what follows the program's end stays as it is."""
     lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), LINE_END.findall(text)
     ends += [""] * (len(lines) - len(ends))
@@ -155,7 +157,7 @@ def _rewritten_lines(rewriter: Rewriter, text: str, name: str, block_delete: boo
         written = [line]
         if block.percent:
             running, started = not started, True
-        elif block.optional and block_delete:
+        elif block.optional and block.switch in switches:
             _refuse_left_out(bool(block.words), number, name)
         else:
             started = started or bool(block.words)
