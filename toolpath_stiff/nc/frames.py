@@ -87,7 +87,7 @@ class Frames:
     @property
     def rotated(self) -> bool:
         """Whether a work offset or G68 turns the program's X and Y."""
-        return self.rotation is not None or self.offsets.table[self.active].rotation != 0.0
+        return self.rotation is not None or self.offsets.at(self.active).rotation != 0.0
 
     @property
     def turned(self) -> float:

@@ -217,7 +217,7 @@ class Mover(Coordinates):
         if normal in words:
             self.sticky["Z"] = words.pop(normal)
         self._check_cycle(code, normal)
-        if self.sticky.setdefault("unit", self._scale) != self._scale:
+        if self.sticky.setdefault("unit", self.length_scale) != self.length_scale:
             raise self.fail(
                 None,
                 f"{code} after a change between G20 and G21: controls differ in whether the run keeps its heights",

@@ -63,7 +63,7 @@ class Zeros(Mover):
             if length is None:
                 raise self.fail(word, "L10 without the length", "R")
             self.tools = {} if self.tools is None else self.tools
-            self.tools.setdefault(int(number), ToolEntry(int(number))).length = length * self._scale
+            self.tools.setdefault(int(number), ToolEntry(int(number))).length = length * self.length_scale
             return
         self._refuse_while_rotated(word, "sets a work offset")
         self._forget_polar()
