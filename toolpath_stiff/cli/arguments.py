@@ -105,10 +105,9 @@ def switches_argument(text: str) -> frozenset[int] | bool:
 
 def whole_options(arguments: Sequence[str]) -> list[str]:
     """`--block-delete` before anything but switches is the whole option: what follows is a program."""
-    following = [*arguments[1:], ""]
     return [
         f"{word}={ALL_BLOCKS}" if word == "--block-delete" and not SWITCHES.fullmatch(after) else word
-        for word, after in zip(arguments, following, strict=True)
+        for word, after in zip(arguments, [*arguments[1:], ""], strict=False)
     ]
 
 

@@ -164,7 +164,7 @@ def check_lines(
     if not any(line.strip() for line in lines):
         raise InputError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
-        return _check_cutter_location(lines, name, origin or default_origin, block_delete, controller)
+        return _check_cutter_location(lines, name, origin or default_origin, bool(block_delete), controller)
     place, default = None if origin is None else _to_mm(origin), _to_mm(default_origin)
     posted = controller.kinematics
     if posted is None:

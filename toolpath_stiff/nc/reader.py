@@ -151,7 +151,7 @@ def _read(
                 file=name,
             )
         place, default = None if origin is None else _six(origin), _six(default_origin)
-        warnings = cutter_location.not_for(controller, any(o.given for o in offsets.table), block_delete)
+        warnings = cutter_location.not_for(controller, any(o.given for o in offsets.table), bool(block_delete))
         return cutter_location.read(lines, name, path, place, default, tools, warnings)
     foreign = foreign_program(lines, name)
     if foreign is not None:
