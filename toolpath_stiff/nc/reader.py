@@ -108,7 +108,7 @@ def _read_on_part(
     default_origin: Iterable[float],
     offsets: Offsets,
     tools: dict[int, ToolEntry] | None,
-    block_delete: bool,
+    block_delete: Switches,
     interpreter: str,
     rs274: str | None,
     controller: Controller,
