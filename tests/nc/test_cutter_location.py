@@ -137,6 +137,144 @@ def test_moves_of_autodesks_iso_4343_post():
     assert error.line == 5 and "ANGLE says 90" in str(error)
 
 
+CATIA = """\
+$$ -----------------------------------------------------------------
+$$     Generated on Tuesday
+$$     CATIA APT VERSION 1.0
+$$ -----------------------------------------------------------------
+$$*CATIA0
+$$ Part Operation.1
+$$     1.00000     0.00000     0.00000    12.00000
+$$     0.00000     1.00000     0.00000     0.00000
+$$     0.00000     0.00000     1.00000     0.00000
+PARTNO PART OPERATION.1
+COOLNT/ON
+CUTCOM/OFF
+PPRINT TOOL = T1 END MILL D 10, A $ AND A / IN IT
+$$ OPERATION NAME : Tool Change.1
+$$ TOOLCHANGEBEGINNING
+CUTTER/ 10.000000,  2.000000,  3.000000,  2.000000,  0.000000,$
+         0.000000, 50.000000
+TOOLNO/1,MILL,1,0,   14.106000,  100.000000,$
+  100.000000,  100.000000,   20.000000,   15.000000,,   40.000000,$
+ 1000.000000,MMPM,   70.000000,RPM,CLW,$
+ON,,NOTE
+TPRINT/T1 End Mill D 10,T1 End Mill D 10,T1 End Mill D 10
+LOADTL/1,1,1
+$$ TOOLCHANGEEND
+$$ OPERATION NAME : Multi-Axis Sweeping.1
+FEDRAT/  300.0000,MMPM
+SPINDL/   70.0000,RPM,CLW
+MULTAX
+RAPID
+GOTO  /   10.00000,   20.00000,   50.00000, 0.000000, 0.000000, 1.000000
+GOTO  /   10.00000,   20.00000,    0.00000, 0.000000, 0.000000, 1.000000
+FEDRAT/ 1000.0000,MMPM
+GOTO  /   30.00000,   20.00000,    0.00000, 0.173648, 0.000000, 0.984808
+SPINDL/OFF
+REWIND/0
+END
+FINI
+"""
+NX = """\
+TOOL PATH/CAVITY_MILL_1,TOOL,MILL D10 R1
+TLDATA/MILL,10.0000,1.0000,75.0000,0.0000,0.0000
+MSYS/0.0000,0.0000,-50.0000,1.0000000,0.0000000,0.0000000,0.0000000,1.0000000,0.0000000
+$$ centerline data
+PAINT/PATH
+PAINT/SPEED,10
+LOAD/TOOL,62,ADJUST,62
+SELECT/TOOL,62
+SPINDL/RPM,3600,CLW
+PAINT/COLOR,186
+RAPID
+GOTO/10.0000,20.0000,50.0000,0.0000000,0.0000000,1.0000000
+PAINT/COLOR,42
+FEDRAT/MMPM,300.0000
+GOTO/10.0000,20.0000,0.0000
+PAINT/COLOR,31
+FEDRAT/1000.0000
+GOTO/30.0000,20.0000,0.0000,0.1736482,0.0000000,0.9848078
+PAINT/TOOL,NOMORE
+END-OF-PATH
+"""
+CREO = """\
+$$* Pro/CLfile  Version 10.0
+$$-> MFGNO / PART
+PARTNO / PART
+$$-> FEATNO / 25
+MACHIN / UNCX01, 1
+$$-> CUTCOM_GEOMETRY_TYPE / OUTPUT_ON_CENTER
+UNITS / MM
+LOADTL / 1, OSETNO, 1
+$$-> CUTTER / 10.000000
+$$-> CSYS / 1.0000000000, 0.0000000000, 0.0000000000, 0.0000000000, $
+ 0.0000000000, 1.0000000000, 0.0000000000, 0.0000000000, $
+ 0.0000000000, 0.0000000000, 1.0000000000, 0.0000000000
+MULTAX / ON
+SPINDL / RPM, 3600.000000,  CLW
+RAPID
+GOTO / 10.0000000000, 20.0000000000, 50.0000000000, $
+0.0000000000, 0.0000000000, 1.0000000000
+FEDRAT / 300.000000,  MMPM
+GOTO / 10.0000000000, 20.0000000000, 0.0000000000
+FEDRAT / 1000.000000,  MMPM
+GOTO / 30.0000000000, 20.0000000000, 0.0000000000, $
+0.1736481777, 0.0000000000, 0.9848077530
+SPINDL / OFF
+MULTAX / OFF
+$$-> END /
+FINI
+"""
+AUTODESK = """\
+MACHIN/generic
+MODE/MILL
+PARTNO/'1001'
+PPRINT/'1001'
+
+PPRINT/'NEW SECTION'
+CSI_TOOL_PATH/Flow1
+CSI_SET_PATH_PARAM/CSI_FORCE_TOOL_CHANGE=1
+
+UNITS/MM
+MULTAX/ON
+
+PPRINT/'MATRIX DEFINITION'
+MCS/1., 0., 0., $
+0., 1., 0., $
+0., 0., 1., $
+0., 0., 0.
+
+CUTTER/10., 0., 0., 0., 0., 0., 30.
+CSI_SET_FLUTE_LENGTH/20.
+LOADTL/1, 0, 30., 1
+SPINDL/RPM,3600.,CLW
+COOLNT/FLOOD
+ZERO/1
+RAPID
+GOTO/10., 20., 50., 0., 0., 1.
+FEDRAT/300., MMPM
+GOTO/10., 20., 0., 0., 0., 1.
+FEDRAT/1000., MMPM
+GOTO/30., 20., 0., 0.173648178, 0., 0.984807753
+COOLNT/OFF
+END
+FINI
+"""
+
+
+@pytest.mark.parametrize(("text", "tool"), [(CATIA, 1), (NX, 62), (CREO, 1), (AUTODESK, 1)])
+def test_one_path_in_the_words_of_four_systems(text, tool):
+    """Down by 50 at 300 mm/min, then 20 across at 1000 while the tool leans by 10 degrees. Numbers ours."""
+    program = read(text)
+    moves = program.moves
+    assert set(moves.motion) == {FEED} and set(moves.tool) == {tool}
+    np.testing.assert_allclose(move_lengths(moves), [50 * MM, 20 * MM])
+    np.testing.assert_allclose(moves.feed, [300 * MM / 60, 1000 * MM / 60])
+    np.testing.assert_allclose(np.degrees(moves.end[-1, 3:]), [0, 10, 0], atol=1e-4)
+    assert not program.warnings
+
+
 # -- closed cases --------------------------------------------------------------------------------------------------
 
 
@@ -396,6 +534,7 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("GOT/1,2,3", 3, "may move the tool"),
         ("STRANGE/1,2,3", 3, "may move the tool"),
         ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2\nRAPID", 4, "is the next point a hole"),
+        ("ZERO/1\nGOTO/0,0,0\nZERO/2", 5, "another coordinate system"),
         ("G1 X10 Y5", 3, "no statement"),
         ("%", 3, "no statement"),
     ],

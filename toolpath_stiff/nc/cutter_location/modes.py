@@ -61,7 +61,7 @@ class Modes(ToolPath):
         self.circle_line = 0
         self.rapid = 0  # line of the RAPID that waits for its motion
         self.statement = Statement(1, 1, "")
-        self._frame: tuple[str, ...] | None = None
+        self._frames: dict[str, tuple[str, ...]] = {}
         self._revolutions = 0.0
 
     def fail(self, found: str, expected: str = "", hint: str = "", at: Argument | None = None) -> InputError:
@@ -210,13 +210,14 @@ class Modes(ToolPath):
 
     def _frame_word(self, statement: Statement) -> None:
         frame = tuple(" ".join(word.split()) for word in self._words(statement))
-        if self._frame is not None and frame != self._frame and self.point is not None:
+        before = self._frames.get(statement.word, frame)
+        if frame != before and self.point is not None:
             raise self.fail(
                 f"{statement.shown}: another coordinate system than the one before",
                 "one system for the whole file",
                 "write each of them to a file of its own",
             )
-        self._frame = frame
+        self._frames[statement.word] = frame
         self._note(self.noted, statement, vocabulary.FRAMES[statement.word])
 
     def _fini(self, statement: Statement) -> None:

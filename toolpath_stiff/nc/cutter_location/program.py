@@ -22,6 +22,7 @@ def not_for(controller: Controller, offsets_given: bool, block_delete: bool) -> 
         ("work offsets", offsets_given),
         ("posted kinematics", controller.kinematics is not None),
         ("block-delete switches", block_delete or bool(controller.switches)),
+        ("posted kinematics", controller.kinematics is not None),
     )
     return tuple(f"{what} mean nothing to a cutter-location file and are not used" for what, asked in given if asked)
 

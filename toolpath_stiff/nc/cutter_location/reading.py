@@ -66,6 +66,7 @@ class CutterLocation(Curves):
             "ORIGIN": self._shift,
             "MSYS": self._frame_word,
             "MCS": self._frame_word,
+            "ZERO": self._frame_word,
             "FINI": self._fini,
         }
 

@@ -52,12 +52,18 @@ HARMLESS = {
     **dict.fromkeys(("PAINT", "DISPLY", "PLOT", "VERIFY", "CLPRNT"), _DRAWING),
     **dict.fromkeys(("TOOLNO", "SELECT", "SELCTL", "SELECTL", "TLCHG", "OFSTNO", "TOOL", "HEAD", "SWITCH"), _TOOL),
     **dict.fromkeys(("MACHIN", "SEQNO", "LEADER", "TMARK", "REWIND", "CHANNEL", "NOPOST", "CLDATA", "PROGRM"), _OUTPUT),
+    **dict.fromkeys(("CSI_PROGRAM_COMMENT", "CSI_SET_PATH_PARAM", "CSI_PATH_TOLERANCE"), "for CAMplete"),
+    **dict.fromkeys(("CSI_SET_FLUTE_LENGTH",), _TOOL),
     **dict.fromkeys(("COOLNT", "FLUSH"), "coolant"),
     **dict.fromkeys(("CLEARP", "CLRSRF"), "a plane to retract to, of which nothing is made without RETRCT"),
     **dict.fromkeys(("AUTOPS", "PSIS"), "the part surface; the points have its height already"),
     **dict.fromkeys(("CLAMP", "UNCLMP"), "clamps of machine axes"),
 }
-FRAMES = {"MSYS": _FRAME, "MCS": _FRAME}  # a second, different one is refused
+FRAMES = {
+    "MSYS": _FRAME,
+    "MCS": _FRAME,
+    "ZERO": "the work offset of the posted program; here it is program zero",
+}  # a second, different one is refused
 
 _WHOLE_PATH = ("changes where all that follows lies", "have the CAM system write the points where they are cut")
 _TURN = ("turns the work or the head of one machine", "have the CAM system write points and tool axes in one system")
@@ -90,6 +96,7 @@ DOUBTFUL = {
     "AUXFUN": "an M code of one control: what it does is not known",
     "PREFUN": "a G code of one control: what it does is not known",
     "INSERT": "a block for the control as it stands: what it does is not known",
+    "CSI_INSERT_CUSTOM_GCODE": "a block for the control as it stands: what it does is not known",
     "GOHOME": "the way home is not part of the path",
     "OPSKIP": "statements that the operator may leave out: they are read",
 }
