@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from urllib.parse import unquote
 
 import pytest
 
@@ -172,6 +174,20 @@ def test_one_program_has_no_overview_however_often_it_is_named(shop):
     assert main(["analyze", "jobs/a/part.nc", "jobs/a/../a/part.nc", *SHORT]) == 0
     assert set(files_of(shop / "reports")) == {"part/samples.csv", "part/summary.json"}
     assert main(["analyze", "jobs/bad.nc"]) == 2
+
+
+@pytest.mark.parametrize("name", ["ä b#?.nc", "two\nlines.nc", "\udcff.nc", "%41.nc", "<b>.nc"])
+def test_any_file_name_has_its_report_and_a_link_to_it(name, shop, capsys):
+    try:
+        (shop / "odd").mkdir()
+        (shop / "odd" / name).write_text(PART)
+    except OSError:
+        pytest.skip("this file system does not take the name")
+    assert main(["analyze", "odd", "--out", "o", *SHORT]) == 0
+    assert main(["analyze", f"odd/{name}", "--out", "single", *SHORT]) == 0
+    capsys.readouterr().out.encode("utf-8")  # raises for what no terminal can show
+    (link,) = re.findall('<a href="([^"]*)"', (shop / "o/index.html").read_text(encoding="utf-8"))
+    assert (shop / "o" / unquote(link, errors="surrogateescape")).is_file()
 
 
 TRAP = '''

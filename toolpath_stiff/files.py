@@ -50,7 +50,7 @@ def _encoded(content: str | bytes | Iterable[str | bytes]) -> Iterator[bytes]:
         yield content
     else:
         for piece in [content] if isinstance(content, str) else content:
-            yield piece.encode("utf-8") if isinstance(piece, str) else piece
+            yield piece.encode("utf-8", "replace") if isinstance(piece, str) else piece
 
 
 def _umask() -> int:

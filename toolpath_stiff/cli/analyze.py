@@ -189,6 +189,7 @@ def _run_single(args: argparse.Namespace, file: str) -> int:
 
 def _print(args: argparse.Namespace, report: Report) -> None:
     from toolpath_stiff.report.terminal import comparison_table, terminal_table
+    from toolpath_stiff.report.wording import plain
 
     print(terminal_table(report.summary))
     if report.second is not None:
@@ -197,4 +198,4 @@ def _print(args: argparse.Namespace, report: Report) -> None:
         print(f"below the required {args.require:g} N/mm:")
         for line, stiffness in report.missed:
             print(f"  line {line}: {stiffness:.0f} N/mm  {report.program.source[line - 1].strip()}")
-    print("\n".join(["written:", *(f"  {path}" for path in report.files)]))
+    print("\n".join(["written:", *(f"  {plain(str(path))}" for path in report.files)]))

@@ -20,6 +20,7 @@ from toolpath_stiff.cli.progress import say
 from toolpath_stiff.cli.workers import answers, one_thread
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.report.batch import PAGE_MARK, TABLE_MARK, Outcome, figures_of, summary_csv, terminal_summary
+from toolpath_stiff.report.wording import plain
 
 INCOMPLETE = 1  # exit code: a program failed, or samples were left out
 INDEX, SUMMARY = RESERVED
@@ -47,7 +48,7 @@ def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
     _check(setting)
     if not args.json:
         for count in counts:
-            print(count, flush=True)
+            print(plain(str(count)), flush=True)
     with _folders_for(setting.out, programs):
         outcomes = _outcomes(programs, setting, jobs)
         files = _write_overview(setting.out, outcomes)
@@ -55,7 +56,7 @@ def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
         _print_json(setting.out, programs, outcomes)
     else:
         print(terminal_summary(outcomes))
-        print("\n".join(["written:", *(f"  {path}" for path in files)]))
+        print("\n".join(["written:", *(f"  {plain(str(path))}" for path in files)]))
     if any(one.status != "done" for one in outcomes):
         return INCOMPLETE
     return BELOW_REQUIRED if any((one.figures or {}).get("lines_below_required") for one in outcomes) else 0
@@ -127,7 +128,7 @@ def _outcomes(programs: Sequence[Listed], setting: Setting, jobs: int) -> list[O
         for place, outcome in answers([programs[i] for i in order], partial(start_worker, setting), died, jobs):
             outcomes[order[place]] = outcome
             done += 1
-            say(f"{done}/{len(programs)} programs, {outcome.name}{': failed' if outcome.reason else ''}")
+            say(f"{done}/{len(programs)} programs, {plain(outcome.name)}{': failed' if outcome.reason else ''}")
     finally:
         say("")
     return [one for one in outcomes if one is not None]
