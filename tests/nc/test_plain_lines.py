@@ -70,7 +70,7 @@ def assert_same(lines, dialect="generic"):
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.name)
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_programs(program, dialect):
-    lines = read_lines(program)[:6000]
+    lines = read_lines(program)[: None if dialect == "generic" else 2000]
     assert assert_same(lines, dialect) > 0 or not DIALECTS[dialect].semicolon  # whose blocks end at `;`
 
 

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.machine import Machine
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.path import move_lengths, place, sample_moves
 from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.path.sampling import RAPID_FEED, move_durations
+from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.path.sampling import BLOCK, RAPID_FEED, move_durations
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
 
 FloatArray = NDArray[np.float64]
@@ -158,9 +159,7 @@ def machine_findings(
     """
     assert checked.moves is not None
     samples = sample_moves(place(checked.moves, origin), step=step, rapid_feed=machine.rapid_feed, origin=origin)
-    rotation = rotation_matrices(samples.abc)
-    struts = solve_struts(machine, samples.position, rotation, samples.tool_length)
-    within = reach(machine, samples.position, struts, rotation)
+    strut_lengths, within = _struts_and_reach(machine, samples)
     cutting = samples.motion != RAPID
     findings = []
     for line in np.unique(samples.line[~within.reachable])[:MOST_NAMED]:
@@ -171,7 +170,7 @@ def machine_findings(
         findings.append(Finding(int(line), 0, "reach", text, ERROR if cuts else WARNING))
     findings += _rest("reach", len(np.unique(samples.line[~within.reachable])))
     same = (samples.move[1:] == samples.move[:-1]) & cutting[1:] & (np.diff(samples.t) > 0.0)
-    speed = np.abs(np.diff(struts.lengths, axis=0)[same]) / np.diff(samples.t)[same, None]
+    speed = np.abs(np.diff(strut_lengths, axis=0)[same]) / np.diff(samples.t)[same, None]
     if not len(speed):
         return findings, {}
     fastest, lines = speed.max(axis=1), samples.line[1:][same]
@@ -187,6 +186,21 @@ def machine_findings(
             findings.append(Finding(int(line), 0, "strut speed", text, WARNING))
         findings += _rest("strut speed", len(over))
     return findings, {"mm_per_min": mm_per_min_from_m_per_s(float(fastest[top])), "line": int(lines[top])}
+
+
+def _struts_and_reach(machine: Machine, samples: Samples) -> tuple[FloatArray, Reach]:
+    """(n, 6) m strut lengths of n samples, and their reach; block by block, as work arrays of a long path are large."""
+    n = len(samples)
+    lengths = np.empty((n, 6))
+    found = Reach(np.empty(n), np.empty(n, dtype=np.int64), np.empty(n), machine_limits(machine))
+    for start in range(0, n, BLOCK):
+        rows = slice(start, start + BLOCK)
+        position, rotation = samples.position[rows], rotation_matrices(samples.abc[rows])
+        struts = solve_struts(machine, position, rotation, samples.tool_length[rows])
+        within = reach(machine, position, struts, rotation)
+        lengths[rows] = struts.lengths
+        found.margin[rows], found.limit[rows], found.value[rows] = within.margin, within.limit, within.value
+    return lengths, found
 
 
 def _rest(code: str, count: int) -> list[Finding]:
