@@ -13,7 +13,10 @@ from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import assert_same_path, debian_programs
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.nc import read_program
+from toolpath_stiff.nc.controller import read_controller
 from toolpath_stiff.path import move_lengths
+from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.path.sampling import move_durations
 
 FOLDER = Path(__file__).parent.parent / "programs"
 PROGRAMS = sorted(FOLDER.glob("*.nc"))
@@ -39,7 +42,9 @@ def test_there_are_enough():
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda p: p.stem)
 def test_each_ends_in_a_report(program, tmp_path, capsys):
     out = tmp_path / "out"
-    code = main(["analyze", str(program), "--no-plots", "--json", "--tools", str(TOOLS), "--out", str(out)])
+    control = program.with_suffix(".toml")  # of a program that was posted for another machine
+    posted = ["--controller", str(control)] if control.exists() else []
+    code = main(["analyze", str(program), "--no-plots", "--json", "--tools", str(TOOLS), "--out", str(out), *posted])
     assert code == 0
     summary = json.loads(capsys.readouterr().out)
     assert 10_000 < summary["min_N_per_mm"] <= summary["mean_N_per_mm"] <= summary["max_N_per_mm"] < 200_000
@@ -76,6 +81,31 @@ def test_surface_is_what_its_script_writes():
     text = runpy.run_path(str(FOLDER / "make_surface.py"))["program"]()
     assert (FOLDER / "surface_50000.nc").read_text() == text
     assert len(text.splitlines()) > 50_000
+
+
+def test_dome_is_what_its_script_writes_and_lies_on_its_sphere():
+    script = runpy.run_path(str(FOLDER / "make_dome.py"))
+    assert (FOLDER / "dome_ac_table.nc").read_text() == script["program"]()
+    program = read_program(
+        FOLDER / "dome_ac_table.nc", controller=read_controller(FOLDER / "dome_ac_table.toml"), tool_table=TOOLS
+    )
+    assert program.kinematics == "table-table A C" and not program.warnings
+    moves = program.moves
+    posted = np.flatnonzero((np.diff(moves.line, append=0) != 0) & (moves.motion != 0))[
+        1:
+    ]  # ends of the program's cuts
+    tips = 1e3 * moves.end[posted, :3]
+    out = tips - np.array([0.0, 0.0, -script["RADIUS"]])  # from the sphere's centre
+    # Words of four decimals: angles of 5e-5 degrees at 500 mm or less from the tables' axes, and 5e-5 mm.
+    np.testing.assert_allclose(np.linalg.norm(out, axis=1), script["RADIUS"], atol=1e-3)
+    axes = rotation_matrices(moves.end[posted, 3:])[:, :, 2]
+    np.testing.assert_allclose(axes, out / script["RADIUS"], atol=1e-5)
+    seconds = move_durations(moves)[np.isin(moves.line, moves.line[posted])].sum()
+    lengths = sum(
+        np.linalg.norm(np.subtract(script["cutter_location"](i)[0], script["cutter_location"](i - 1)[0]))
+        for i in range(1, script["POINTS"] + 1)
+    )
+    assert seconds == pytest.approx(60.0 * lengths / script["FEED"], rel=1e-4)  # G93, three decimals
 
 
 @pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's programs are not installed")
