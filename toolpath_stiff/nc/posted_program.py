@@ -105,7 +105,8 @@ def on_the_part(
 
 def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: str) -> None:
     """Raise `InputError` for work offsets with A, B, C under tool centre point control: controls differ in them."""
-    if kinematics.tcp and any(any(offset.axes[3:]) for offset in offsets.table):
+    every = (*offsets.table, *offsets.additional.values())
+    if kinematics.tcp and any(any(offset.axes[3:]) for offset in every):
         raise InputError(
             "a work offset with A, B or C, and tool centre point control (kinematics.tcp = true): controls differ in "
             "what X Y Z are then",
