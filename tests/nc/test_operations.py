@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.nc import rs274
-from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, operations
+from toolpath_stiff.nc.headings import headings, plain_name
+from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, find_operations, operations
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 
@@ -403,3 +404,45 @@ def test_operations_are_stretches_that_cut_and_hold_one_tool(lines: list[str]) -
         assert row.first_line <= mine.line.min()
         assert row.last_line == mine.line.max()
         assert row.name
+
+
+@pytest.mark.parametrize(
+    ("comment", "name"),
+    [
+        ("--- POCKET ---", "POCKET"),
+        ("*** ROUGH ***", "ROUGH"),
+        ("-X SIDE", "-X SIDE"),
+        ("R.5 CHAMFER, 2.", "R.5 CHAMFER, 2."),
+        ("| Toolpath:- 'Profile 2'    ", "Toolpath:- 'Profile 2"),
+        ("=====", ""),
+        ("MSG, - WALL -", "WALL"),
+        ("A ---- B", "A ---- B"),
+    ],
+)
+def test_frames_around_names(comment: str, name: str) -> None:
+    assert plain_name(comment) == name
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "(" + "-" * 3000 + "X" + "-" * 3000 + "Y)",
+        "(" + "X1111 " * 500 + "POCKET)",
+        " " * 20000 + "O" + " " * 20000 + "(A)",
+        "(" * 5000,
+        ";" + "A1 " * 3000 + "!",
+        "N" + "1" * 5000 + "(",
+        "M" + "0" * 5000 + "X",
+    ],
+)
+def test_no_line_takes_forever(line: str) -> None:
+    headings([line] * 3)
+    moves = parse_program("G1 X1 F100\nX2\n").moves
+    assert len(find_operations([line, "", line], moves, "part.nc").rows) >= 1
+
+
+@given(st.lists(st.text(alphabet="(); NOMGTX019-*\t:.%/#<>[]äß", max_size=12), max_size=8))
+def test_any_text_is_looked_through(lines: list[str]) -> None:
+    for heading in headings(lines):
+        assert heading.name
+        assert 1 <= heading.line <= len(lines)

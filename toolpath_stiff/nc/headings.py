@@ -15,9 +15,10 @@ from typing import NamedTuple
 NAMED, MARKED, TOOL = "named", "marked", "tool"
 
 COMMENTS = re.compile(r"\(([^()]*)\)?|;(.*)")
-NO_WORDS = re.compile(r"\s*(?:N\s*\d+\s*)?", re.IGNORECASE)  # a line number is no word
+NO_WORDS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?", re.IGNORECASE)  # a line number is no word
+BEGINS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?[(;]", re.IGNORECASE)
 ACTIVE = re.compile(r"\s*(?:MSG|DEBUG|PRINT)\s*,", re.IGNORECASE)  # LinuxCNC shows what follows
-BORDER = re.compile(r"^(?:[\s*=#~|'\"]|[-_.]{2,})+|(?:[\s*=#~|'\"]|[-_.]{2,})+$")
+FRAME, DASHES = " *=#~|'\"", "-_."  # of dashes and points only two and more are a frame: -X SIDE, .5 CHAMFER
 MARK = re.compile(
     r"(?:(?:begin|start)\s+(?:of\s+)?(?:operation|section|toolpath|cutting\s+path\s+id)|tool\s?path(?:\s+name)?"
     r"|operation(?:\s+name)?|block-name)\s*:-?\s*(?=.*\w)",
@@ -30,7 +31,7 @@ NOTHING = re.compile(
     r"|.*\b(?:done|finished|completed)$"
     r"|(?:begin|start)\s+(?:of\s+)?(?:preamble|tool\s?change)\b|tool\s?change$|(?:section|start|stop|end)\s+(?:begin|end)$"
     r"|(?:MOVEMENT|COMMAND)_\w+$|>>>|block-(?:expand|enable)\b|[XYZ]\s+min\b|when\s+using\s+fusion\b"
-    r"|(?:[A-Z]\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*)+(?:;.*)$|(?:[A-Z]\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*){2,}$",
+    r"|(?:[A-Z]\s*[-+]?(?:\d++\.?\d*+|\.\d++)\s*)++(?:;.*)$|(?:[A-Z]\s*[-+]?(?:\d++\.?\d*+|\.\d++)\s*){2,}+$",
     re.IGNORECASE,
 )
 FROM_HERE_NOTES = re.compile(r"when\s+using\s+fusion\b", re.IGNORECASE)  # the rest of its block is its sentence
@@ -53,9 +54,9 @@ def headings(lines: Sequence[str]) -> list[Heading]:
     """Blocks of successive lines that hold comments alone, in order; those that name nothing are left out."""
     found: list[Heading] = []
     block: list[str] = []
-    first = last = 0
+    first = last = -1
     for number, text in enumerate(lines, 1):
-        if "(" not in text and ";" not in text:
+        if ("(" not in text and ";" not in text) or not BEGINS.match(text):
             continue
         code, comment = split_comments(text)
         if not NO_WORDS.fullmatch(code):
@@ -100,4 +101,12 @@ def plain_name(comment: str) -> str:
     """A comment without what frames it: blanks, asterisks, dashes; the text alone of `MSG, text`."""
     active = ACTIVE.match(comment)
     text = " ".join((comment[active.end() :] if active else comment).split())
-    return BORDER.sub("", text)
+    inside = text.lstrip(FRAME + DASHES)
+    text = _last_dash(text[: len(text) - len(inside)]) + inside
+    inside = text.rstrip(FRAME + DASHES)
+    return inside + _last_dash(text[len(inside) :][::-1])
+
+
+def _last_dash(frame: str) -> str:
+    """The dash or point next to the text, if it stands alone: it belongs to the text."""
+    return frame[-1:] if frame and frame[-1] in DASHES and frame[-2:-1] not in tuple(DASHES) else ""

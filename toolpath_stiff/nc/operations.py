@@ -22,11 +22,11 @@ IntArray = NDArray[np.int64]
 MOST_OPERATIONS = 1000  # beyond, comments name passes or moves, not operations: the tools are taken
 # A call, a return, a loop or a condition: M97, M98, M99 and LinuxCNC's O words (`o100 call`, `o<name> while`).
 LEAVES = re.compile(
-    r"\s*(?:/\s*\d?\s*)?(?:N\s*\d+\s*)?(?:O\s*(?:\d+\s*[A-Z]|[<#\[])|[^O(;]*M\s*0*9[789](?!\d))", re.IGNORECASE
+    r"\s*+(?:/\s*+\d?\s*+)?(?:N\s*+\d++\s*+)?(?:O\s*(?:\d+\s*[A-Z]|[<#\[])|[^O(;]*?M\s*+0*9[789](?!\d))", re.IGNORECASE
 )
 # Where a run arrives only from elsewhere: the head of a subprogram, and what follows the end of a program.
-HEAD = re.compile(r"\s*(?:/?\s*[O:]\s*\d+|[^(;]*M\s*0*(?:2|30)(?!\d)[^(;]*)\s*(?:[(;].*)?$", re.IGNORECASE)
-BARE = re.compile(r"\s*(?:%|[O:]\s*\d+|N\s*\d+)?\s*", re.IGNORECASE)
+HEAD = re.compile(r"\s*+(?:/?\s*[O:]\s*\d+\s*+(?:[(;]|$)|[^(;]*?M\s*+0*(?:2|30)(?!\d))", re.IGNORECASE)
+BARE = re.compile(r"\s*+(?:%|[O:]\s*+\d++|N\s*+\d++)?\s*+", re.IGNORECASE)
 CHANGES_TOOL = re.compile(r"M\s*0*6(?!\d)|T\s*\d", re.IGNORECASE)
 
 
