@@ -30,6 +30,7 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
 }
 INCH_FEEDS = ("IPM", "IPR", "FPM", "FPR")
 LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_PER_INCH}
+SAME_LENGTH_MM = 1e-3
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
 
 
@@ -254,10 +255,20 @@ class Modes(ToolPath):
         entry = (self.tools or {}).get(self.tool)
         if entry is not None and not math.isnan(entry.length):
             self.tool_length = entry.length
+            if length > 0.0 and abs(length - entry.length) > SAME_LENGTH_MM:
+                self.assume(
+                    f"tool {self.tool}: the tool table's length {entry.length:g} mm, not LOADTL's {length:g} mm"
+                )
         else:
             self.tool_length = length if length > 0.0 else math.nan
             if length > 0.0:
                 self.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools wins over it")
+
+    def _toolno(self, statement: Statement) -> None:
+        if "TURN" in self._words(statement):
+            found, hint = vocabulary.TURNING
+            raise self.fail(f"{statement.shown} {found}", "a milling tool", hint)
+        self._note(self.noted, statement, vocabulary.HARMLESS["TOOLNO"])
 
     def _cutter(self, statement: Statement) -> None:
         """The first number is the diameter, in all of APT's forms."""

@@ -62,6 +62,7 @@ class CutterLocation(Curves):
             "CYCLE": self._cycle_word,
             "CUTCOM": self._cutcom,
             "MODE": self._mode,
+            "TOOLNO": self._toolno,
             "TRANS": self._shift,
             "ORIGIN": self._shift,
             "MSYS": self._frame_word,

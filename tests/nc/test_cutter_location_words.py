@@ -1,0 +1,193 @@
+"""The words of cutter-location files: what they do, what is refused and where."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.nc.cutter_location import MM, START, read, refused
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.moves import FEED, RAPID
+from toolpath_stiff.nc.tables import ToolEntry
+
+
+def test_rapids_are_for_one_motion_and_from_is_where_the_tool_stands():
+    moves = read(f"{START}FROM/0,0,100\nRAPID\nGOTO/0,0,5\nGOTO/0,0,0\nRAPID\nGODLTA/0,0,7\nGODLTA/1,0,0\n").moves
+    assert list(moves.motion) == [RAPID, FEED, RAPID, FEED]
+    np.testing.assert_allclose(moves.start[0, :3], [0, 0, 0.1])
+    np.testing.assert_allclose(moves.end[:, 2], [0.005, 0, 0.007, 0.007])
+
+
+@pytest.mark.parametrize(
+    ("feed", "mm_per_min"),
+    [
+        ("FEDRAT/500,MMPM", 500),
+        ("FEDRAT / MMPM , 500.", 500),
+        ("FEDRAT/500", 500),
+        ("FEDRAT/5.0E+2,PERMIN", 500),
+        ("FEDRAT/10,IPM", 254),
+        ("SPINDL/RPM,2000,CLW\nFEDRAT/0.1,MMPR", 200),
+        ("SPINDL/ 2000.0000,RPM,CLW\nFEDRAT/PERREV,0.1", 200),
+        ("SPINDL/CCLW,2000\nFEDRAT/MMPR,0.1", 200),
+        ("SPINDL/2000,CLW\nSPINDL/OFF\nSPINDL/ON\nFEDRAT/MMPR,0.1", 200),
+    ],
+)
+def test_feeds(feed, mm_per_min):
+    moves = read(f"UNITS/MM\n{feed}\nGOTO/0,0,0\nGOTO/1,0,0\n").moves
+    assert moves.feed[0] == pytest.approx(mm_per_min * MM / 60)
+
+
+def test_inches():
+    program = read(
+        "UNITS/INCHES\nLOADTL/1,LENGTH,2\nCUTTER/0.5\nFEDRAT/10\nGOTO/0,0,0\nGOTO/1,0,0\nGOTO/1,0,0,0,.6,.8\n"
+    )
+    moves = program.moves
+    assert moves.end[0, 0] == pytest.approx(0.0254) and moves.feed[0] == pytest.approx(0.254 / 60)
+    assert moves.tool_length[0] == pytest.approx(0.0508) and program.tools[0].diameter == pytest.approx(0.0127)
+    # The tip stands, the tool turns: the feed's mm count as degrees, whatever the unit of the file.
+    assert moves.feed[-1] == pytest.approx(math.radians(254) / 60)
+
+
+def test_tools_lengths_and_pauses():
+    text = (
+        f"{START}LOADTL/3,LENGTH,80\nGOTO/0,0,0\nGOTO/1,0,0\nDELAY/2\nSPINDL/600,RPM\nDELAY/5,REV\n"
+        "LOAD/TOOL,4,ADJUST,4\nGOTO/2,0,0\n"
+    )
+    program = read(text)
+    assert list(program.moves.tool) == [3, 4]
+    np.testing.assert_allclose(program.moves.tool_length, [0.08, math.nan])
+    assert program.moves.dwell[0] == pytest.approx(2.5)
+    assert any("LENGTH of LOADTL" in text for text in program.assumptions)
+    tabled = read(text, tools={3: ToolEntry(3, 120.0, 6.0), 4: ToolEntry(4, 90.0)})
+    np.testing.assert_allclose(tabled.moves.tool_length, [0.12, 0.09])
+    assert any("not LOADTL's 80 mm" in text for text in tabled.assumptions)
+    assert [tool.number for tool in tabled.tools] == [3, 4] and tabled.tools[0].diameter == pytest.approx(0.006)
+
+
+def test_lines_columns_and_labels():
+    """Physical lines of the first part of a statement, whatever continues it."""
+    program = read(
+        "$$ head\n\nUNITS/MM\nN10 FEDRAT/100,MMPM\nL1) GOTO/0,$ $$ more\n 0,$\n0\nGOTO/1,$\n0,0\n\ngoto/2,0,0\n"
+    )
+    assert list(program.moves.line) == [8, 11]
+    assert (program.dialect, program.interpreter) == ("cutter-location file", "builtin")
+    error = refused("UNITS/MM\nFEDRAT/1\nGOTO/0,0,0\nGOTO/1,$\n  0,abc\n")
+    assert (error.line, error.column) == (5, 5)
+
+
+def test_file_ends_with_fini():
+    program = read(f"{START}GOTO/0,0,0\nGOTO/1,0,0\nEND\nFINI\nGOTO/2,0,0\n")
+    assert len(program.moves) == 1 and "FINI ends the file" in program.warnings[0]
+
+
+def test_what_is_not_acted_upon_is_listed_once_with_its_count():
+    program = read(
+        f"{START}PAINT/COLOR,1\nGOTO/0,0,0\nPAINT/COLOR,2\nGOTO/1,0,0\nCOOLNT/ON\nAUXFUN/99\nAUXFUN/98\nFOOBAR/1,2\n"
+    )
+    listed = {word.word: word for word in program.unsupported}
+    assert set(listed) == {"PAINT", "COOLNT", "AUXFUN", "FOOBAR"} and listed["PAINT"].line == 3
+    assert "2 times" in listed["PAINT"].reason
+    assert len(program.warnings) == 2 and "line 8" in program.warnings[0] and "FOOBAR" in program.warnings[1]
+
+
+def test_creos_coordinate_system_is_a_comment_over_several_lines():
+    program = read(
+        "$$-> CSYS / 1.0000000000, 0.0000000000, 0.0000000000, 0.0000000000,  $\n"
+        "            0.0000000000, 1.0000000000, 0.0000000000, 0.0000000000,  $\n"
+        "            0.0000000000, 0.0000000000, 1.0000000000, 0.0000000000\n"
+        f"{START}GOTO / 0.0000000000, 0.0000000000, 1.0000000000\nGOTO / 1.0, 0., 1.\n"
+    )
+    assert len(program.moves) == 1 and not program.warnings
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("COPY/1,TRANSL,1,0,0,3", 3, "COPY"),
+        ("TRACUT/1", 3, "TRACUT"),
+        ("TRANS/0,0,5", 3, "TRANS"),
+        ("ORIGIN/1,2,3", 3, "ORIGIN"),
+        ("ROTABL/90,BAXIS", 3, "ROTABL"),
+        ("CUTCOM/LEFT,1", 3, "cutter compensation"),
+        ("CALSUB/5", 3, "CALSUB"),
+        ("TLRGT,GORGT/L1", 3, "TLRGT"),
+        ("RETRCT", 3, "retracts"),
+        ("CYCLE/TAP,10,IPM,2", 3, "CYCLE/TAP"),
+        ("CYCLE/DRILL, 126.0, 85.0, 1.0,MMPR", 3, "order hangs on"),
+        ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2,RAPTO,1", 3, "RAPTO"),
+        ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2,RETURN,0", 3, "RETURN,0"),
+        ("CYCLE/DRILL,DEEP,STEP,20,CLEAR,3,FEDTO,-72,RTRCTO,AUTO,MMPM,250", 3, "AUTO"),
+        ("GOTO/PT1", 3, "APT's processor"),
+        ("P1=POINT/1,2,3", 3, "APT's processor"),
+        ("GOTO/1,2", 3, "2 numbers"),
+        ("GOTO/1,2,3,4", 3, "4 numbers"),
+        ("GOTO/1,2,3,", 3, "4 numbers|''"),
+        ("GOTO/1,2,1e400", 3, "within"),
+        ("GOTO/1,2,2e5", 3, "within"),
+        ("GOTO/1,2,3,0,0,0", 3, "length 0"),
+        ("GOTO/1,2,3,0,0,1.01", 3, "length 1.01"),
+        ("GOTO/0,0,0,0,0,1\nGOTO/0,0,1,0,0,-1", 4, "turns over"),
+        ("1,2,3", 3, "no statement"),
+        ("GOTO/1,2,$", 3, "continues"),
+        ("GOTO/1,2,$\nGOTO/3,4,5", 3, "continues"),
+        ("GOTO/1,2 $ 3", 3, "after a \\$"),
+        ("GODLTA/1,2,3", 3, "before any point"),
+        ("CIRCLE/0,0,0,0,0,1,5", 3, "before any point"),
+        ("GOTO/5,0,0\nCIRCLE/0,0,0,0,0,2,5\nGOTO/0,5,0", 4, "circle's axis"),
+        ("GOTO/5,0,0\nCIRCLE/0,0,0,5\nGOTO/0,5,0", 4, "INDIRV"),
+        ("GOTO/5,0,0\nCIRCLE/0,0,0,0,0,1,6\nGOTO/0,5,0", 5, "radius 6"),
+        ("GOTO/5,0,0\nCIRCLE/0,0,0,0,0,1,5\nGOTO/0,5.2,0", 5, "off its circle"),
+        ("GOTO/0,0,0\nCIRCLE/0,0,0,0,0,1,5\nGOTO/0,5,0", 5, "centre"),
+        ("GOTO/5,0,0\nCIRCLE/0,0,0,0,0,1,5\nFINI", 5, "waits"),
+        ("GOTO/5,0,0\nRAPID\nCIRCLE/0,0,0,0,0,1,5\nGOTO/0,5,0", 5, "RAPID"),
+        ("GOTO/5,0,0\nINDIRV/1,0,0\nTLON,GOFWD/(CIRCLE/0,0,0,5),ON,(LINE/0,0,0,0,5,0)", 5, "along the circle"),
+        ("GOTO/5,0,0\nTLON,GOFWD/(CIRCLE/0,0,0,5),ON,(LINE/0,0,0,0,5,0)", 4, "INDIRV"),
+        ("GOTO/5,0,0\nINDIRV/0,1,0\nTLON,GOFWD/(CIRCLE/0,0,0,5),TO,(LINE/0,0,0,0,5,0)", 5, "TLON"),
+        ("GOTO/5,0,0\nINDIRV/0,1,0\nTLON,GOFWD/(CIRCLE/0,0,0,5),ON,(LINE/9,0,0,9,5,0)", 5, "does not meet"),
+        ("RAPID\nFEDRAT/100\nGOTO/1,2,3", 4, "after the RAPID"),
+        ("FEDRAT/100,FOO", 3, "MMPM"),
+        ("FEDRAT/-5", 3, "above 0"),
+        ("FEDRAT/0.1,MMPR\nGOTO/0,0,0\nGOTO/1,0,0", 5, "spindle speed"),
+        ("FEDRAT/0\nGOTO/0,0,0\nGOTO/1,0,0", 5, "before any feed"),
+        ("UNITS/FURLONG", 3, "UNITS/MM"),
+        ("LOADTL/1.5", 3, "whole number"),
+        ("DELAY/-1", 3, "seconds"),
+        ("MULTAX/MAYBE", 3, "MULTAX"),
+        ("GOTO/0,0,0,0,.6,.8\nMULTAX/OFF\nGOTO/1,0,0", 5, "tool axis"),
+        ("MULTAX/OFF\nGOTO/1,0,0,0,.6,.8", 4, "MULTAX/OFF"),
+        ("MSYS/0,0,0,1,0,0,0,1,0\nGOTO/0,0,0\nMSYS/5,0,0,1,0,0,0,1,0", 5, "another coordinate system"),
+        ("MODE/TURN", 3, "not milling"),
+        ("TOOLNO/1,TURN", 3, "not milling"),
+        ("CUTCOM/ON,LEFT", 3, "cutter compensation"),
+        ("RAPD0", 3, "may move the tool"),
+        ("GOT/1,2,3", 3, "may move the tool"),
+        ("STRANGE/1,2,3", 3, "may move the tool"),
+        ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2\nRAPID", 4, "is the next point a hole"),
+        ("ZERO/1\nGOTO/0,0,0\nZERO/2", 5, "another coordinate system"),
+        ("G1 X10 Y5", 3, "no statement"),
+        ("%", 3, "no statement"),
+    ],
+)
+def test_refusals_name_word_and_line(text, line, words):
+    with pytest.raises(InputError, match=words) as caught:
+        read(START + text + "\n")
+    assert caught.value.line == line and caught.value.column is not None and caught.value.file == "part.apt"
+
+
+def test_units_must_be_certain():
+    assert "inches" in str(refused("FEDRAT/10,IPM\nGOTO/0,0,0\nGOTO/1,0,0\n"))
+    assert refused("FEDRAT/10\nGOTO/0,0,0\nGOTO/1,0,0\nUNITS/INCHES\n").line == 4
+    assert any("taken as mm" in text for text in read("FEDRAT/10\nGOTO/0,0,0\nGOTO/1,0,0\n").assumptions)
+
+
+def test_arcs_that_turn_the_other_way_are_noticed():
+    """A path that goes up into an arc and would turn back there: the file means the axis the other way round."""
+    text = f"{START}GOTO/10,-5,0\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,{{}},10\nGOTO/0,10,0\n"
+    assert not read(text.format(1)).warnings
+    assert "turns back" in read(text.format(-1)).warnings[0]
+
+
+def test_no_cut_is_an_error():
+    assert "no cutting move" in str(refused("UNITS/MM\nRAPID\nGOTO/0,0,0\nRAPID\nGOTO/1,0,0\n"))
