@@ -122,8 +122,8 @@ def load_argument(text: str) -> str:
     return text
 
 
-def add_program_options(parser: argparse.ArgumentParser) -> None:
-    """Options about how a program is read and sampled."""
+def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True) -> None:
+    """Options about how a program is read and, where it is `sampled`, how finely."""
     group = parser.add_argument_group("program")
     group.add_argument(
         "--origin",
@@ -132,9 +132,10 @@ def add_program_options(parser: argparse.ArgumentParser) -> None:
         help="where program zero (G54) sits in machine coordinates, mm and degrees "
         "(default: where the program's G10 says, else the machine's default)",
     )
-    group.add_argument(
-        "--step", type=length_m(1000.0), default=1e-3, metavar="MM", help="distance of the samples (default: 1)"
-    )
+    if sampled:
+        group.add_argument(
+            "--step", type=length_m(1000.0), default=1e-3, metavar="MM", help="distance of the samples (default: 1)"
+        )
     group.add_argument("--offsets", metavar="FILE", help="work offsets G54 to G59.3")
     group.add_argument("--tools", metavar="FILE", help="tool table: LinuxCNC .tbl, or CSV tool,length_mm,diameter_mm")
     group.add_argument(

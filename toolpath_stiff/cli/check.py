@@ -22,6 +22,7 @@ examples:
   tps check part.nc --dialect fanuc --json
   tps check part.nc --strut-speed 5000         warn of cuts in which a strut is faster, mm/min
   tps check part.nc --machine none             the program alone, no reach and no strut speeds
+  tps check part.ngc --interpreter auto        by LinuxCNC's interpreter where ours does not read it to its end
 
 Where the reader would refuse the program, the check says so and goes on with the next block; what it says of extents,
 lengths and times is then that of the blocks that could be read. Extents are those of the tool tip in program
@@ -54,32 +55,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check and print."""
     from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.nc.checking import ERROR, check_lines
+    from toolpath_stiff.nc.checking import ERROR
+    from toolpath_stiff.nc.second_check import check_by
     from toolpath_stiff.nc.source import read_lines
 
-    if args.interpreter != "builtin":
-        raise InputError(
-            f"--interpreter {args.interpreter}: the check is that of the built-in interpreter",
-            hint="leave the option out; tps path --interpreter linuxcnc reads the program by LinuxCNC's",
-        )
     machine = None if args.machine == NO_MACHINE else load_machine(args.machine)
     if machine is None and args.strut_speed is not None:
         raise InputError("--strut-speed without a machine", hint="name one with --machine")
     controller = controller_for(args)
     name = Path(args.program).name
     lines = read_lines(args.program)
-    checked = check_lines(
+    checked, interpreter = check_by(
+        args.interpreter,
         lines,
         name,
         origin=args.origin,
         default_origin=machine.default_origin if machine else (0.0,) * 6,
         block_delete=args.block_delete,
         controller=controller,
+        rs274=args.rs274,
     )
     document = {
         "program": name,
+        "interpreter": interpreter,
         "dialect": checked.dialect or controller.label,
-        "kinematics": controller.kinematics.label if controller.kinematics and not checked.dialect else "",
+        "kinematics": controller.kinematics.label
+        if controller.kinematics and checked.dialect in ("", "linuxcnc")
+        else "",
         **_document(args, checked, lines, machine),
     }
     if args.json:
@@ -128,6 +130,8 @@ def _text(document: dict[str, Any]) -> str:
 
     posted = f", posted for {document['kinematics']}" if document["kinematics"] else ""
     lines = [f"{document['program']}, read as {document['dialect']}{posted}"]
+    if document["interpreter"] != "builtin":
+        lines.append("read by LinuxCNC's interpreter: codes are counted where they stand, modal states are not known")
     if not document["complete"]:
         lines.append("NOT READ TO ITS END AS IT STANDS: figures are those of the blocks that could be read")
     lines.append("\nfindings:")

@@ -7,7 +7,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.cli.arguments import limit_threads, pose_argument
+from toolpath_stiff.cli.arguments import add_program_options, limit_threads, read_program_for
 from toolpath_stiff.cli.measurement_arguments import (
     add_data_arguments,
     add_noise_arguments,
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--program", metavar="PROGRAM", help="NC program to try it on (default: the packaged case study)"
     )
-    group.add_argument("--origin", type=pose_argument, metavar="X,Y,Z[,A,B,C]", help="its program zero, mm and degrees")
+    add_program_options(parser, sampled=False)
     add_output_arguments(parser, "diagnose", kept="diagnose.json and residuals.csv")
 
 
@@ -102,9 +102,7 @@ def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namesp
 
         program = case_study_program()
     else:
-        from toolpath_stiff.nc import read_program
-
-        program = read_program(args.program, origin=args.origin, default_origin=diagnosis.machine.default_origin)
+        program = read_program_for(args, args.program, diagnosis.machine)
     found["path"] = choice_on_path(diagnosis, program, args.origin)
 
 

@@ -193,7 +193,7 @@ def check_lines(
         at = default if place is None else place
         moves, refused, more, assumed = _on_the_part(moves, posted, frames, interpreter.used_tools.values(), name)
         errors, warnings, assumptions = [*errors, *refused], [*warnings, *more], [*assumptions, *assumed]
-    findings = [_of_error(error) for error in errors]
+    findings = [finding_of(error) for error in errors]
     findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in warnings]
     findings += [Finding(0, 0, "assumption", text, NOTE) for text in assumptions]
     x, y, z, a, b, c = at
@@ -235,7 +235,7 @@ def _check_cutter_location(
     reading.check(lines)
     offsets = controller.offsets is not None and any(offset.given for offset in controller.offsets.table)
     warnings = (*not_for(controller, offsets, block_delete), *reading.warnings)
-    findings = [_of_error(error) for error in reading.errors]
+    findings = [finding_of(error) for error in reading.errors]
     findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in warnings]
     findings += [Finding(0, 0, "assumption", text, NOTE) for text in reading.assumptions]
     x, y, z, a, b, c = origin
@@ -262,7 +262,7 @@ def _check_cutter_location(
     )
 
 
-def _of_error(error: InputError) -> Finding:
+def finding_of(error: InputError) -> Finding:
     """What could not be read, and what it would change."""
     text = error.found + (f"; expected {error.expected}" if error.expected else "")
     changes = would_change(error.found)
