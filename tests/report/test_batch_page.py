@@ -52,6 +52,15 @@ def test_the_required_level_is_on_the_scale_and_marks_what_is_below():
     assert high < required <= 100 and '"span below"' in text
 
 
+def test_the_other_machine_is_a_mark_on_the_same_scale():
+    both = {"compare_machine": "soft", "compare_mean_N_per_mm": 5e3, "compare_mean_difference_percent": -83.3}
+    text = batch_page([outcome("a.nc", 20e3, 30e3, 60e3, **both)])
+    mark = [float(x) for x in re.findall(r'class="other" x1="([\d.]+)%"', text)]
+    ((left, right),) = bars(text)
+    assert (mark[0] - left) / (right - left) == pytest.approx(-15 / 40, rel=1e-3) and mark[0] >= 0
+    assert "mean on the other machine, soft" in text and "-83.3" in text
+
+
 @pytest.mark.parametrize("value", [1e3, 1.0, 123456.789])
 def test_equal_values_are_drawn_too(value):
     ((left, right),) = bars(batch_page([outcome("a.nc", value, value, value)]))

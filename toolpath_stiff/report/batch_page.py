@@ -21,6 +21,7 @@ from toolpath_stiff.report.wording import duration, number, plain, shortened
 TEXT = 40  # characters of a program's line that are shown
 TICKS = 5  # of the scale, about
 MOST_LABELS = 4  # on the scale, or they would touch on a narrow page
+DRAWN = ("min_N_per_mm", "max_N_per_mm", "required_N_per_mm", "compare_mean_N_per_mm")
 OTHER_MEAN, CHANGE = "mean on the other machine, N/mm", "how much higher the mean is on the other machine"
 
 HOW_TO_READ = (
@@ -118,7 +119,7 @@ class Scale:
 
 def _scale(good: Sequence[Outcome]) -> Scale | None:
     """A scale that holds all bars and the required level; None where there is no bar."""
-    ends = [_figure(one, name) for one in good for name in ("min_N_per_mm", "max_N_per_mm", "required_N_per_mm")]
+    ends = [_figure(one, name) for one in good for name in DRAWN]
     values = [float(end) for end in ends if end is not None]
     if not any(_figure(one, "min_N_per_mm") is not None for one in good):
         return None
@@ -152,6 +153,8 @@ def _bar(one: Outcome, scale: Scale) -> str:
         width = f"{max(float(right[:-1]) - float(left[:-1]), 0.4):.2f}%"
         lines += f'<rect class="{kind}" x="{left}" width="{width}" y="6" height="10" rx="2"/>'
         lines += _line(scale, mean, "mean", (3, 19))
+    if (other := _figure(one, "compare_mean_N_per_mm")) is not None:
+        lines += _line(scale, other, "other", (3, 19))
     if scale.required is not None:
         lines += _line(scale, scale.required, "required")
     return f'<svg height="22" aria-hidden="true">{lines}</svg>'
@@ -164,10 +167,10 @@ def _line(scale: Scale, value: float, kind: str, ends: tuple[int, int] = (0, 22)
 
 @dataclass(frozen=True)
 class Column:
-    """A heading, its alignment, and what stands in a cell: the value to sort by and the HTML shown."""
+    """A heading (a line feed divides it), the class of its cells, and more about it for whoever points at it."""
 
     title: str
-    kind: str  # class: "", "num", "text", "bar"
+    kind: str  # "num" is also sorted as numbers
     hint: str = ""
 
 
@@ -193,7 +196,7 @@ def _table(good: Sequence[Outcome]) -> str:
     ]
     head = "".join(_heading(column, scale) for column in columns)
     rows = "".join(_row(one, columns, scale, compared) for one in good)
-    key = _key(scale)
+    key = _key(scale, _figure(good[0], "compare_machine"))
     body = (
         f'<p class="muted">{escaped(HOW_TO_READ)}</p><p class="muted">{key}</p>'
         # A box that scrolls by itself keeps the headings in sight; with a tabindex the keyboard can scroll it.
@@ -203,10 +206,12 @@ def _table(good: Sequence[Outcome]) -> str:
     return section("Stiffness of each program", body)
 
 
-def _key(scale: Scale) -> str:
+def _key(scale: Scale, other: str | None) -> str:
     bar = '<rect class="span" x="0" width="34" y="2" height="10" rx="2"/>'
     mean = '<line class="mean" x1="17" x2="17" y1="0" y2="14"/>'
     entries = [(bar, "lowest to highest, N/mm"), (mean, "mean")]
+    if other is not None:
+        entries.append((mean.replace('"mean"', '"other"'), f"mean on the other machine, {other}"))
     if scale.required is not None:
         entries.append(('<line class="required" x1="17" x2="17" y1="0" y2="14"/>', "required"))
         entries.append((bar.replace('"span"', '"span below"'), "below it somewhere"))
