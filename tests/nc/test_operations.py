@@ -192,6 +192,72 @@ G00 Z5
 (End cutting path id: path9)
 M2
 """
+CAMBAM = """( Made using CamBam )
+( craftsman 2/4/2014 9:29:48 PM )
+( T1 : 0.3 )
+G21 G90 G64 P0.25 G40
+G0 Z5.0
+( T1 : 0.3 )
+T1 M6
+( Engrave1 )
+M3 S20000
+G0 X16.4 Y16.9
+G1 F700.0 Z-0.5
+G0 Z5
+( Engrave2 )
+G1 Z-0.5
+"""
+FIVE_AXIS = """(!!! Touch Off: Table = -13.25 == Z max neg extent !!!)
+(BOAT-XYZAC)
+( 11/20/2011 19:50:48 )
+
+( OPERATION=  ROUGH7  Z LEVEL  SRF_MILL1  )
+( TOOL: T1 = 10.0 dia. ENDMILL )
+G00 G17 G40 G90 G94
+Z5
+T1 M6
+G54 X-49.65 Y-23.015 A0. C0. S630 M03
+G01 Z4. F500
+G00 Z5.0
+
+( FINISH1 FLOWLINE SRF_MILL1 )
+G00 Z5.
+G54 X-34.78 Y-2.436 A-5.546 C-25.602 S600
+G01 Z3.573
+G00 Z5.0
+(A0.)
+A-75.0 C33.636
+G01 Z-3.879 F43.6112
+"""
+JSCUT = """G21
+G1 Z2.54 F254
+;
+; Operation:    0
+; Name:         pocket
+; Type:         Pocket
+;
+; Retract
+G1 Z25.4 F254
+; Rapid to initial position
+G1 X10 Y8 F2540
+; plunge
+G1 Z-3 F127
+; cut
+G1 X20 F1016
+; Retract
+G1 Z25.4 F254
+;
+; Operation:    1
+; Type:         Inside
+;
+; Rapid to initial position
+G1 X30 Y8 F2540
+; plunge
+G1 Z-3 F127
+; Path 1
+G1 X40 F1016
+M2
+"""
 MARLIN = """(Fusion CAM 2.0.18961)
 ( Posts processor: MPCNC21.cps)
 ( *** START begin ***)
@@ -223,9 +289,24 @@ M30
         (VECTRIC, ["Pocket 1", "Profile 2"]),
         (ESTLCAM, ["No. 1: Hole 1", "No. 2: Part 3"]),
         (GCODETOOLS, ["path1-4", "path9"]),
+        (CAMBAM, ["Engrave1", "Engrave2"]),
+        (FIVE_AXIS, ["ROUGH7 Z LEVEL SRF_MILL1", "FINISH1 FLOWLINE SRF_MILL1"]),
+        (JSCUT, ["part.nc", "Operation: 0", "Operation: 1"]),
         (MARLIN, ["boxDoorDrill - Milling - Tool: 1 - drill"]),
     ],
-    ids=["fusion", "freecad", "solidcam", "mastercam", "vectric", "estlcam", "gcodetools", "marlin"],
+    ids=[
+        "fusion",
+        "freecad",
+        "solidcam",
+        "mastercam",
+        "vectric",
+        "estlcam",
+        "gcodetools",
+        "cambam",
+        "five axes",
+        "jscut",
+        "marlin",
+    ],
 )
 def test_programs_as_posts_write_them(text: str, expected: list[str]) -> None:
     assert names(text) == expected

@@ -207,8 +207,8 @@ def test_the_table_of_operations_is_that_of_the_summary(analysis, parsed):
     for row in summary["per_operation"]:
         assert number(row["mean_N_per_mm"]) in cells
         assert f"{row['first_line']}-{row['last_line']}" in cells
-    assert [name for _, name in data["operations"]] == [row["name"] for row in summary["per_operation"]]
-    assert [first for first, _ in data["operations"]] == [0, int(np.argmax(analysis.operation == 2))]
+    assert [name for _, name, _ in data["operations"]] == [row["name"] for row in summary["per_operation"]]
+    assert [first for first, *_ in data["operations"]] == [0, int(np.argmax(analysis.operation == 2))]
 
 
 def test_one_operation_has_no_table():

@@ -21,17 +21,19 @@ ACTIVE = re.compile(r"\s*(?:MSG|DEBUG|PRINT)\s*,", re.IGNORECASE)  # LinuxCNC sh
 FRAME, DASHES = " *=#~|'\"", "-_."  # of dashes and points only two and more are a frame: -X SIDE, .5 CHAMFER
 MARK = re.compile(
     r"(?:(?:begin|start)\s+(?:of\s+)?(?:operation|section|toolpath|cutting\s+path\s+id)|tool\s?path(?:\s+name)?"
-    r"|operation(?:\s+name)?|block-name)\s*:-?\s*(?=.*\w)",
+    r"|operation(?:\s+name)?|block-name)\s*(?::-?|=)\s*(?=.*\w)",
     re.IGNORECASE,
 )
 TOOL_LINE = re.compile(r"(?:T\s*\d+|tools?|change\s+(?:to\s+)?tool)\b", re.IGNORECASE)
-# The end of something, the state of a post, licence notes, code that is commented out: none of these heads anything.
+# The end of something, the state of a post, single moves, licence notes, code that is commented out: no headings.
 NOTHING = re.compile(
     r"(?:finish(?:ed)?|end)\s+(?:of\s+)?(?:the\s+)?(?:op|operation|section|tool\s?path|cutting|path|preamble)\b"
     r"|.*\b(?:done|finished|completed)$"
     r"|(?:begin|start)\s+(?:of\s+)?(?:preamble|tool\s?change)\b|tool\s?change$|(?:section|start|stop|end)\s+(?:begin|end)$"
+    r"|(?:plunge|cut|cutting|retract|approach|ramp|penetrate|lead[\s-]?(?:in|out))$|(?:rapid|retract|move|go)\s+to\b"
     r"|(?:MOVEMENT|COMMAND)_\w+$|>>>|block-(?:expand|enable)\b|[XYZ]\s+min\b|when\s+using\s+fusion\b"
-    r"|(?:[A-Z]\s*[-+]?(?:\d++\.?\d*+|\.\d++)\s*)++(?:;.*)$|(?:[A-Z]\s*[-+]?(?:\d++\.?\d*+|\.\d++)\s*){2,}+$",
+    r"|(?:[A-Z]\s*[-+]?(?:\d++\.?\d*+|\.\d++)\s*)++(?:;.*)$|(?:[A-Z]\s*[-+]?(?:\d++\.?\d*+|\.\d++)\s*){2,}+$"
+    r"|[A-Z]\s*[-+]?(?:\d++\.\d*+|\.\d++)$",  # an axis and where it stands; M8 may be a hole
     re.IGNORECASE,
 )
 FROM_HERE_NOTES = re.compile(r"when\s+using\s+fusion\b", re.IGNORECASE)  # the rest of its block is its sentence
@@ -83,10 +85,11 @@ def heading_of(block: Sequence[str], line: int) -> Heading | None:
         name = plain_name(comment)
         mark = MARK.match(name)
         if mark is not None:
-            return Heading(line, plain_name(name[mark.end() :]), MARKED)
+            marked = plain_name(name[mark.end() :])
+            return Heading(line, marked if any(map(str.isalpha, marked)) else name, MARKED)
         if FROM_HERE_NOTES.match(name):
             break
-        if NOTHING.match(name) or not any(character.isalpha() for character in name):
+        if NOTHING.match(name) or not any(map(str.isalpha, name)):
             continue
         if TOOL_LINE.match(name):
             tool = tool or name

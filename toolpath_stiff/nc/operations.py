@@ -135,6 +135,9 @@ class _Text:
         if not self.title:
             self.title = next((h.name for h in found if h.line <= self.header_end and h.kind == NAMED), "")
         self.heads = [h for h in found if h.line > self.header_end or h.kind == MARKED]
+        said = [h for h in self.heads if h.kind == MARKED]
+        if len(said) > 1:  # a post that marks operations means other things by other comments
+            self.heads = said
         self.leaves = np.array(
             [
                 number

@@ -90,10 +90,10 @@ def page_rows(analysis: Analysis) -> IntArray:
 
 
 def _operations(analysis: Analysis, move: IntArray) -> list[list[Any]]:
-    """First row on the page and name of each operation; `move` (n,) of the page's rows."""
-    firsts = np.searchsorted(move, [operation.first_move for operation in analysis.operations.rows])
-    names = [plain(operation.name) for operation in analysis.operations.rows]
-    return [[first, name] for first, name in zip(firsts.tolist(), names, strict=True)]
+    """First row on the page, name and first line of each operation; `move` (n,) of the page's rows."""
+    rows = analysis.operations.rows
+    firsts = np.searchsorted(move, [row.first_move for row in rows]).tolist()
+    return [[first, plain(row.name), row.first_line] for first, row in zip(firsts, rows, strict=True)]
 
 
 def _other_curve(other: Analysis) -> dict[str, str]:

@@ -11,7 +11,7 @@ function chooseOperation(k) {
     operationShown.textContent = `\u2715 only ${operationName(chosenOperation)}`;
     if (end > first) {
       profile.show(s[first], s[end - 1]);
-      showLine(line[first]);
+      showLine(operations[chosenOperation][2]);
     }
   }
   view.fit();
