@@ -176,6 +176,26 @@ def test_refusals_name_word_and_line(text, line, words):
     assert caught.value.line == line and caught.value.column is not None and caught.value.file == "part.apt"
 
 
+@pytest.mark.parametrize(
+    "frame",
+    [
+        "$$*CATIA0\n$$ Part Operation.1\n$$ 1.0 0.0 0.0 {0}\n$$ 0.0 1.0 0.0 0.0\n$$ 0.0 0.0 1.0 0.0\n",
+        "$$-> CSYS / 1.0, 0.0, 0.0, {0}, $\n 0.0, 1.0, 0.0, 0.0, $\n 0.0, 0.0, 1.0, 0.0\n",
+        "MSYS/{0},0,0,1,0,0,0,1,0\n",
+        "MCS/1,0,0,0,1,0,0,0,1,{0},0,0\n",
+    ],
+)
+def test_a_second_coordinate_system_is_refused(frame):
+    """CATIA and Creo say it in comments. The same one again is harmless."""
+    cut = "GOTO/0,0,0\nGOTO/1,0,0\n"
+    same = START + frame.format("5.0") + cut + frame.format("5.00000") + cut
+    assert len(read(same).moves) == 3
+    other = START + frame.format("5.0") + cut + frame.format("6.0") + cut
+    error = refused(other)
+    assert "another coordinate system" in str(error)
+    assert other.splitlines()[error.line - 1] in frame.format("6.0")
+
+
 def test_units_must_be_certain():
     assert "inches" in str(refused("FEDRAT/10,IPM\nGOTO/0,0,0\nGOTO/1,0,0\n"))
     assert refused("FEDRAT/10\nGOTO/0,0,0\nGOTO/1,0,0\nUNITS/INCHES\n").line == 4

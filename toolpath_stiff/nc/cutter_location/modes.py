@@ -62,7 +62,7 @@ class Modes(ToolPath):
         self.circle_line = 0
         self.rapid = 0  # line of the RAPID that waits for its motion
         self.statement = Statement(1, 1, "")
-        self._frames: dict[str, tuple[str, ...]] = {}
+        self._frames: dict[str, tuple[float, ...]] = {}
         self._revolutions = 0.0
 
     def fail(self, found: str, expected: str = "", hint: str = "", at: Argument | None = None) -> InputError:
@@ -210,16 +210,21 @@ class Modes(ToolPath):
         raise self.fail(f"{statement.shown} {found}, which is not supported", "0,0,0", hint)
 
     def _frame_word(self, statement: Statement) -> None:
-        frame = tuple(" ".join(word.split()) for word in self._words(statement))
-        before = self._frames.get(statement.word, frame)
-        if frame != before and self.point is not None:
+        numbers = tuple(number_of(a, self.name) for a in statement.arguments if is_number(a.text))
+        self._one_frame(statement.word, numbers, statement.shown)
+        self._note(self.noted, statement, vocabulary.FRAMES[statement.word])
+
+    def _one_frame(self, kind: str, numbers: tuple[float, ...], shown: str) -> None:
+        """Points of one coordinate system only; `kind` says who names it, the numbers where it lies."""
+        before = self._frames.get(kind, numbers)
+        same = len(before) == len(numbers) and all(abs(a - b) < 1e-6 for a, b in zip(before, numbers, strict=True))
+        if not same and self.point is not None:
             raise self.fail(
-                f"{statement.shown}: another coordinate system than the one before",
+                f"{shown}: another coordinate system than the one before",
                 "one system for the whole file",
                 "write each of them to a file of its own",
             )
-        self._frames[statement.word] = frame
-        self._note(self.noted, statement, vocabulary.FRAMES[statement.word])
+        self._frames[kind] = numbers
 
     def _fini(self, statement: Statement) -> None:
         self._no_circle("FINI")

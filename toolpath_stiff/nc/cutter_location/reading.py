@@ -13,6 +13,7 @@ from toolpath_stiff.nc.cutter_location.cycles import Cycle, read_cycle
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS, NO_UNITS
 from toolpath_stiff.nc.cutter_location.statements import (
     Statement,
+    frame_in_comment,
     is_number,
     number_of,
     plain_point,
@@ -91,7 +92,7 @@ class CutterLocation(Curves):
                     continue
                 statement, at = read_statement(lines, at, self.name)
                 if statement is None:
-                    self._heading(lines[here], here + 1)
+                    self._comment(lines, here)
                 else:
                     self.statement = statement
                     self.seen(statement.word, statement.line)
@@ -106,10 +107,16 @@ class CutterLocation(Curves):
             self.warnings.append(f"line {at}: FINI ends the file; what follows is not read")
         self._finish()
 
-    def _heading(self, comment: str, line: int) -> None:
-        found = OPERATION.match(comment)
+    def _comment(self, lines: tuple[str, ...], at: int) -> None:
+        """What CAM systems say in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
+        found = OPERATION.match(lines[at])
         if found:
-            self.marks.append((line, found[1]))
+            self.marks.append((at + 1, found[1]))
+            return
+        frame = frame_in_comment(lines, at)
+        if frame is not None:
+            self.statement = Statement(at + 1, 1, frame[0])
+            self._one_frame(*frame, lines[at].strip()[:40])
 
     def seen(self, word: str, line: int) -> None:
         """Called for every statement; the check counts them."""

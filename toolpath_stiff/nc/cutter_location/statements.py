@@ -28,6 +28,8 @@ _LABEL = re.compile(r"\s*(?:N?\d+\s+(?=[A-Za-z])|[A-Za-z0-9]+\))")
 # These carry free text, which no `$` continues.
 _TEXT_WORD = re.compile(r"\s*(PARTNO|PPRINT|REMARK|INSERT|LETTER|TITLES|MFGNO)", re.IGNORECASE)
 _WORD = re.compile(r"\s*([A-Za-z][\w.-]*(?: +[A-Za-z][\w.-]*)*(?:\s*,\s*\w+)*)\s*(/|$)")
+_FRAME = re.compile(r"\s*\$\$(?:(\*)CATIA0\b|->\s*CSYS\s*/)", re.IGNORECASE)
+FRAME_NUMBERS = 12
 _ONLY_NUMBERS = re.compile(r"[\s\d.,+\-EeDd$]*")
 _NEW_STATEMENT = re.compile(
     r"\s*(?:(?:GOTO|FROM|FEDRAT|GODLTA|CYCLE|LOADTL|SPINDL|CUTTER|UNITS|TLAXIS|INDIRV)\s*/|TLON\s*,|(?:RAPID|FINI)\s*$)",
@@ -118,6 +120,22 @@ def _after_comment(lines: tuple[str, ...], at: int) -> int:
     ):
         at += 1
     return at + 1
+
+
+def frame_in_comment(lines: tuple[str, ...], at: int) -> tuple[str, tuple[float, ...]] | None:
+    """The coordinate system that a comment names: a word for whose it is, and its matrix of 3 rows of 4.
+
+    CATIA writes `$$*CATIA0`, a name and three rows, all of them comments; Creo `$$-> CSYS /` and twelve numbers.
+    """
+    found = _FRAME.match(lines[at])
+    if found is None:
+        return None
+    if found[1] == "*":
+        text = " ".join(line.strip().removeprefix("$$") for line in lines[at + 2 : at + 5])
+    else:
+        text = " ".join((lines[at][found.end() :], *lines[at + 1 : _after_comment(lines, at)]))
+    numbers = tuple(float(number.upper().replace("D", "E")) for number in _IS_NUMBER.findall(text))
+    return (found[0].strip(), numbers) if len(numbers) == FRAME_NUMBERS else None
 
 
 def _pieces(lines: tuple[str, ...], at: int, begin: int, name: str) -> tuple[list[tuple[int, int, str]], int]:

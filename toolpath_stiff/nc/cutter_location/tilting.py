@@ -2,8 +2,10 @@
 
 A machine that is told two tool axes turns the tool in their plane, along the great circle between them. Our moves turn
 roll and pitch linearly. On the unit sphere with roll a as latitude and pitch b as longitude a geodesic of angle t has
-a'' = -sin a cos a b'^2 and b'' = 2 tan a a' b' (do Carmo, "Differential Geometry of Curves and Surfaces", 4-4), both
-together at most sqrt(4/3) tan|a| t^2 long; the linear interpolation then departs from it by at most an eighth of that.
+a'' = -sin a cos a b'^2 and b'' = 2 tan a a' b' (do Carmo, "Differential Geometry of Curves and Surfaces", 4-4). With
+y = cos a b' / t, which is the share of its speed across, both together are tan|a| y sqrt(4 - 3 y^2) t^2 long, and the
+linear interpolation departs by at most an eighth of the largest of them. Along the geodesic y cos a is constant
+(Clairaut), the y component of its normal.
 """
 
 from __future__ import annotations
@@ -62,8 +64,11 @@ def division(first: Vector, second: Vector) -> int:
     angle = angle_between(first, second)
     if angle > TURNED_OVER:
         raise AxisError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
-    steepest = math.radians(min(_steepest_roll(first, second, math.radians(angle)), STEEPEST))
-    departure = math.sqrt(4.0 / 3.0) * math.tan(steepest) * math.radians(angle) ** 2 / 8.0
+    turn = math.radians(angle)
+    steepest = math.radians(min(_steepest_roll(first, second, turn), STEEPEST))
+    normal_y = abs(first[2] * second[0] - first[0] * second[2]) / math.sin(turn)
+    across = min((normal_y / math.cos(steepest)) ** 2, 2.0 / 3.0)  # y^2; beyond 2/3 y sqrt(4 - 3 y^2) falls again
+    departure = math.sqrt(across * (4.0 - 3.0 * across)) * math.tan(steepest) * turn**2 / 8.0
     return max(1, math.ceil(math.sqrt(departure / math.radians(GREAT_CIRCLE_DEG))))
 
 
