@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("program", metavar="PROGRAM", help="NC program")
+    parser.add_argument("program", metavar="PROGRAM", help="NC program or cutter-location file")
     add_program_options(parser)
     parser.add_argument(
         "--machine",

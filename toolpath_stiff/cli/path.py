@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("program", metavar="PROGRAM", help="NC program")
+    parser.add_argument("program", metavar="PROGRAM", help="NC program or cutter-location file")
     add_program_options(parser)
     target = parser.add_mutually_exclusive_group()
     target.add_argument("--csv", action="store_true", help="write CSV to standard output (the default)")

@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("program", metavar="PROGRAM", help="NC program")
+    parser.add_argument("program", metavar="PROGRAM", help="NC program or cutter-location file")
     group = parser.add_argument_group(
         "what may vary (LO:HI, or one number to fix it; default: as far as the machine reaches)"
     )
