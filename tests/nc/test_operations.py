@@ -24,7 +24,7 @@ def names(text: str, **options: object) -> list[str]:
     return [row.name for row in found(text, **options).rows]
 
 
-# What the posts write, shortened; the text around the moves as it stands in published programs.
+# What the posts write, shortened from published programs; SolidCAM's from memory.
 FUSION = """%
 (1001)
 (BRACKET - SETUP 1)
@@ -117,26 +117,24 @@ M30
 %
 """
 MASTERCAM = """%
-O0000 (BRACKET)
-(DATE=DD-MM-YY - 09-07-10 TIME=HH:MM - 11:53)
-(MCX FILE - T)
-( T1 | 12. FLAT ENDMILL | H1 )
-( T2 | 8. DRILL | H2 )
-N100 G21
-N102 G0 G17 G40 G80 G90
-( ROUGH OUTER PROFILE )
-( TOOL - 1 DIA. OFF. - 1 LEN. - 1 DIA. - 12. )
-N104 T1 M6
-N106 G0 G90 G54 X0. Y0. S1000 M3
-N112 G1 Z-1. F100.
-N114 X20.
-N116 G0 Z50.
-( DRILL )
-N118 T2 M6
-N120 G0 X5. Y5.
-N122 G99 G81 Z-5. R2. F80.
-N124 G80
-N126 M30
+O1000
+(PROGRAM NAME - HELLOWORLD)
+(DATE=DD-MM-YY - 30-06-05 TIME=HH:MM - 19:37)
+N10G21
+N20G0G17G40G49G80G90
+( 1/16 FLAT ENDMILL TOOL - 1 DIA. OFF. - 1 LEN. - 1 DIA. - .0625)
+(CONTOUR)
+N60T1M6
+N70G0G90X0.Y1.A0.S5000M3
+N90Z.25
+N100G1Z-.005F2.
+N120G0Z.5
+( TOOL - 6 2"  FACE MILL    DIA. OFF. - 6  LEN. - 6  DIA. - 2. )
+( MACHINE GROUP-1 )
+T6 M6
+G0 X5.
+G1 Z-1.
+M30
 %
 """
 VECTRIC = """( sign )
@@ -285,13 +283,13 @@ M30
         (FUSION, ["2D CONTOUR2", "2D CONTOUR3", "POCKET1"]),
         (FREECAD, ["Drilling", "Profile"]),
         (SOLIDCAM, ["F-CONTOUR - PROFILE", "P-POCKET - T1"]),
-        (MASTERCAM, ["ROUGH OUTER PROFILE", "DRILL"]),
+        (MASTERCAM, ["CONTOUR", 'T6 2" FACE MILL']),
         (VECTRIC, ["Pocket 1", "Profile 2"]),
         (ESTLCAM, ["No. 1: Hole 1", "No. 2: Part 3"]),
         (GCODETOOLS, ["path1-4", "path9"]),
         (CAMBAM, ["Engrave1", "Engrave2"]),
         (FIVE_AXIS, ["ROUGH7 Z LEVEL SRF_MILL1", "FINISH1 FLOWLINE SRF_MILL1"]),
-        (JSCUT, ["part.nc", "Operation: 0", "Operation: 1"]),
+        (JSCUT, ["part.nc", "pocket", "Inside"]),
         (MARLIN, ["boxDoorDrill - Milling - Tool: 1 - drill"]),
     ],
     ids=[
@@ -354,6 +352,8 @@ def test_a_retract_belongs_to_what_it_leaves_and_an_approach_to_what_it_goes_to(
         ("G1 X1 F100\nN200 (WALL)\nX3\n", ["part.nc", "WALL"]),
         ("G1 X1 F100\n(=====)\n(* WALL *)\n(=====)\nX3\n", ["part.nc", "WALL"]),
         ("G1 X1 F100\n(17)\nX3\n", ["part.nc"]),
+        ("G1 X1 F100\n;Operation: 0\n;Name:\nX3\n", ["part.nc", "Operation: 0"]),
+        ("(Tool = 3)\n(Toolpath name      = Boring_2)\nG0 X3\n(Cutting Move Starts)\nG1 X1 F100\n", ["Boring_2"]),
         ("G1 X1 F100\n(row 1 done)\nX3\n", ["part.nc"]),
         ("G1 X1 F100\n(M5 T2)\nX3\n", ["part.nc"]),
         ("G1 X1 F100\n;G04 P1 ; dwell\nX3\n", ["part.nc"]),

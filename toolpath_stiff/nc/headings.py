@@ -1,9 +1,9 @@
 """Comment lines of a program that head an operation, as CAM posts and people write them.
 
-What posts write was looked up in programs of Fusion 360, HSMWorks and Inventor (one line before each operation; tools,
-notes on the licence in the header), FreeCAD (`begin operation: NAME`, `finish operation: NAME`), Vectric (`Toolpath:-
-NAME` between lines of dashes), SolidCAM and Mastercam (the description of the tool beside the name), Estlcam, bCNC,
-Inkscape's Gcodetools, pcb2gcode.
+What posts write was looked up in published programs: of Fusion 360 (one line before each operation; tools, notes on the
+licence in the header), FreeCAD (`begin operation: NAME`, `finish operation: NAME`), Mastercam (tool and name in one
+block), Vectric (`Toolpath:- NAME` between lines of dashes), Estlcam, CamBam, jscut, Gcodetools, bCNC, pcb2gcode, and
+five-axis demos of LinuxCNC.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ MARK = re.compile(
     r"|operation(?:\s+name)?|block-name)\s*(?::-?|=)\s*(?=.*\w)",
     re.IGNORECASE,
 )
-TOOL_LINE = re.compile(r"(?:T\s*\d+|tools?|change\s+(?:to\s+)?tool)\b", re.IGNORECASE)
+FIELD = re.compile(r"(?:name|type)\s*:\s*(?=.*\w)", re.IGNORECASE)  # after `Operation: 0`
+TOOL_LINE = re.compile(r"(?:T\s*\d+|tools?|change\s+(?:to\s+)?tool)\b|.*\btool\s*-\s*\d", re.IGNORECASE)
+TOOL_NUMBERS = re.compile(r"\s*\btool\s*-\s*\d+\s*|\s*\b(?:tool\s+)?dia\.\s*off\..*$", re.IGNORECASE)
 # The end of something, the state of a post, single moves, licence notes, code that is commented out: no headings.
 NOTHING = re.compile(
     r"(?:finish(?:ed)?|end)\s+(?:of\s+)?(?:the\s+)?(?:op|operation|section|tool\s?path|cutting|path|preamble)\b"
     r"|.*\b(?:done|finished|completed)$"
     r"|(?:begin|start)\s+(?:of\s+)?(?:preamble|tool\s?change)\b|tool\s?change$|(?:section|start|stop|end)\s+(?:begin|end)$"
     r"|(?:plunge|cut|cutting|retract|approach|ramp|penetrate|lead[\s-]?(?:in|out))$|(?:rapid|retract|move|go)\s+to\b"
+    r"|(?:pass\s+\d+\s+)?path\s+\d+$|.*\bmove\s+(?:starts|ends)$|machine\s+group-\d+$"
     r"|(?:MOVEMENT|COMMAND)_\w+$|>>>|block-(?:expand|enable)\b|[XYZ]\s+min\b|when\s+using\s+fusion\b"
     r"|(?:[A-Z]\s*[-+]?(?:\d++\.?\d*+|\.\d++)\s*)++(?:;.*)$|(?:[A-Z]\s*[-+]?(?:\d++\.?\d*+|\.\d++)\s*){2,}+$"
     r"|[A-Z]\s*[-+]?(?:\d++\.\d*+|\.\d++)$",  # an axis and where it stands; M8 may be a hole
@@ -80,21 +83,28 @@ def _close(found: list[Heading], first: int, block: list[str]) -> None:
 
 def heading_of(block: Sequence[str], line: int) -> Heading | None:
     """What a block of comments names: what the post marks, else the first line with letters, else a tool."""
-    named = tool = None
+    named = tool = number = None
     for comment in block:
         name = plain_name(comment)
         mark = MARK.match(name)
         if mark is not None:
             marked = plain_name(name[mark.end() :])
-            return Heading(line, marked if any(map(str.isalpha, marked)) else name, MARKED)
+            if any(map(str.isalpha, marked)):
+                return Heading(line, marked, MARKED)
+            number = name
+        field = FIELD.match(name)
+        if number and field is not None:
+            return Heading(line, plain_name(name[field.end() :]), MARKED)
         if FROM_HERE_NOTES.match(name):
             break
         if NOTHING.match(name) or not any(map(str.isalpha, name)):
             continue
         if TOOL_LINE.match(name):
-            tool = tool or name
+            tool = tool or TOOL_NUMBERS.sub("", name) or name
         else:
             named = named or name
+    if number is not None:
+        return Heading(line, number, MARKED)
     if named is None:
         return None if tool is None else Heading(line, tool, TOOL)
     return Heading(line, named, NAMED)
