@@ -63,6 +63,8 @@ def test_operations_are_those_of_the_file():
     )
     nx = parse_program(path.format("FACE_1") + path.format("POCKET_2"), "part.cls")
     assert [row.name for row in operations(nx).rows] == ["FACE_1", "POCKET_2"]
+    other = parse_program(path.format("A") + path.format("B").replace("D10", "D6"), "part.cls")
+    assert other.tools[0].remark == "several tools without numbers"
     assert nx.tools[0].remark == "MILL_D10" and nx.tools[0].diameter == pytest.approx(0.01)
 
 

@@ -20,6 +20,13 @@ def test_rapids_are_for_one_motion_and_from_is_where_the_tool_stands():
     np.testing.assert_allclose(moves.end[:, 2], [0.005, 0, 0.007, 0.007])
 
 
+def test_home_is_a_point_or_the_controls():
+    there = read(f"{START}GOTO/0,0,0\nGOTO/1,0,0\nRAPID\nGOHOME/0,0,50\n")
+    assert list(there.moves.motion) == [FEED, RAPID] and there.moves.end[-1, 2] == pytest.approx(0.05)
+    unknown = read(f"{START}GOTO/0,0,0\nGOTO/1,0,0\nRAPID\nGOHOME\nGOTO/2,0,0\n")
+    assert list(unknown.moves.motion) == [FEED, FEED] and "way there is not part" in unknown.warnings[0]
+
+
 @pytest.mark.parametrize(
     ("feed", "mm_per_min"),
     [

@@ -12,6 +12,7 @@ from toolpath_stiff.nc.cutter_location.cycles import Cycle
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number, number_of
 from toolpath_stiff.nc.cutter_location.tilting import VERTICAL, Vector, unit_axis
 from toolpath_stiff.nc.cutter_location.tool_path import ToolPath
+from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -30,6 +31,7 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
 }
 INCH_FEEDS = ("IPM", "IPR", "FPM", "FPR")
 LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_PER_INCH}
+SEVERAL_TOOLS = ToolUse(0, math.nan, math.nan, "several tools without numbers")
 SAME_LENGTH_MM = 1e-3
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
 
@@ -291,7 +293,10 @@ class Modes(ToolPath):
         self._no_circle("TOOL PATH/")
         words = self._words(statement)
         if "TOOL" in words[1:-1]:
-            self.tool_name = statement.arguments[words.index("TOOL", 1) + 1].text
+            name = statement.arguments[words.index("TOOL", 1) + 1].text
+            if self.tool == 0 and 0 in self.used_tools and name != self.tool_name:
+                self.used_tools[0] = SEVERAL_TOOLS
+            self.tool_name = name
         self._note(self.noted, statement, vocabulary.HARMLESS["TOOL PATH"])
 
     def _delay(self, statement: Statement) -> None:

@@ -43,6 +43,7 @@ class CutterLocation(Curves):
             "": self._more_points,
             "GODLTA": self._godlta,
             "FROM": self._from,
+            "GOHOME": self._gohome,
             "RAPID": self._set_rapid,
             "FEDRAT": self._fedrat,
             "SPINDL": self._spindl,
@@ -234,6 +235,15 @@ class CutterLocation(Curves):
         axis = self._axis_of(numbers)
         x, y, z = (p + d for p, d in zip(self.point, self._scaled(numbers[:3]), strict=True))
         self._go((x, y, z), axis)
+
+    def _gohome(self, statement: Statement) -> None:
+        """NX says where home is; without a point it is the control's."""
+        if statement.arguments:
+            self._points(self._numbers(statement, 3, 6))
+            return
+        self._no_circle("GOHOME")
+        self.rapid = 0
+        self._note(self.doubtful, statement, vocabulary.DOUBTFUL["GOHOME"])
 
     def _from(self, statement: Statement) -> None:
         numbers = self._numbers(statement, 3, 6)

@@ -97,7 +97,7 @@ DOUBTFUL = {
     "PREFUN": "a G code of one control: what it does is not known",
     "INSERT": "a block for the control as it stands: what it does is not known",
     "CSI_INSERT_CUSTOM_GCODE": "a block for the control as it stands: what it does is not known",
-    "GOHOME": "the way home is not part of the path",
+    "GOHOME": "home is the control's: the way there is not part of the path",
     "OPSKIP": "statements that the operator may leave out: they are read",
 }
 UNKNOWN = "is not known"
