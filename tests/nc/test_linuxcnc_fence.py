@@ -69,6 +69,11 @@ CALLS_FILES = [
     "M98 P#1",
     "o[100+1] call",
     "o#1 call",
+    "M098 P77",
+    "o+100 call",
+    "o</tmp/evil> call\no</tmp/evil> sub\no</tmp/evil> endsub",
+    "/o<../evil> sub",
+    "o<sub/evil> call",
 ]
 
 
@@ -102,6 +107,47 @@ def test_refused_before_anything_runs_with_its_line(line, interpreter, started):
     assert not started
     if interpreter == "linuxcnc":
         assert error.value.line == 4
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G1 X5 F100\rM101\rM2\r",
+        "G1 X5 F100\r;py,open('x','w')\rM2\r",
+        "G1 X5 F100\nM1\x0001\nM2",
+        "G1 X5 F100\n;\x00py,open('x','w')\nM2",
+        "\ufeff;py,open('x','w')\nG1 X5 F100\nM2",
+        "G1 X5 F100\nM\ufeff101\nM2",
+        "G1 X5 F100\nM\u2007101\nM2",
+        "G1 X5 F100\nM\u0661\u0660\u0661\nM2",
+        "G1 X5 F100\n\uff2d101\nM2",
+        "G1 X5 F100\n\u041c101\nM2",
+        "G1 X5 F100\n\u24dc101\nM2",
+        "G1 X5 F100\n;\u200bpy,open('x','w')\nM\u200b101\nM2",
+        "G1 X5 F100\nM1\x1a01\nM2",
+        "G1 X5 F100\nM1\x0c01\nM2",
+        "G1 X5 F100\nM1\x8501\nM2",
+        "G1 X5 F100\n;py\u2028,open('x','w')\nM2",
+        "%\nG1 X5 F100\n%\nM101\n",
+        "G1 X5 F100\nM2\nM101\n",
+        "G1 X5 F100\no<\u0131f> call\nM2\n",
+    ],
+)
+@pytest.mark.parametrize("interpreter", ["linuxcnc", "auto"])
+def test_spellings_of_other_editors_and_scripts_are_refused(text, interpreter, started):
+    """Line ends of old Macs, NUL, byte-order marks, blanks and letters of other scripts, text after the end."""
+    if interpreter == "auto":
+        text = "#1 = 1\n" + text
+    with pytest.raises(InputError):
+        parse_program(text, "part.nc", interpreter=interpreter)
+    assert not started
+
+
+@pytest.mark.parametrize("text", ["G1 X5 F100\n(a\u0131b)\n", "G1 X5 F100 (LOGOPEN,x)\n(PROBEOPEN y)\n;DEBUG,#1\n"])
+def test_what_other_comments_say_does_not_reach_it(text, started):
+    with pytest.raises(InputError, match="started"):
+        parse_program(text, interpreter="linuxcnc")
+    assert set(started[0]) <= set("N0123456789G XF\nM")
 
 
 @pytest.mark.parametrize(
@@ -174,6 +220,27 @@ def test_no_file_appears(tmp_path, monkeypatch):
 
 
 @needs_rs274
+@pytest.mark.parametrize(
+    "call",
+    [
+        "%\no<{0}> call\nG1 X1 F100\n%\no<{0}> sub\no<{0}> endsub\n",
+        "/o<{0}> sub\n/o<{0}> endsub\no<{0}> call\nG1 X1 F100\nM2\n",
+    ],
+)
+def test_a_file_beside_the_program_is_not_run(call, tmp_path, monkeypatch):
+    """A subprogram that is only seemingly in the program: what defines it never reaches the interpreter."""
+    marker, other = tmp_path / "marker", tmp_path / "other.ngc"
+    other.write_text(f"o<other> sub\n;py,open('{marker}','w').close()\no<other> endsub\n")
+    program = call.format(other.with_suffix(""))
+    with pytest.raises(InputError, match="path"):
+        parse_program(program, interpreter="linuxcnc", block_delete=True)
+    with pytest.raises(InputError):  # by its name alone, from beside the program
+        monkeypatch.chdir(tmp_path)
+        parse_program(call.format("other"), interpreter="linuxcnc", block_delete=True)
+    assert not marker.exists()
+
+
+@needs_rs274
 def test_a_program_is_not_changed_and_a_run_leaves_no_trace_in_the_next(tmp_path):
     """Parameters persist in LinuxCNC; here each run begins anew."""
     file = tmp_path / "part.ngc"
@@ -198,6 +265,42 @@ def test_an_endless_loop_ends(confined, monkeypatch):
 
 
 @needs_rs274
+def test_an_endless_loop_is_named():
+    """Where it last moved, and the loops of the program."""
+    text = "\n".join(["G1 X1 F100", "X2"] * 2000 + ["o100 while [1]", "#1 = 1", "o100 endwhile", "M2"])
+    with pytest.raises(InputError, match=r"Loops begin in the lines 4001") as error:
+        read_limited(text, Limits(seconds=1))
+    assert 3000 < (error.value.line or 0) <= 4000  # what rs274 had in its buffer is lost
+
+
+@pytest.mark.parametrize("confined", [True, False])
+def test_it_starts_no_process(confined, monkeypatch, tmp_path):
+    """A stand-in for rs274 that tries; what it is itself, it still does."""
+    if not confined:
+        monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
+    fake = tmp_path / "rs274"
+    fake.write_text(
+        "#!/bin/sh\necho alive > canon.txt\n/bin/true && echo started >> canon.txt\necho late >> canon.txt\n"
+    )
+    fake.chmod(0o755)
+    assert runner.run_rs274("M2\n", "", "", rs274=str(fake)).canon == "alive\n"
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="root alone may become another user")
+def test_a_user_without_the_filter_starts_no_process_either(tmp_path):
+    """The limit on processes holds for everyone but root, for whom the filter is."""
+    script, limit = tmp_path / "limiter.py", "    resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))\n"
+    with_filter = limit + "    start_nothing()\n"
+    text = runner.LIMITER.read_text()
+    assert with_filter in text
+    script.write_text(text.replace(with_filter, "    os.setuid(65534)\n" + limit))
+    limits = ["10", str(1 << 30), "1000000"]
+    command = ["python3", "-I", "-S", str(script), *limits, "/bin/sh", "-c", "/bin/true && echo started"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd="/")
+    assert "started" not in done.stdout and "fork" in done.stderr
+
+
+@needs_rs274
 def test_an_endless_path_ends():
     with pytest.raises(InputError, match=r"part\.nc:3: .*after 1 MB of output"):
         read_limited("G91\no100 while [1]\nG1 X1 F100\no100 endwhile\nM2", Limits(file_bytes=1_000_000))
@@ -214,7 +317,9 @@ def test_in_bubblewrap_nothing_else_can_be_written_and_there_is_no_network(tmp_p
     """A stand-in for rs274 that tries."""
     outside = tmp_path / "outside"
     fake = tmp_path / "rs274"
-    fake.write_text(f"#!/bin/sh\necho x > {outside}\ncat /proc/net/dev > canon.txt\n")
+    fake.write_text(
+        f"#!/bin/sh\necho x > {outside}\nwhile read line; do echo $line; done < /proc/net/dev > canon.txt\n"
+    )
     fake.chmod(0o755)
     run = runner.run_rs274("M2\n", "", "", rs274=str(fake))
     assert not outside.exists()
@@ -225,11 +330,11 @@ def test_in_bubblewrap_nothing_else_can_be_written_and_there_is_no_network(tmp_p
 def test_it_is_started_without_a_shell_in_a_home_of_its_own(tmp_path, monkeypatch):
     monkeypatch.setenv("SECRET", "42")
     fake = tmp_path / "rs; touch x"
-    fake.write_text("#!/bin/sh\nenv > canon.txt\npwd >> canon.txt\n")
+    fake.write_text("#!/bin/sh\nexport -p > canon.txt\npwd >> canon.txt\n")
     fake.chmod(0o755)
     monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
     run = runner.run_rs274("M2\n", "", "", rs274=str(fake))
-    home = next(line for line in run.canon.splitlines() if line.startswith("HOME=")).removeprefix("HOME=")
+    home = next(line for line in run.canon.splitlines() if line.startswith("export HOME=")).split("=")[1].strip("'")
     assert run.canon.splitlines()[-1] == home and home != os.environ.get("HOME")
     assert "SECRET" not in run.canon
     assert not Path(home).exists()

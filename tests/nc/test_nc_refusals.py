@@ -64,7 +64,7 @@ REFUSALS = [
     ("G10 L5 P1", 1, 1, "with L5"),
     ("G53 X1", 1, 5, "motion mode"),
     ("G91 G53 G0 X1", 1, 5, "incremental"),
-    ("G28 G92 X1", 1, 5, "axis words"),
+    ("G28 G92 X1", 1, 5, "act once"),
     ("G0 G92 X1", 1, 4, "axis words"),
     ("G1 F100 X1 K4", 1, 12, "not used"),
     ("G1 F100 X1 N5", 1, 12, "line number"),

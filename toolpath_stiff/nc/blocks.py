@@ -97,8 +97,8 @@ class BlockReader:
         if code in G_HARMLESS:
             self._note(word, G_HARMLESS[code])
         if group == ONCE:
-            if any(code == other for other, _ in codes.once):
-                raise self.fail(word, "appears twice in its block")
+            for other, _ in codes.once:  # LinuxCNC's modal group 0
+                raise self.fail(word, f"and {other} both act once, in this block", "one of them in a block")
             codes.once.append((code, word))
             return
         if group in codes.groups:

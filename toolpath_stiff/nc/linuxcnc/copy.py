@@ -47,8 +47,8 @@ def _split_line(text: str, number: int, name: str) -> Line:
         words, comments = text, NO_COMMENTS
     else:
         words, comments = _cut_comments(text, number, name)
-    compact = "".join(words.replace("\ufeff", "").split()).upper()
-    if not compact.isascii():
+    compact = "".join(words.replace("\ufeff", "").split())
+    if not compact.isascii():  # before upper case: of other scripts some letters become ASCII ones
         foreign = next(c for c in words if not c.isascii() and not c.isspace() and c != "\ufeff")
         raise InputError(
             f"{foreign!r} outside a comment",
@@ -57,6 +57,7 @@ def _split_line(text: str, number: int, name: str) -> Line:
             line=number,
             column=words.index(foreign) + 1,
         )
+    compact = compact.upper()
     optional = compact.startswith("/")
     if optional:
         compact = compact[1:].lstrip("0123456789")

@@ -20,6 +20,7 @@ PYTHON = re.compile(r"[\s(;]*p\s*y(?:\s*(?:[^\w\s]|$|r\s*u\s*n|r\s*e\s*l\s*o\s*a
 M_WORD = re.compile(r"M(?!OD)([+-]?[0-9.]+)?", re.ASCII)
 SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
 OPENS_OR_ENDS = re.compile(r"O(<[^<>]*>|\d+)(END)?(SUB|IF|WHILE|REPEAT)")
+M98 = re.compile(r"M[+]?0*98(?!\d)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
 
 
@@ -66,6 +67,8 @@ def _check_calls(lines: list[Line], name: str) -> None:
     defined: set[str] = set()
     for line in lines:
         match = SUBPROGRAM.match(line.words)
+        if match and "/" in match[1]:  # it would be looked for there, if what defines it here is left out
+            raise _refused("a subprogram whose name is a path", name, line.number)
         if match and match[2] == "SUB":
             defined.add(_key(match[1]))
         elif match and match[2] == "CALL":
@@ -74,7 +77,7 @@ def _check_calls(lines: list[Line], name: str) -> None:
             defined.add(_key(line.words[1:]))
         elif line.words.startswith("O") and "CALL" in NAMED.sub("<>", line.words):
             raise _refused("a call of a subprogram whose name is computed", name, line.number)
-        elif "M98" in line.words:
+        elif M98.search(line.words):
             called = re.search(r"P(\d+)", line.plain)
             if called is None:
                 raise _refused("M98 without the number of its subprogram", name, line.number)

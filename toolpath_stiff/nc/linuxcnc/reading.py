@@ -25,6 +25,8 @@ SETS_G54 = re.compile(r"L0*20?(?!\d).*P0*[01](?!\d)|P0*[01](?!\d).*L0*20?(?!\d)"
 HARMLESS = {**G_HARMLESS, **M_HARMLESS}
 HARMLESS_WORD = re.compile(r"([GM])([0-9]+\.?[0-9]*)")
 FILES = re.compile(r"\s*(logopen|logappend|probeopen)\b", re.IGNORECASE)
+LOOPS = re.compile(r"O(?:<[^<>]*>|\d+|[#\[].*)(?:WHILE|REPEAT|DO)")
+MOST_NAMED = 5  # loops, in a message
 WAITS = re.compile(r"M0*66(?!\d)")
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
@@ -184,7 +186,9 @@ class _Session:
                 limits=self.limits,
             )
         except StoppedError as error:
-            raise InputError(str(error), file=self.name, line=error.line) from None
+            loops = [str(line.number) for line in self.lines if LOOPS.match(line.words)][:MOST_NAMED]
+            hint = f"loops begin in the lines {', '.join(loops)}" if loops else ""
+            raise InputError(str(error), hint=hint, file=self.name, line=error.line) from None
         follower = self._follow(run, (0.0, 0.0, 0.0))
         if run.message or not follower.ended:
             raise self._refusal(run.message, len(prefix))

@@ -1,7 +1,7 @@
 """Running `rs274` in a folder of its own: no shell, no network, no way out, and an end.
 
-Limits on time, memory and file size by the kernel (`setrlimit`); bubblewrap, where it is installed and works, makes the
-whole file system but that folder read-only and takes away the network.
+Limits on time, memory and file size by the kernel, and no process beside it (`limiter`); bubblewrap, where it is
+installed and works, makes the whole file system but that folder read-only and takes away the network.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from toolpath_stiff.errors import InputError, TpsError
 HOW_TO_GET = "install LinuxCNC (Debian, Ubuntu: apt install linuxcnc-uspace), or name the program with --rs274 PATH"
 PROGRAM, CANON, PARAMETERS, TOOLS, ERRORS = "program.ngc", "canon.txt", "rs274.var", "tool.tbl", "errors.txt"
 LONGEST_MESSAGE = 4000
+LIMITER = Path(__file__).with_name("limiter.py").resolve()
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
         (folder / PARAMETERS).write_text(parameters, encoding="ascii")
         (folder / TOOLS).write_text(tools, encoding="ascii")
         command = [rs274, "-g", "-t", TOOLS, "-v", PARAMETERS, PROGRAM, CANON]
-        code = _execute([*_limiter(limits), *_sandbox(folder), *command], folder, limits)
+        code = _execute([*_sandbox(folder), *_limiter(limits), *command], folder, limits)
         message = _text(folder / ERRORS, LONGEST_MESSAGE)
         over = _exceeded(code, limits)
         if over:
@@ -130,19 +131,11 @@ def _wait(process: subprocess.Popen[bytes], folder: Path, limits: Limits) -> int
 def _limiter(limits: Limits) -> list[str]:
     """A command before the command: a small Python that limits itself and becomes what follows.
 
-    Setting the limits between fork and exec of this process would not be safe where it has threads.
+    Setting the limits between fork and exec of this process would not be safe where it has threads; and bubblewrap,
+    which goes before, starts a process.
     """
-    code = (
-        "import os, resource, sys; "
-        "cpu, memory, size = map(int, sys.argv[1:4]); "
-        "resource.setrlimit(resource.RLIMIT_CPU, (cpu, cpu + 1)); "
-        "resource.setrlimit(resource.RLIMIT_AS, (memory, memory)); "
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)); "
-        "resource.setrlimit(resource.RLIMIT_CORE, (0, 0)); "
-        "os.execv(sys.argv[4], sys.argv[4:])"
-    )
     values = (limits.seconds, limits.memory_bytes, limits.file_bytes)
-    return [sys.executable, "-I", "-S", "-c", code, *(str(value) for value in values)]
+    return [sys.executable, "-I", "-S", str(LIMITER), *(str(value) for value in values)]
 
 
 def _exceeded(code: int, limits: Limits) -> str:
