@@ -138,10 +138,10 @@ def test_g_code_is_not_taken_for_one(text):
 
 
 def test_check_goes_on_after_errors():
-    text = SLOT.replace("FINI\n", "COPY/1\nGOTO/1,x,0\nTLRGT\nGOTO/9,9,9\nFINI\n")
+    text = SLOT.replace("FINI\n", "COPY/1\nGOTO/1,x,0\nTLRGT\nGOTO/9,9,9\nCIRCLE/0,9,9,0,0,1,9\n")
     checked = check_lines(tuple(text.splitlines()), "part.apt")
     errors = [finding for finding in checked.findings if finding.severity == "error"]
-    assert [finding.line for finding in errors] == [7, 8, 9] and not checked.complete
+    assert [finding.line for finding in errors] == [7, 8, 9, 11] and not checked.complete
     assert checked.moves is not None and checked.moves.line[-1] == 10
 
 

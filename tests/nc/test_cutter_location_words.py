@@ -148,6 +148,7 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("GOTO/5,0,0\nCIRCLE/0,0,0,0,0,1,5\nGOTO/0,5.2,0", 5, "off its circle"),
         ("GOTO/0,0,0\nCIRCLE/0,0,0,0,0,1,5\nGOTO/0,5,0", 5, "centre"),
         ("GOTO/5,0,0\nCIRCLE/0,0,0,0,0,1,5\nFINI", 5, "waits"),
+        ("GOTO/5,0,0\nGOTO/6,0,0\nCIRCLE/0,0,0,0,0,1,6", 5, "the end of the file"),
         ("GOTO/5,0,0\nRAPID\nCIRCLE/0,0,0,0,0,1,5\nGOTO/0,5,0", 5, "RAPID"),
         ("GOTO/5,0,0\nINDIRV/1,0,0\nTLON,GOFWD/(CIRCLE/0,0,0,5),ON,(LINE/0,0,0,0,5,0)", 5, "along the circle"),
         ("GOTO/5,0,0\nTLON,GOFWD/(CIRCLE/0,0,0,5),ON,(LINE/0,0,0,0,5,0)", 4, "INDIRV"),
@@ -214,6 +215,15 @@ def test_arcs_that_turn_the_other_way_are_noticed():
     text = f"{START}GOTO/10,-5,0\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,{{}},10\nGOTO/0,10,0\n"
     assert not read(text.format(1)).warnings
     assert "turns back" in read(text.format(-1)).warnings[0]
+
+
+def test_a_diameter_is_that_of_its_tool():
+    """CUTTER before LOADTL (CATIA) or after it; a tool without one has none."""
+    cut = "GOTO/0,0,0\nGOTO/1,0,0\n"
+    program = read(
+        f"{START}CUTTER/10\nLOADTL/1\n{cut}LOADTL/2\nCUTTER/8\n{cut}LOADTL/3\n{cut}CUTTER/6\nLOADTL/4\n{cut}"
+    )
+    np.testing.assert_allclose([tool.diameter for tool in program.tools], [0.01, 0.008, math.nan, 0.006])
 
 
 def test_no_cut_is_an_error():

@@ -80,6 +80,7 @@ class Curves(Modes):
             self.direction = None
         self.circle, self.circle_line = circle, self.statement.line
         self._swept = 0.0
+        self.note_entry(self.statement.line, circle)
 
     def arc_through(self, targets: list[Vector], axis: Vector) -> None:
         """Follow the circle that waits through points; the last one ends the arc."""

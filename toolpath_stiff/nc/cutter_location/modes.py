@@ -254,22 +254,23 @@ class Modes(ToolPath):
         if number != int(number) or not 0 <= number < 1e9:
             raise self.fail(f"tool {given.text}", "a whole number", at=given)
         self._no_circle(f"{statement.word}/")
-        self.tool = int(number)
         words = self._words(statement)
         length = math.nan
         if "LENGTH" in words and words.index("LENGTH") + 1 < len(words):
             length = number_of(statement.arguments[words.index("LENGTH") + 1], self.name) * self.scale
-        entry = (self.tools or {}).get(self.tool)
-        if entry is not None and not math.isnan(entry.length):
-            self.tool_length = entry.length
-            if length > 0.0 and abs(length - entry.length) > SAME_LENGTH_MM:
-                self.assume(
-                    f"tool {self.tool}: the tool table's length {entry.length:g} mm, not LOADTL's {length:g} mm"
-                )
-        else:
-            self.tool_length = length if length > 0.0 else math.nan
-            if length > 0.0:
+            length = length if length > 0.0 else math.nan
+        self.change_tool(int(number), self._length_of(int(number), length))
+
+    def _length_of(self, number: int, said: float) -> float:
+        """The tool table's length, or what the file says; nan: the machine's reference tool."""
+        entry = (self.tools or {}).get(number)
+        if entry is None or math.isnan(entry.length):
+            if not math.isnan(said):
                 self.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools wins over it")
+            return said
+        if abs(said - entry.length) > SAME_LENGTH_MM:
+            self.assume(f"tool {number}: the tool table's length {entry.length:g} mm, not LOADTL's {said:g} mm")
+        return entry.length
 
     def _toolno(self, statement: Statement) -> None:
         if "TURN" in self._words(statement):
@@ -281,12 +282,12 @@ class Modes(ToolPath):
         """The first number is the diameter, in all of APT's forms."""
         first = statement.arguments[0] if statement.arguments else None
         if first is not None and is_number(first.text):
-            self.diameter = number_of(first, self.name) * self.scale or math.nan
+            self.cutter(number_of(first, self.name) * self.scale)
 
     def _tldata(self, statement: Statement) -> None:
         for argument in statement.arguments:
             if is_number(argument.text):
-                self.diameter = number_of(argument, self.name) * self.scale or math.nan
+                self.cutter(number_of(argument, self.name) * self.scale)
                 return
 
     def _tool_path(self, statement: Statement) -> None:

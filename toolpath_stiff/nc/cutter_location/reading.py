@@ -106,6 +106,12 @@ class CutterLocation(Curves):
                 at = max(at, here + 1)
         if self.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[at:]):
             self.warnings.append(f"line {at}: FINI ends the file; what follows is not read")
+        try:
+            self._no_circle("the end of the file")
+        except InputError as error:
+            if on_error is None:
+                raise
+            on_error(error)
         self._finish()
 
     def _comment(self, lines: tuple[str, ...], at: int) -> None:

@@ -57,7 +57,8 @@ class ToolPath:
         self.tool, self.tool_length = 0, math.nan
         self.diameter, self.tool_name = math.nan, ""
         self.smooth, self.unsmooth, self.first_unsmooth = 0, 0, 0
-        self._direction: Vector | None = None
+        self._direction: Vector | None = None  # of the straight move before
+        self._cutter_at = 0  # moves before the last CUTTER
 
     def assume(self, text: str) -> None:
         """Note an assumption, once."""
@@ -98,12 +99,11 @@ class ToolPath:
         start = self.point
         assert start is not None
         arc = circles.arc_to(circle, start, target)
-        self._smoothness(line, circle, start)
         if axis == self.axis:
             self._add(line, ARC, target, self.angles, self._feed(ARC), arc)
         else:
             self._turning(line, ARC, target, axis, lambda share: circles.part_of(arc, start, target, share), arc)
-        self._direction = circles.cross(arc.normal, circles.minus(target, circle.center))
+        self._direction = None
         return arc.sweep
 
     def hole(self, line: int, target: Vector, axis: Vector, hole: Drilling, feed: float) -> None:
@@ -204,11 +204,11 @@ class ToolPath:
             raise NoFeedError("a feed per revolution without a spindle speed", "SPINDL/ with RPM before it")
         return feed * self.speed
 
-    def _smoothness(self, line: int, circle: Circle, start: Vector) -> None:
-        """Whether the path goes on into an arc smoothly, as it nearly always does, or would turn back."""
-        if self._direction is None:
+    def note_entry(self, line: int, circle: Circle) -> None:
+        """Count whether a straight move goes on into an arc smoothly, as it nearly always does, or would turn back."""
+        if self._direction is None or self.point is None:
             return
-        tangent = circles.cross(circle.axis, circles.minus(start, circle.center))
+        tangent = circles.cross(circle.axis, circles.minus(self.point, circle.center))
         sizes = math.sqrt(circles.dot(tangent, tangent)), math.sqrt(circles.dot(self._direction, self._direction))
         if min(sizes) < 1e-9:
             return
@@ -220,3 +220,14 @@ class ToolPath:
         elif angle > 180.0 - circles.SMOOTH_DEG:
             self.unsmooth += 1
             self.first_unsmooth = self.first_unsmooth or line
+
+    def cutter(self, diameter: float) -> None:
+        """The diameter of the tool that cuts next."""
+        self.diameter = diameter if diameter > 0.0 else math.nan
+        self._cutter_at = len(self.recorder)
+
+    def change_tool(self, number: int, length: float) -> None:
+        """Another tool; a CUTTER that stands between the last move and this is its own."""
+        if len(self.recorder) > self._cutter_at:
+            self.diameter = math.nan
+        self.tool, self.tool_length = number, length
