@@ -272,6 +272,85 @@ def test_a_helix_under_tool_centre_point_control(control):
     np.testing.assert_allclose(helix.arc_center[:, 2], helix.start[:, 2], atol=1e-15)
 
 
+SWITCHED = """T1 M6
+G0 X10 Y20 Z30 A25 C50
+G43.4 H1 Z{height}
+G1 F400 X{x:.9f} Y{y:.9f} Z{z:.9f} A5 C-20
+A-15
+G49
+G1 X0 Y0 Z0 A0 C0
+"""
+
+
+@pytest.mark.parametrize("tool", [0.0, 80.0])
+def test_g43_4_holds_the_tip_from_there_to_g49(control, tool):
+    """With the tool's length L the spindle's nose stands at X10 Y20 Z30, and the tip L below it."""
+    table = f"[[tools]]\nnumber = 1\nlength_mm = {tool}\n"
+    standing = (about("z", 50, (20, -5, 0)) @ about("x", 25, (0, 10, -50)) @ [10, 20, 30 - tool, 1])[:3]
+    x, y, z = standing
+    # Z is named where it is: nothing moves but the angles.
+    program = parse_program(SWITCHED.format(height=f"{z:.9f}", x=x, y=y, z=z), controller=control(AC + table))
+    held = program.moves.take((program.moves.line == 4) | (program.moves.line == 5))
+    np.testing.assert_allclose(1e3 * held.start[:, :3], [standing] * len(held), atol=1e-6)
+    np.testing.assert_allclose(1e3 * held.end[:, :3], [standing] * len(held), atol=1e-6)
+    axis = about("z", -20, (0, 0, 0)) @ about("x", -15, (0, 0, 0)) @ [0, 0, 1, 0]
+    np.testing.assert_allclose(axes_of(held.end[-1:, 3:])[0], axis[:3], atol=1e-12)
+    before = program.moves.line < 6  # with a length, the moves are those of the nose first, of the tip then
+    if not tool:
+        np.testing.assert_allclose(program.moves.start[before][1:], program.moves.end[before][:-1], atol=1e-11)
+    # G49 puts the numbers back to the axes', those of the spindle's nose: the machine stands still.
+    last = program.moves.take(program.moves.line == 7)
+    back = about("z", -20, (20, -5, 0)) @ about("x", -15, (0, 10, -50))
+    nose = np.linalg.solve(back, [*standing, 1.0])[:3] + np.array([0.0, 0.0, tool])
+    np.testing.assert_allclose(1e3 * last.start[0, :3], (back @ [*nose, 1.0])[:3], atol=1e-6)
+    np.testing.assert_allclose(last.end[-1], 0.0, atol=1e-12)
+    assert any("from G43.4 on to G43 or G49" in text for text in program.assumptions)
+
+
+def test_the_same_part_posted_with_and_without_g43_4(control):
+    plain = parse_program(hemisphere_program(60, 7), controller=control(AC))
+    text = hemisphere_program(60, 7).replace("G0 X", "G43.4 H1\nG0 X")  # upright still
+    lines = text.splitlines()
+    ends = plain.moves.end[np.flatnonzero(np.diff(plain.moves.line, append=0) != 0)]
+    words = iter(ends)
+    for i, line in enumerate(lines):
+        if line.startswith(("G0 ", "G1 ")):
+            x, y, z = 1e3 * next(words)[:3]
+            code, *_, a, c = [word for word in line.split() if not word.startswith("F")]
+            feed = " F1000" if code == "G1" else ""
+            lines[i] = f"{code} X{x:.7f} Y{y:.7f} Z{z:.7f} {a} {c}{feed}"
+    table = "[[tools]]\nnumber = 1\nlength_mm = 0\n"
+    held = parse_program("\n".join(lines), controller=control(AC + table))
+    again = held.moves.end[np.flatnonzero(np.diff(held.moves.line, append=0) != 0)]
+    np.testing.assert_allclose(again, ends, atol=1e-9)
+
+
+def test_g43_4_without_kinematics_is_refused_as_before(control):
+    with pytest.raises(InputError, match=r"G43.4 is tool centre point control .*kinematics"):
+        parse_program("G43.4 H1\nG1 F100 X1\n")
+
+
+def test_machine_points_while_the_tip_is_held_are_refused(control):
+    table = "[[tools]]\nnumber = 1\nlength_mm = 0\n"
+    for home in ("G53 G0 Z0", "G28 G91 Z0"):
+        with pytest.raises(InputError, match="while tool centre point control is on") as error:
+            parse_program(f"G1 F100 X1\nG43.4 H1\n{home}\n", controller=control(AC + table))
+        assert error.value.line == 3
+
+
+def test_another_length_under_a_leaning_tool_with_the_tip_held_for_good(control):
+    """Where the tip is then is not known until X, Y and Z are named: there are no pivots."""
+    table = "[[tools]]\nnumber = 1\nlength_mm = 80\n"
+    start = "T1 M6\nG0 A30\nG43.4 H1 Z100\n"
+    program = parse_program(start + "X2 Y2\nX1\nG1 F100 Z0\n", controller=control(AC_TCP + table))
+    assert set(program.moves.line) == {2, 5, 6} and program.warnings[0].startswith("lines 3, 4: rapids")
+    with pytest.raises(InputError, match="a cut that begins or ends at a point") as error:
+        parse_program(start + "G1 F100 X7\n", controller=control(AC_TCP + table))
+    assert error.value.line == 4
+    upright = parse_program(start.replace("A30", "X5") + "G1 F100 X7\n", controller=control(AC_TCP + table))
+    assert not upright.warnings
+
+
 # -- heads: what the tool's length has to do with it -------------------------------------------------------------------
 
 

@@ -16,7 +16,7 @@ from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_locat
 from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, ToolUse, Unsupported
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Unsupported
 from toolpath_stiff.nc.plain_lines import G_COLUMN
 from toolpath_stiff.nc.posted import PostedKinematics
 from toolpath_stiff.nc.reader import ZERO
@@ -170,7 +170,7 @@ def check_lines(
     if posted is None:
         frames = Frames(copy.deepcopy(controller.offsets or Offsets()), place, default)
     else:  # first in the coordinates of the machine that the program was posted for
-        frames = Frames(copy.deepcopy(controller.offsets or Offsets()), None, ZERO, posted=True)
+        frames = Frames(copy.deepcopy(controller.offsets or Offsets()), None, ZERO, posted=posted)
     interpreter = Interpreter(name, frames, copy.deepcopy(controller.tools), controller.dialect)
     run = _CheckingRun(interpreter, lines, name, switches_on(block_delete, controller))
     start = modal_state(interpreter)
@@ -191,7 +191,7 @@ def check_lines(
     at = frames.origin
     if posted is not None:
         at = default if place is None else place
-        moves, refused, more, assumed = _on_the_part(moves, posted, frames, interpreter.used_tools.values(), name)
+        moves, refused, more, assumed = _on_the_part(moves, posted, interpreter, name)
         errors, warnings, assumptions = [*errors, *refused], [*warnings, *more], [*assumptions, *assumed]
     findings = [finding_of(error) for error in errors]
     findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in warnings]
@@ -211,18 +211,20 @@ def check_lines(
 
 
 def _on_the_part(
-    moves: Moves | None, kinematics: PostedKinematics, frames: Frames, tools: Iterable[ToolUse], name: str
+    moves: Moves | None, kinematics: PostedKinematics, interpreter: Interpreter, name: str
 ) -> tuple[Moves | None, list[InputError], tuple[str, ...], tuple[str, ...]]:
     """Moves of the posted machine on the part, None where that is refused; errors, warnings, assumptions."""
     from toolpath_stiff.nc.posted_program import check_rotary_offsets, on_the_part
 
     if moves is None:
         return None, [], (), ()
+    frames = interpreter.frames
     x, y, z = (m_from_mm(v) for v in frames.origin[:3])
     zero = (x, y, z, 0.0, 0.0, 0.0) if frames.source == "program" else None
     try:
         check_rotary_offsets(frames.offsets, kinematics, name)
-        part = on_the_part(moves, kinematics, zero, tools, name)
+        tools = interpreter.used_tools.values()
+        part = on_the_part(moves, kinematics, zero, tools, name, interpreter.tip_held)
     except InputError as error:
         return None, [error], (), ()
     return part.moves, [], part.warnings, part.assumptions

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from toolpath_stiff.nc.posted import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
 
 Pose = tuple[float, float, float, float, float, float]
@@ -42,7 +43,9 @@ class Frames:
     reference
         G54's zero in control coordinates, fixed at the first motion.
     posted
-        Whether the program was posted for another machine, whose coordinates these are.
+        The machine that the program was posted for, whose coordinates these are; None: this one.
+    tip_held
+        Whether tool centre point control is on (G43.4): positions are then those of the tip on the part.
     """
 
     offsets: Offsets
@@ -57,13 +60,14 @@ class Frames:
     from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
     reference: tuple[float, float, float] | None = None
     source: str = ""
-    posted: bool = False
+    posted: PostedKinematics | None = None
+    tip_held: bool = False
 
     @property
     def bound(self) -> bool:
         """Whether the present point was given in machine coordinates, an axis of it at least."""
         # The rotary axes of a machine that is not this one have one zero for both.
-        return any(self.from_machine[:3] if self.posted else self.from_machine)
+        return any(self.from_machine if self.posted is None else self.from_machine[:3])
 
     def to_control(self, program: list[float]) -> list[float]:
         """Control coordinates of a point in program coordinates."""

@@ -19,6 +19,10 @@ from toolpath_stiff.nc.words import Block, Word
 from toolpath_stiff.nc.zeros import Zeros
 from toolpath_stiff.units import MM_PER_INCH
 
+HOLDS_TIP = "G43.4"
+HOLDS_HINT = (
+    "post X, Y, Z, A, B, C of the tip, or name the machine it is posted for ([kinematics] of a controller file)"
+)
 USES_AXES = ("G10", "G28", "G30", "G52", "G92")  # non-modal codes that take the axis words of their block
 
 
@@ -44,6 +48,8 @@ class Interpreter(Zeros):
         super().__init__(name, frames, tools, dialect)
         self.call: Call | None = None
         self.returns = False
+        # Tool centre point control, by the number of moves before it is switched (G43.4) on or off.
+        self.tip_held: list[tuple[int, bool]] = []
 
     def execute(self, block: Block) -> bool:
         """Execute a block; False once the program has ended."""
@@ -240,6 +246,11 @@ class Interpreter(Zeros):
         if code is None:
             return
         word = codes.groups["tool length"][1]
+        if code == HOLDS_TIP and self.frames.posted is None:
+            raise self.fail(
+                word, "is tool centre point control of one control, which is not supported", hint=HOLDS_HINT
+            )
+        self._hold_tip(False, word)
         if code == "G49":
             length = math.nan
         elif code == "G43.1":
@@ -252,6 +263,31 @@ class Interpreter(Zeros):
         self.tool_length = length
         self.length_changed = True
         self.frames.set_tool(0.0 if math.isnan(length) else length)
+        self._hold_tip(code == HOLDS_TIP, word)
+
+    def _hold_tip(self, hold: bool, word: Word) -> None:
+        """Switch tool centre point control: the machine stands still, the numbers of the present point change."""
+        frames = self.frames
+        if frames.posted is None or (not frames.posted.tcp and frames.tip_held == hold):
+            return
+        turned = any(frames.position[3 + axis.column] for axis in frames.posted.axes)
+        if not frames.posted.tcp:
+            frames.tip_held = hold
+            self.tip_held.append((len(self.recorder), hold))
+        if not turned:
+            return
+        if frames.posted.tcp or (frames.bound and frames.source != "program"):
+            frames.from_machine[:3] = [True] * 3  # not known until X, Y and Z are named
+            return
+        from toolpath_stiff.nc.posted_program import switched
+
+        length = self.tool_length
+        if math.isnan(length):
+            length = (self.tools or {}).get(self.tool, ToolEntry(self.tool)).length
+        position = switched(frames, length, hold)
+        if any(map(math.isnan, position)):
+            raise self.fail(word, "with a tilted head needs the tool's length", hint="add it to the tool table")
+        frames.position = position
 
     def _table_length(self, word: Word) -> float:
         """Length of the tool that G43 names by H, or of the one in the spindle."""

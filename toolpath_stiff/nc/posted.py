@@ -108,10 +108,11 @@ class PostedKinematics:
         """Type and letters: "table-table A C"."""
         return " ".join([self.type, *(axis.letter for axis in self.axes)])
 
-    def assumption(self) -> str:
-        """What was made of X Y Z A B C, a sentence for people."""
+    def assumption(self, *, switched: bool = False) -> str:
+        """What was made of X Y Z A B C, a sentence for people; `switched`: tool centre point control came and went."""
         axes = ", ".join(axis.describe() for axis in self.axes)
         where = "the tip on the part (tool centre point control)" if self.tcp else "the machine's axes"
+        where += ", of the tip on the part from G43.4 on to G43 or G49" if switched and not self.tcp else ""
         return (
             f"posted for another kinematics ({self.label}): X Y Z are those of {where}; {axes}, positive angles of the "
             "tool against the work by the right hand (ISO 841). Tool tip and tool axis are recovered, moves with "

@@ -51,6 +51,7 @@ def tool_poses(
     xyz: FloatArray,
     abc: FloatArray,
     tool_length: FloatArray | float = math.nan,
+    tip_held: BoolArray | bool = False,
 ) -> ToolPoses:
     """Where the tool stands on the part: the forward kinematics of the machine that a program was posted for.
 
@@ -59,12 +60,16 @@ def tool_poses(
     kinematics
         With its tables' points in the coordinates of `xyz`.
     xyz
-        (n, 3) m, X Y Z as programmed; `kinematics.tcp` says what they are.
+        (n, 3) m, X Y Z as programmed.
     abc
         (n, 3) rad, A B C as programmed.
     tool_length
         (n,) or one, m, from the spindle's gauge line to the tip; heads without tool centre point control alone need it.
+    tip_held
+        (n,) or one, whether tool centre point control is on where it is not for good (`kinematics.tcp`): X Y Z are the
+        tip's on the part.
     """
+    held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(xyz),))
     axis = np.tile(Z, (len(xyz), 1))
     tip = np.array(xyz, dtype=float)
     for rotary in kinematics.from_tool_to_work:
@@ -73,7 +78,8 @@ def tool_poses(
         if not kinematics.tcp:
             center = _line_point(rotary, xyz, tool_length)
             # Where nothing turns the numbers stay to their last digit, and a tool's unknown length does not matter.
-            tip = np.where((angle != 0.0)[:, None], center + _turned(tip - center, rotary, angle), tip)
+            turns = ~held & (angle != 0.0)
+            tip = np.where(turns[:, None], center + _turned(tip - center, rotary, angle), tip)
     return ToolPoses(tip, axis)
 
 
@@ -92,7 +98,11 @@ def roll_pitch(axis: FloatArray) -> FloatArray:
 
 
 def recover_moves(
-    moves: Moves, kinematics: PostedKinematics, tool_lengths: Mapping[int, float], name: str = "program"
+    moves: Moves,
+    kinematics: PostedKinematics,
+    tool_lengths: Mapping[int, float],
+    name: str = "program",
+    tip_held: BoolArray | bool = False,
 ) -> Moves:
     """Moves of the tool on the part, from those of the machine that the program was posted for.
 
@@ -106,6 +116,8 @@ def recover_moves(
         Tool number -> m, for moves without a length of their own (G43).
     name
         The program's name, for messages.
+    tip_held
+        (n,) or one, whether tool centre point control is on, as in `tool_poses`.
 
     Returns
     -------
@@ -124,8 +136,9 @@ def recover_moves(
         return moves
     _check_letters(moves, kinematics, name)
     moves = _shorter_way(moves, kinematics)
-    length = _lengths_at_heads(moves, kinematics, tool_lengths, name)
-    count = _pieces(moves, kinematics, length)
+    held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(moves),))
+    length = _lengths_at_heads(moves, kinematics, held, tool_lengths, name)
+    count = _pieces(moves, kinematics, held, length)
     if count.sum() > MOST_PIECES:
         worst = int(moves.line[np.argmax(count)])
         raise InputError(
@@ -143,12 +156,12 @@ def recover_moves(
     programmed = points_along(moves, move, u)[0]
     angles = moves.start[move, 3:] + u[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
     angles[last] = moves.end[:, 3:]
-    found = tool_poses(kinematics, programmed, angles, length[move])
+    found = tool_poses(kinematics, programmed, angles, length[move], held[move])
     pose = np.zeros((len(move), 6))
     pose[:, :3] = _without_rounding(found.tip)
     pose[:, 3:5] = _without_rounding(roll_pitch(found.axis))
     start, end = np.flatnonzero(~last), np.flatnonzero(step > 0)
-    pieces = _on_the_part(moves, kinematics, length, move[start], u[start])
+    pieces = _on_the_part(moves, kinematics, held, length, move[start], u[start])
     pieces = replace(pieces, start=pose[start], end=pose[end])
     return _with_times(pieces, moves, move[start], count, last[end])
 
@@ -212,7 +225,7 @@ def _turning(moves: Moves) -> FloatArray:
 
 
 def _lengths_at_heads(
-    moves: Moves, kinematics: PostedKinematics, tool_lengths: Mapping[int, float], name: str
+    moves: Moves, kinematics: PostedKinematics, held: BoolArray, tool_lengths: Mapping[int, float], name: str
 ) -> FloatArray:
     """(n,) m, gauge line to tip: G43's, else the tool table's; needed wherever a head is tilted."""
     length = moves.tool_length.copy()
@@ -222,7 +235,7 @@ def _lengths_at_heads(
     if kinematics.tcp or not heads:
         return length
     tilted = (moves.start[:, heads] != 0.0).any(axis=1) | (moves.end[:, heads] != 0.0).any(axis=1)
-    missing = tilted & np.isnan(length)
+    missing = tilted & ~held & np.isnan(length)
     if missing.any():
         first = int(np.argmax(missing))
         raise InputError(
@@ -236,7 +249,7 @@ def _lengths_at_heads(
     return length
 
 
-def _pieces(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> IntArray:
+def _pieces(moves: Moves, kinematics: PostedKinematics, held: BoolArray, length: FloatArray) -> IntArray:
     """(n,) into how many pieces each move is divided.
 
     A curve with |q''| <= a (per share of the move) is within a / (8 m^2) of m equal chords. A turn at the rate w about
@@ -246,9 +259,9 @@ def _pieces(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> I
     used = [axis.column for axis in kinematics.axes]
     count = np.ceil(turning[:, used].sum(axis=1) / AXIS_STEP - 1e-9)
     if not kinematics.tcp:
-        bend = _bend(moves, kinematics, length)
-        bent = (turning[:, used] > 0.0).any(axis=1)
-        count = np.where(bent, np.maximum(count, np.ceil(np.sqrt(bend / (8.0 * kinematics.tolerance)) - 1e-9)), 0.0)
+        bent = ~held & (turning[:, used] > 0.0).any(axis=1)
+        bend = np.where(bent, _bend(moves, kinematics, length), 0.0)
+        count = np.maximum(count, np.ceil(np.sqrt(bend / (8.0 * kinematics.tolerance)) - 1e-9))
     return np.asarray(np.maximum(count, 1.0), dtype=np.int64)
 
 
@@ -304,15 +317,20 @@ def _without_rounding(points: FloatArray) -> FloatArray:
 
 
 def _on_the_part(
-    moves: Moves, kinematics: PostedKinematics, length: FloatArray, move: IntArray, share: FloatArray
+    moves: Moves,
+    kinematics: PostedKinematics,
+    held: BoolArray,
+    length: FloatArray,
+    move: IntArray,
+    share: FloatArray,
 ) -> Moves:
     """One row a piece, which begins at its share of its move; arcs that stay arcs; the ends are still the moves'."""
     arc = moves.arc_sweep != 0.0
     turning = (_turning(moves) > 0.0).any(axis=1)
-    stays = arc & (~turning | kinematics.tcp)
+    stays = arc & (~turning | held)
     center, normal = moves.arc_center, moves.arc_normal
-    rows = np.flatnonzero(stays)
-    if not kinematics.tcp and len(rows):
+    rows = np.flatnonzero(stays & ~held)
+    if len(rows):
         # Turned as a whole: the centre as a point of the linear axes, the normal as the way to another one.
         abc = moves.start[rows, 3:]
         here, there = (
@@ -320,7 +338,7 @@ def _on_the_part(
         )
         center, normal = center.copy(), normal.copy()
         center[rows], normal[rows] = here, (there - here) / np.linalg.norm(there - here, axis=1)[:, None]
-    climb = np.zeros(len(moves))
+    rows, climb = np.flatnonzero(stays), np.zeros(len(moves))
     climb[rows] = arc_frame(moves, rows).climb
     risen = center[move] + (climb[move] * share)[:, None] * normal[move]  # the plane of the piece's start
     pieces = np.bincount(move, minlength=len(moves))

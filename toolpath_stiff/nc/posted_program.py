@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
-from toolpath_stiff.nc.posted import MACHINE, TABLE, PostedKinematics, RotaryAxis
-from toolpath_stiff.nc.posted_moves import recover_moves, turns_far
+from toolpath_stiff.nc.posted import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis
+from toolpath_stiff.nc.posted_moves import recover_moves, tool_poses, turns_far
 from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 Pose = tuple[float, float, float, float, float, float]
+BoolArray = NDArray[np.bool_]
 MOST_LINES = 5  # named in one sentence
 OWN_ZERO = (
     "G54 as the program or the controller file sets it is that of the machine that the program was posted for; it does "
@@ -34,7 +38,9 @@ class OnThePart:
     assumptions: tuple[str, ...]
 
 
-def recovered(program: Program, kinematics: PostedKinematics, origin: Pose, source: str) -> Program:
+def recovered(
+    program: Program, kinematics: PostedKinematics, tip_held: Sequence[tuple[int, bool]], origin: Pose, source: str
+) -> Program:
     """A program as read for its own machine, with the moves of the tool on the part.
 
     Parameters
@@ -43,6 +49,8 @@ def recovered(program: Program, kinematics: PostedKinematics, origin: Pose, sour
         Its origin is G54's zero on the posted machine, if its `origin_source` is "program".
     kinematics
         Of the posted machine.
+    tip_held
+        Numbers of moves before which tool centre point control was switched on or off.
     origin, source
         Where the work sits on this machine, m and rad, and who says so.
 
@@ -52,7 +60,7 @@ def recovered(program: Program, kinematics: PostedKinematics, origin: Pose, sour
         See `on_the_part`.
     """
     zero = program.origin if program.origin_source == "program" else None
-    part = on_the_part(program.moves, kinematics, zero, program.tools, program.name)
+    part = on_the_part(program.moves, kinematics, zero, program.tools, program.name, tip_held)
     return replace(
         program,
         moves=part.moves,
@@ -65,7 +73,12 @@ def recovered(program: Program, kinematics: PostedKinematics, origin: Pose, sour
 
 
 def on_the_part(
-    moves: Moves, kinematics: PostedKinematics, zero: Pose | None, tools: Iterable[ToolUse], name: str
+    moves: Moves,
+    kinematics: PostedKinematics,
+    zero: Pose | None,
+    tools: Iterable[ToolUse],
+    name: str,
+    tip_held: Sequence[tuple[int, bool]] = (),
 ) -> OnThePart:
     """Moves of the posted machine, recovered on the part.
 
@@ -81,6 +94,8 @@ def on_the_part(
         The tools of the program, with their lengths.
     name
         The program's name, for messages.
+    tip_held
+        Numbers of moves before which tool centre point control was switched on or off.
 
     Raises
     ------
@@ -89,8 +104,16 @@ def on_the_part(
         that is not known on the part.
     """
     placed = _points_at(kinematics, zero, name)
-    kept, warnings, assumptions = _known_points(moves, placed, zero, name)
-    assumptions = [kinematics.assumption(), *assumptions, *([OWN_ZERO] if zero is not None else [])]
+    known, warnings, assumptions = _known_points(moves, placed, zero, name)
+    kept = moves.take(known)
+    held = np.full(len(moves), kinematics.tcp)
+    for first, on in tip_held:
+        held[first:] = on or kinematics.tcp
+    assumptions = [
+        kinematics.assumption(switched=any(on for _, on in tip_held)),
+        *assumptions,
+        *([OWN_ZERO] if zero is not None else []),
+    ]
     far = turns_far(kept, kinematics)
     if far:
         line, letter, degrees = far[0]
@@ -100,7 +123,7 @@ def on_the_part(
             + f"; if the control takes the shorter way, say rollover = true for {letter} in the controller file"
         )
     lengths = {tool.number: tool.length for tool in tools}
-    return OnThePart(recover_moves(kept, placed, lengths, name), tuple(warnings), tuple(assumptions))
+    return OnThePart(recover_moves(kept, placed, lengths, name, held[known]), tuple(warnings), tuple(assumptions))
 
 
 def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: str) -> None:
@@ -113,6 +136,24 @@ def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: s
             expected="work offsets of X Y Z alone",
             file=name,
         )
+
+
+def switched(frames: Frames, tool_length: float, hold: bool) -> list[float]:
+    """The numbers of the present point once tool centre point control is switched on (`hold`) or off.
+
+    The machine stands still. Control coordinates, mm and degrees; `tool_length` in mm. nan where a head has none.
+    """
+    assert frames.posted is not None
+    zero = frames.fix_reference()
+    shift = zero if frames.posted.points == PROGRAM else (0.0, 0.0, 0.0)
+    point = np.array([p - s for p, s in zip(frames.position[:3], shift, strict=True)])
+    # The tip of four points of the linear axes: it moves with them as one body.
+    corners = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+    abc = np.tile(rad_from_deg(np.array(frames.position[3:])), (4, 1))
+    tips = mm_from_m(tool_poses(frames.posted, m_from_mm(corners), abc, m_from_mm(tool_length)).tip)
+    turn = (tips[1:] - tips[0]).T
+    moved = tips[0] + turn @ point if hold else turn.T @ (point - tips[0])
+    return [*(float(m) + s for m, s in zip(moved, shift, strict=True)), *frames.position[3:]]
 
 
 def _points_at(kinematics: PostedKinematics, zero: Pose | None, name: str) -> PostedKinematics:
@@ -140,13 +181,13 @@ def _moved(axis: RotaryAxis, zero: Pose) -> RotaryAxis:
 
 def _known_points(
     moves: Moves, kinematics: PostedKinematics, zero: Pose | None, name: str
-) -> tuple[Moves, list[str], list[str]]:
-    """The moves whose ends are known on the part, with warnings and assumptions about those to machine points."""
+) -> tuple[BoolArray, list[str], list[str]]:
+    """(n,) the moves whose ends are known on the part; warnings and assumptions about those to machine points."""
     fixed = np.asarray(moves.from_machine.any(axis=1))
     if not fixed.any():
-        return moves, [], []
+        return ~fixed, [], []
     if zero is not None and not kinematics.tcp:
-        return moves, [], [OWN_POINTS]
+        return np.ones(len(moves), dtype=bool), [], [OWN_POINTS]
     reason = (
         "tool centre point control does not hold there"
         if kinematics.tcp
@@ -167,6 +208,6 @@ def _known_points(
     more = f" and {len(lines) - MOST_LINES} more" if len(lines) > MOST_LINES else ""
     warning = (
         f"line{'s' if len(lines) > 1 else ''} {shown}{more}: rapids to or from points of the machine that the program "
-        f"was posted for (G53, G28, G30) are left out of the path: {reason}"
+        f"was posted for (G53, G28, G30, another tool length while the tool leans) are left out of the path: {reason}"
     )
-    return moves.take(~fixed), [warning], []
+    return ~fixed, [warning], []

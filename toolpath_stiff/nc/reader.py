@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
@@ -14,6 +14,7 @@ from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.posted import PostedKinematics
 from toolpath_stiff.nc.source import read_lines, split_lines
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
@@ -66,7 +67,7 @@ def read_program(
     InputError
         With file, line and column, what was found and what was expected.
     """
-    return _read_on_part(
+    return _read(
         read_lines(path),
         Path(path).name,
         str(path),
@@ -97,32 +98,7 @@ def parse_program(
     """Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`."""
     lines = split_lines(text, name)
     tables = (offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools)
-    return _read_on_part(lines, name, "", origin, default_origin, *tables, block_delete, interpreter, rs274, controller)
-
-
-def _read_on_part(
-    lines: tuple[str, ...],
-    name: str,
-    path: str,
-    origin: Iterable[float] | None,
-    default_origin: Iterable[float],
-    offsets: Offsets,
-    tools: dict[int, ToolEntry] | None,
-    block_delete: Switches,
-    interpreter: str,
-    rs274: str | None,
-    controller: Controller,
-) -> Program:
-    """Read a program; one that was posted for another machine in that one's coordinates first, then on the part."""
-    rest = (offsets, tools, block_delete, interpreter, rs274, controller)
-    if controller.kinematics is None or looks_like_cutter_location(lines, name):
-        return _read(lines, name, path, origin, default_origin, *rest)
-    from toolpath_stiff.nc.posted_program import check_rotary_offsets, recovered
-
-    check_rotary_offsets(offsets, controller.kinematics, name)
-    program = _read(lines, name, path, None, ZERO, *rest)
-    place, source = (default_origin, "default") if origin is None else (origin, "option")
-    return recovered(program, controller.kinematics, _six(place), source)
+    return _read(lines, name, "", origin, default_origin, *tables, block_delete, interpreter, rs274, controller)
 
 
 def _read(
@@ -159,7 +135,7 @@ def _read(
     given = (lines, name, path, origin, default_origin, offsets, tools)
     if interpreter == "linuxcnc":
         check_plain(block_delete, controller)
-        return _read_by_linuxcnc(*given, bool(switches_on(block_delete, controller)), rs274)
+        return _read_by_linuxcnc(*given, bool(switches_on(block_delete, controller)), rs274, controller.kinematics)
     try:
         return _read_built_in(*given, switches_on(block_delete, controller), controller)
     except InputError as error:
@@ -168,10 +144,12 @@ def _read(
             raise foreign from None
         if interpreter == "builtin" or not plain(block_delete, controller):
             raise
-        return _second_opinion(error, given, bool(switches_on(block_delete, controller)), rs274)
+        return _second_opinion(error, given, bool(switches_on(block_delete, controller)), rs274, controller.kinematics)
 
 
-def _second_opinion(error: InputError, given: Given, block_delete: bool, rs274: str | None) -> Program:
+def _second_opinion(
+    error: InputError, given: Given, block_delete: bool, rs274: str | None, posted: PostedKinematics | None
+) -> Program:
     """What the built-in interpreter refused with `error`, by the second one if it is there and the program harmless."""
     from toolpath_stiff.nc.linuxcnc.reading import refusal
     from toolpath_stiff.nc.linuxcnc.runner import find_rs274
@@ -190,7 +168,7 @@ def _second_opinion(error: InputError, given: Given, block_delete: bool, rs274: 
             line=error.line,
             column=error.column,
         ) from None
-    return _read_by_linuxcnc(*given, block_delete, found)
+    return _read_by_linuxcnc(*given, block_delete, found, posted)
 
 
 def _read_by_linuxcnc(
@@ -203,12 +181,13 @@ def _read_by_linuxcnc(
     tools: dict[int, ToolEntry] | None,
     block_delete: bool,
     rs274: str | None,
+    posted: PostedKinematics | None,
 ) -> Program:
     from toolpath_stiff.nc.linuxcnc.reading import read
 
-    place, default = None if origin is None else _to_mm(origin), _to_mm(default_origin)
-    reading = read(lines, name, place, default, offsets, tools, block_delete, rs274=rs274)
-    return Program(
+    place, default = _zero(origin, default_origin, posted)
+    reading = read(lines, name, place, default, offsets, tools, block_delete, rs274=rs274, posted=posted is not None)
+    program = Program(
         name=name,
         path=path,
         source=lines,
@@ -222,6 +201,7 @@ def _read_by_linuxcnc(
         interpreter="linuxcnc",
         dialect="linuxcnc",
     )
+    return program if posted is None else _on_the_part(program, posted, (), offsets, origin, default_origin)
 
 
 def _read_built_in(
@@ -235,8 +215,8 @@ def _read_built_in(
     switches: frozenset[int],
     controller: Controller,
 ) -> Program:
-    frames = Frames(copy.deepcopy(offsets), None if origin is None else _to_mm(origin), _to_mm(default_origin))
-    frames.posted = controller.kinematics is not None
+    posted = controller.kinematics
+    frames = Frames(copy.deepcopy(offsets), *_zero(origin, default_origin, posted), posted=posted)
     interpreter = Interpreter(name, frames, copy.deepcopy(tools), controller.dialect)
     warnings = ProgramRun(interpreter, lines, name, switches).run()
     if not interpreter.recorder.cuts:
@@ -246,7 +226,7 @@ def _read_built_in(
         warnings.append(
             "the program or the offsets file sets G54; --origin overrides it, other offsets keep their distance to it"
         )
-    return Program(
+    program = Program(
         name=name,
         path=path,
         source=lines,
@@ -259,6 +239,37 @@ def _read_built_in(
         tools=tuple(interpreter.used_tools.values()),
         dialect=controller.label,
     )
+    if posted is None:
+        return program
+    return _on_the_part(program, posted, interpreter.tip_held, frames.offsets, origin, default_origin)
+
+
+def _zero(
+    origin: Iterable[float] | None, default_origin: Iterable[float], posted: PostedKinematics | None
+) -> tuple[Pose | None, Pose]:
+    """Where G54's zero sits, mm and degrees, as the caller says, and unless anyone says.
+
+    A program that was posted for another machine is read in that one's coordinates first.
+    """
+    if posted is not None:
+        return None, ZERO
+    return None if origin is None else _to_mm(origin), _to_mm(default_origin)
+
+
+def _on_the_part(
+    program: Program,
+    posted: PostedKinematics,
+    tip_held: Sequence[tuple[int, bool]],
+    offsets: Offsets,
+    origin: Iterable[float] | None,
+    default_origin: Iterable[float],
+) -> Program:
+    """A program as read for the machine that it was posted for, with the moves of the tool on the part."""
+    from toolpath_stiff.nc.posted_program import check_rotary_offsets, recovered
+
+    check_rotary_offsets(offsets, posted, program.name)
+    place, source = (default_origin, "default") if origin is None else (origin, "option")
+    return recovered(program, posted, tip_held, _six(place), source)
 
 
 def _six(origin: Iterable[float]) -> Pose:

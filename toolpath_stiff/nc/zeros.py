@@ -117,6 +117,8 @@ class Zeros(Mover):
 
     def _leave_program_coordinates(self, word: Word, words: dict[int, float]) -> None:
         """A move of `words` (none: all axes) by machine coordinates: harmless under G68 only off the rotated plane."""
+        if self.frames.tip_held:
+            raise self.fail(word, "while tool centre point control is on (G43.4)", "G49 before it")
         if not words or XY & words.keys():
             self._refuse_while_rotated(word, "moves X and Y by machine coordinates")
             self._forget_polar()

@@ -53,6 +53,7 @@ class Follower:
     used_tools: list[int] = field(default_factory=list)
     first_motion: int | None = None
     ended: bool = False
+    posted: bool = False
 
     scale: float = 1.0
     plane: str = "XY"
@@ -353,7 +354,8 @@ class Follower:
         """Whether start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
         if not self.tagged or (self.cycle and start == end):
             return (False, False)
-        was = any(self.from_machine)
+        of = slice(0, 3 if self.posted else 6)
+        was = any(self.from_machine[of])
         words = self._words(self.line)
         named = {AXES.index(letter) for letter in AXIS_WORD.findall(words)}
         machine = bool(MACHINE_MOVE.search(words))
@@ -367,7 +369,7 @@ class Follower:
             named = {normal} if along else named - {normal}
         for axis in named:
             self.from_machine[axis] = machine
-        return (was, any(self.from_machine))
+        return (was, any(self.from_machine[of]))
 
 
 def _numbers(inner: str) -> Vector:

@@ -55,8 +55,11 @@ def read(
     *,
     rs274: str | None = None,
     limits: Limits | None = None,
+    posted: bool = False,
 ) -> Reading:
     """Read a program (lines without line ends) with `rs274`; `origin`, `default_origin` in mm and degrees.
+
+    `posted`: it was posted for another machine, whose rotary axes have one zero for program and machine.
 
     Raises
     ------
@@ -65,7 +68,7 @@ def read(
     """
     lines = split(source, name)
     fence.check(lines, name)
-    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits)
+    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted)
     return session.read(origin, default_origin)
 
 
@@ -88,6 +91,7 @@ class _Session:
     block_delete: bool
     rs274: str
     limits: Limits | None
+    posted: bool
 
     def read(self, origin: Pose | None, default_origin: Pose) -> Reading:
         offsets = copying.deepcopy(self.offsets)
@@ -197,6 +201,7 @@ class _Session:
     def _follow(self, run: Run, reference: tuple[float, float, float]) -> Follower:
         numbers = tool_numbers(self.tools, self.lines)
         follower = Follower(self.name, self.lines, self.tools, needs_tags(self.lines), numbers, reference)
+        follower.posted = self.posted
         follower.follow(run.canon)
         return follower
 
