@@ -64,7 +64,7 @@ def parquet_pieces(columns_of: Callable[[slice], Columns], rows: int) -> Iterato
 
     pieces = _Pieces()
     writer: Any = None
-    for block in _blocks(rows, 8 * BLOCK):
+    for block in _blocks(rows, 2 * BLOCK):
         columns = {name: pa.array(column, from_pandas=True) for name, column in columns_of(block).items()}
         table = pa.table(columns)
         if writer is None:
