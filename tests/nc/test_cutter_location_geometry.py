@@ -114,3 +114,20 @@ def test_pitch_goes_on_where_the_tool_turns_right_round():
     )
     pitch = np.degrees(read(START + points).moves.end[:, 4])
     assert np.diff(pitch).max() < 21 and pitch[-1] == pytest.approx(360, abs=1e-6)
+
+
+@given(st.floats(0.02, 40), st.floats(0, math.tau), st.floats(0.5, 5.5), st.sampled_from(["INCHES", "MM"]))
+def test_arcs_rounded_to_four_decimals_are_read(radius, start, sweep, units):
+    """As NX rounds: in inches that is more than LinuxCNC allows of a small arc's radii."""
+
+    def at(angle):
+        return f"{1 + radius * math.cos(angle):.4f},{2 + radius * math.sin(angle):.4f},0.0000"
+
+    text = (
+        f"UNITS/{units}\nFEDRAT/10\nGOTO/{at(start)}\n"
+        f"CIRCLE/1.0000,2.0000,0.0000,0.0000000,0.0000000,1.0000000,{radius:.4f}\nGOTO/{at(start + sweep)}\n"
+    )
+    moves = read(text).moves
+    assert move_lengths(moves)[0] == pytest.approx(
+        radius * sweep * (0.0254 if units == "INCHES" else MM), rel=0.03, abs=1e-5
+    )

@@ -14,9 +14,12 @@ from dataclasses import dataclass
 
 from toolpath_stiff.nc import arcs
 from toolpath_stiff.nc.recorder import Arc
+from toolpath_stiff.units import MM_PER_INCH
 
 Vector = tuple[float, float, float]
 SAME_POINT_MM = 5e-4  # start and end closer than this are one point: a whole turn
+# Radii may differ as LinuxCNC allows, or by what two points rounded to 0.0001 inch in each axis make of them.
+ROUNDING_MM = 2.0 * math.sqrt(3.0) * 0.5e-4 * MM_PER_INCH
 SMOOTH_DEG = 5.0  # a path that enters an arc within this of its tangent enters it smoothly
 SWEEP_TOLERANCE_DEG = 0.05
 
@@ -73,11 +76,17 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
     from_center, to_end = minus(start, circle.center), minus(end, circle.center)
     here = (dot(from_center, first), 0.0)
     there = (dot(to_end, first), dot(to_end, second))
-    arcs.check_radii(here, there, (0.0, 0.0))
-    allowed = min(max(arcs.ABSOLUTE_TOLERANCE, arcs.RELATIVE_TOLERANCE * here[0]), arcs.LARGEST_DIFFERENCE)
-    if abs(circle.radius - here[0]) > allowed:
+    radius, last = here[0], math.hypot(*there)
+    allowed = min(max(ROUNDING_MM, arcs.RELATIVE_TOLERANCE * radius), arcs.LARGEST_DIFFERENCE)
+    if last < arcs.SAME_POINT or abs(last - radius) > allowed:
         raise arcs.ArcError(
-            f"a circle of radius {circle.radius:.4f} mm whose centre lies {here[0]:.4f} mm from the tool's position",
+            f"an arc whose end lies {abs(last - radius):.4f} mm off its circle (radius {radius:.4f} mm at the start, "
+            f"{last:.4f} mm at the end)",
+            f"radii that agree within {allowed:.4f} mm",
+        )
+    if abs(circle.radius - radius) > allowed:
+        raise arcs.ArcError(
+            f"a circle of radius {circle.radius:.4f} mm whose centre lies {radius:.4f} mm from the tool's position",
             f"radii that agree within {allowed:.4f} mm",
         )
     center = along(circle.center, circle.axis, dot(from_center, circle.axis))

@@ -103,7 +103,8 @@ class Modes(ToolPath):
         return self.next_axis
 
     def _scaled(self, numbers: list[float]) -> Vector:
-        x, y, z = (number * self.scale for number in numbers)
+        scale = self.scale
+        x, y, z = numbers[0] * scale, numbers[1] * scale, numbers[2] * scale
         if max(abs(x), abs(y), abs(z)) > LARGEST_MM:
             raise self.fail(f"a point at {x:g}, {y:g}, {z:g} mm", f"within {LARGEST_MM:g} mm")
         return (x, y, z)

@@ -44,10 +44,11 @@ def unit_axis(i: float, j: float, k: float) -> Vector:
 def angles_near(axis: Vector, near: tuple[float, float]) -> tuple[float, float]:
     """Roll and pitch of a unit tool axis, the pitch within half a turn of the one before."""
     i, j, k = axis
-    roll, pitch = (angle + 0.0 for angle in roll_pitch_of_axis(i, j, k))  # no -0
+    roll, pitch = roll_pitch_of_axis(i, j, k)
     if i * i + k * k < 1e-18:  # along Y any pitch gives this axis
         return roll, near[1]
-    return roll, pitch + 360.0 * round((near[1] - pitch) / 360.0)
+    # Adding 0 makes a 0 of -0.
+    return roll + 0.0, pitch + 360.0 * round((near[1] - pitch) / 360.0)
 
 
 def angle_between(first: Vector, second: Vector) -> float:
