@@ -15,7 +15,7 @@ from matplotlib.image import imread
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.report import path_picture as path_picture_module
 from toolpath_stiff.report.path_picture import path_picture
-from toolpath_stiff.report.profile_picture import extremes_by_column, profile_picture
+from toolpath_stiff.report.profile_picture import MOST_OPERATIONS, extremes_by_column, profile_picture
 from toolpath_stiff.report.scale import CLASSES, UNREACHABLE, scale_limits, segment_classes
 
 
@@ -83,6 +83,27 @@ def test_required_level_and_second_machine_change_the_profile(analysis):
     assert count_colour(plain, orange) == 0
     assert count_colour(profile_picture(analysis, other=spiral(load="x")), orange) > 100
     assert count_colour(profile_picture(analysis, required=6e7), (0xD6, 0x45, 0x45)) > 1000
+
+
+def with_operations(names):
+    """A cut of 100 mm for each name."""
+    lines, moves = [], []
+    for i, name in enumerate(names):
+        lines += [f"(HEAD {name})", f"G1 X{i}"]
+        moves.append({"end": (0.1 * (i % 2), 0.001 * i, 0.0), "line": 2 * i + 2})
+    return make_analysis(moves, source=lines, step=0.02)
+
+
+def test_operations_stand_above_the_profile_while_they_can_be_told_apart():
+    every_second_box = (0xD9, 0xE0, 0xE8)
+    for count, shown in ((1, False), (2, True), (150, True), (MOST_OPERATIONS + 1, False)):
+        picture = profile_picture(with_operations([f"NUMBER {i}" for i in range(count)]))
+        assert (count_colour(picture, every_second_box) > 1000) == shown, count
+
+
+@pytest.mark.parametrize("name", ["pri$ce_$5", "$\\frac{$", "a\tb\x1b[0m", "部品", "x" * 400])
+def test_any_name_can_stand_above_the_profile(name):
+    assert profile_picture(with_operations([name, name])).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("name", ["pri$ce_$5.nc", "$\\frac{$.nc", "a\nb\x1b[0m.nc", "部品.nc", "x" * 400])
