@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import importlib
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +37,8 @@ BoolArray = NDArray[np.bool_]
 WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
 STRIP = 0.22  # height of the operations above the frame
-OPERATION_COLOURS = ("#d9e0e8", "#ebeff4")  # of even and odd ones
-NAME_SIZE = 8.5  # points
+OPERATION_COLOURS = ("#ebeff4", "#d9e0e8")  # in turn
+NAME_SIZE, DIGIT = 8.5, 5.0  # points; pixels that the narrowest number needs
 CURVE_BLUE = "#2b59c3"
 BAND_LABEL = "95 % of the fitted parameters"
 MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
@@ -207,47 +208,57 @@ def _tool_changes(axes: Axes, analysis: Analysis) -> None:
 
 def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
     """Named boxes above the frame, `height` of its height; lines where they begin, while these can be told apart."""
-    from matplotlib.patches import Rectangle
-
     rows = analysis.operations.rows
     first = np.searchsorted(analysis.samples.move, [row.first_move for row in rows])
     edges = mm_from_m(np.append(analysis.samples.s[first], analysis.samples.s[-1]))
+    spans = list(zip(edges[:-1].tolist(), np.diff(edges).tolist(), strict=True))
     across = axes.get_xaxis_transform()
     if len(rows) <= MOST_TOOL_LINES:
         axes.vlines(edges[1:-1], 0, 1, transform=across, color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
+    for which, colour in enumerate(OPERATION_COLOURS):
+        axes.broken_barh(
+            spans[which::2],
+            (1.0, height),
+            facecolor=colour,
+            edgecolor="none",
+            transform=across,
+            clip_on=False,
+            zorder=2,
+        )
     pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
-    for row, start, stop in zip(rows, edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        colour = OPERATION_COLOURS[row.number % 2]
-        box = Rectangle((start, 1.0), stop - start, height, facecolor=colour, transform=across, clip_on=False, zorder=2)
-        axes.add_patch(box)
-        name = _fitting(f"{row.number} {plain(row.name)}", str(row.number), (stop - start) * pixels - 8.0)
+    for row, (start, length) in zip(rows, spans, strict=True):
+        name = _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 8.0)
         if name:
             axes.text(
-                start + 4.0 / pixels,
-                1.0 + height / 2.0,
-                name,
-                transform=across,
-                fontsize=NAME_SIZE,
-                va="center_baseline",
-                zorder=6,
-            )
+                start + 4.0 / pixels, 1.0 + height / 2.0, name,
+                transform=across, fontsize=NAME_SIZE, va="center_baseline", zorder=6,
+            )  # fmt: skip
 
 
 def _fitting(text: str, least: str, room: float) -> str:
     """The text cut to `room` pixels; `least` if next to nothing of it would be left, or nothing at all."""
-    from matplotlib.textpath import TextPath
+    from matplotlib.font_manager import FontProperties
 
-    def width(words: str) -> float:
-        return float(TextPath((0, 0), words, size=NAME_SIZE * DPI / 72.0).get_extents().x1) if words else 0.0
+    agg: Any = importlib.import_module("matplotlib.backends.backend_agg")  # its own types are wanting
 
-    if width(text) <= room:
+    # Typesetting a long name is slow; what is beyond one character a pixel never fits.
+    text = shortened(text, max(int(room), len(least)))
+    renderer, font = agg.RendererAgg(1, 1, DPI), FontProperties(size=NAME_SIZE)
+
+    def fits(words: str) -> bool:
+        return float(renderer.get_text_width_height_descent(words, font, ismath=False)[0]) <= room
+
+    if room < DIGIT or not fits(least):
+        return ""
+    if fits(text):
         return text
-    length = int(len(text) * max(room, 0.0) / width(text)) + 1
-    while length > len(least) + 4 and width(shortened(text, length)) > room:
-        length -= 1
-    if length > len(least) + 4:
-        return shortened(text, length)
-    return least if width(least) <= room else ""
+    low, high = len(least) + 4, len(text)  # a name of four letters and less tells nothing
+    if high <= low or not fits(shortened(text, low)):
+        return least
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if fits(shortened(text, middle)) else (low, middle)
+    return shortened(text, low)
 
 
 def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
