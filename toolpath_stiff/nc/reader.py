@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
@@ -21,7 +22,6 @@ from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
-Given = tuple[tuple[str, ...], str, str, Iterable[float] | None, Iterable[float], Offsets, dict[int, ToolEntry] | None]
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
@@ -68,17 +68,19 @@ def read_program(
         With file, line and column, what was found and what was expected.
     """
     return _read(
-        read_lines(path),
-        Path(path).name,
-        str(path),
-        origin,
-        default_origin,
-        read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets(),
-        read_tool_table(tool_table) if tool_table else controller.tools,
-        block_delete,
-        interpreter,
-        rs274,
-        controller,
+        _Request(
+            lines=read_lines(path),
+            name=Path(path).name,
+            path=str(path),
+            origin=None if origin is None else _six(origin),
+            default_origin=_six(default_origin),
+            offsets=read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets(),
+            tools=read_tool_table(tool_table) if tool_table else controller.tools,
+            block_delete=block_delete,
+            interpreter=interpreter,
+            rs274=rs274,
+            controller=controller,
+        )
     )
 
 
@@ -96,69 +98,108 @@ def parse_program(
     controller: Controller = UNKNOWN_CONTROL,
 ) -> Program:
     """Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`."""
-    lines = split_lines(text, name)
-    tables = (offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools)
-    return _read(lines, name, "", origin, default_origin, *tables, block_delete, interpreter, rs274, controller)
+    return _read(
+        _Request(
+            lines=split_lines(text, name),
+            name=name,
+            path="",
+            origin=None if origin is None else _six(origin),
+            default_origin=_six(default_origin),
+            offsets=offsets or controller.offsets or Offsets(),
+            tools=controller.tools if tools is None else tools,
+            block_delete=block_delete,
+            interpreter=interpreter,
+            rs274=rs274,
+            controller=controller,
+        )
+    )
 
 
-def _read(
-    lines: tuple[str, ...],
-    name: str,
-    path: str,
-    origin: Iterable[float] | None,
-    default_origin: Iterable[float],
-    offsets: Offsets,
-    tools: dict[int, ToolEntry] | None,
-    block_delete: Switches,
-    interpreter: str,
-    rs274: str | None,
-    controller: Controller,
-) -> Program:
+@dataclass(frozen=True)
+class _Request:
+    """What is to be read, and with what; `origin` and `default_origin` in m and rad."""
+
+    lines: tuple[str, ...]
+    name: str
+    path: str
+    origin: Pose | None
+    default_origin: Pose
+    offsets: Offsets
+    tools: dict[int, ToolEntry] | None
+    block_delete: Switches
+    interpreter: str
+    rs274: str | None
+    controller: Controller
+
+    @property
+    def posted(self) -> PostedKinematics | None:
+        return self.controller.kinematics
+
+    @property
+    def switches(self) -> frozenset[int]:
+        return switches_on(self.block_delete, self.controller)
+
+    @property
+    def zero(self) -> tuple[Pose | None, Pose]:
+        """Where G54's zero sits, mm and degrees, as the caller says, and unless anyone says.
+
+        A program that was posted for another machine is read in that one's coordinates first.
+        """
+        if self.posted is not None:
+            return None, ZERO
+        return None if self.origin is None else _to_mm(self.origin), _to_mm(self.default_origin)
+
+
+def _read(asked: _Request) -> Program:
     """Choose the interpreter: the built-in one, LinuxCNC's, or that where the first refuses."""
-    if interpreter not in INTERPRETERS:
-        raise InputError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))
+    lines, name = asked.lines, asked.name
+    if asked.interpreter not in INTERPRETERS:
+        raise InputError(f"interpreter {asked.interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in lines):
         raise InputError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
-        if interpreter == "linuxcnc":
-            raise InputError(
-                "LinuxCNC's interpreter reads no cutter-location files",
-                expected="--interpreter builtin",
-                file=name,
-            )
-        place, default = None if origin is None else _six(origin), _six(default_origin)
-        warnings = cutter_location.not_for(controller, any(o.given for o in offsets.table), bool(block_delete))
-        return cutter_location.read(lines, name, path, place, default, tools, warnings)
+        return _read_cutter_location(asked)
     foreign = foreign_program(lines, name)
     if foreign is not None:
         raise foreign
-    given = (lines, name, path, origin, default_origin, offsets, tools)
-    if interpreter == "linuxcnc":
-        check_plain(block_delete, controller)
-        return _read_by_linuxcnc(*given, bool(switches_on(block_delete, controller)), rs274, controller.kinematics)
+    if asked.interpreter == "linuxcnc":
+        check_plain(asked.block_delete, asked.controller)
+        return _read_by_linuxcnc(asked, asked.rs274)
     try:
-        return _read_built_in(*given, switches_on(block_delete, controller), controller)
+        return _read_built_in(asked)
     except InputError as error:
         foreign = foreign_program(lines, name, error.line)
         if foreign is not None:
             raise foreign from None
-        if interpreter == "builtin" or not plain(block_delete, controller):
+        if asked.interpreter == "builtin" or not plain(asked.block_delete, asked.controller):
             raise
-        return _second_opinion(error, given, bool(switches_on(block_delete, controller)), rs274, controller.kinematics)
+        return _second_opinion(error, asked)
 
 
-def _second_opinion(
-    error: InputError, given: Given, block_delete: bool, rs274: str | None, posted: PostedKinematics | None
-) -> Program:
+def _read_cutter_location(asked: _Request) -> Program:
+    if asked.interpreter == "linuxcnc":
+        raise InputError(
+            "LinuxCNC's interpreter reads no cutter-location files",
+            expected="--interpreter builtin",
+            file=asked.name,
+        )
+    any_offset = any(offset.given for offset in asked.offsets.table)
+    warnings = cutter_location.not_for(asked.controller, any_offset, bool(asked.block_delete))
+    return cutter_location.read(
+        asked.lines, asked.name, asked.path, asked.origin, asked.default_origin, asked.tools, warnings
+    )
+
+
+def _second_opinion(error: InputError, asked: _Request) -> Program:
     """What the built-in interpreter refused with `error`, by the second one if it is there and the program harmless."""
     from toolpath_stiff.nc.linuxcnc.reading import refusal
     from toolpath_stiff.nc.linuxcnc.runner import find_rs274
 
-    refused = refusal(given[0], given[1])
+    refused = refusal(asked.lines, asked.name)
     if refused is not None:
         raise refused from None
     try:
-        found = find_rs274(rs274)
+        found = find_rs274(asked.rs274)
     except InputError as missing:
         raise InputError(
             error.found,
@@ -168,29 +209,27 @@ def _second_opinion(
             line=error.line,
             column=error.column,
         ) from None
-    return _read_by_linuxcnc(*given, block_delete, found, posted)
+    return _read_by_linuxcnc(asked, found)
 
 
-def _read_by_linuxcnc(
-    lines: tuple[str, ...],
-    name: str,
-    path: str,
-    origin: Iterable[float] | None,
-    default_origin: Iterable[float],
-    offsets: Offsets,
-    tools: dict[int, ToolEntry] | None,
-    block_delete: bool,
-    rs274: str | None,
-    posted: PostedKinematics | None,
-) -> Program:
+def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
     from toolpath_stiff.nc.linuxcnc.reading import read
 
-    place, default = _zero(origin, default_origin, posted)
-    reading = read(lines, name, place, default, offsets, tools, block_delete, rs274=rs274, posted=posted is not None)
+    posted = asked.posted
+    reading = read(
+        asked.lines,
+        asked.name,
+        *asked.zero,
+        asked.offsets,
+        asked.tools,
+        bool(asked.switches),
+        rs274=rs274,
+        posted=posted is not None,
+    )
     program = Program(
-        name=name,
-        path=path,
-        source=lines,
+        name=asked.name,
+        path=asked.path,
+        source=asked.lines,
         moves=reading.moves,
         origin=_to_si(reading.origin),
         origin_source=reading.source,
@@ -201,35 +240,25 @@ def _read_by_linuxcnc(
         interpreter="linuxcnc",
         dialect="linuxcnc",
     )
-    return program if posted is None else _on_the_part(program, posted, (), offsets, origin, default_origin)
+    return program if posted is None else _on_the_part(program, asked, posted, (), asked.offsets)
 
 
-def _read_built_in(
-    lines: tuple[str, ...],
-    name: str,
-    path: str,
-    origin: Iterable[float] | None,
-    default_origin: Iterable[float],
-    offsets: Offsets,
-    tools: dict[int, ToolEntry] | None,
-    switches: frozenset[int],
-    controller: Controller,
-) -> Program:
-    posted = controller.kinematics
-    frames = Frames(copy.deepcopy(offsets), *_zero(origin, default_origin, posted), posted=posted)
-    interpreter = Interpreter(name, frames, copy.deepcopy(tools), controller.dialect)
-    warnings = ProgramRun(interpreter, lines, name, switches).run()
+def _read_built_in(asked: _Request) -> Program:
+    posted = asked.posted
+    frames = Frames(copy.deepcopy(asked.offsets), *asked.zero, posted=posted)
+    interpreter = Interpreter(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)
+    warnings = ProgramRun(interpreter, asked.lines, asked.name, asked.switches).run()
     if not interpreter.recorder.cuts:
-        raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)
-    g54 = offsets.table[0].given or frames.offsets.table[0].given
+        raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=asked.name)
+    g54 = asked.offsets.table[0].given or frames.offsets.table[0].given
     if frames.source == "option" and g54:
         warnings.append(
             "the program or the offsets file sets G54; --origin overrides it, other offsets keep their distance to it"
         )
     program = Program(
-        name=name,
-        path=path,
-        source=lines,
+        name=asked.name,
+        path=asked.path,
+        source=asked.lines,
         moves=interpreter.recorder.moves(),
         origin=_to_si(frames.origin),
         origin_source=frames.source,
@@ -237,39 +266,27 @@ def _read_built_in(
         warnings=(*warnings, *interpreter.warnings),
         assumptions=(START, *interpreter.assumptions),
         tools=tuple(interpreter.used_tools.values()),
-        dialect=controller.label,
+        dialect=asked.controller.label,
     )
     if posted is None:
         return program
-    return _on_the_part(program, posted, interpreter.tip_held, frames.offsets, origin, default_origin)
-
-
-def _zero(
-    origin: Iterable[float] | None, default_origin: Iterable[float], posted: PostedKinematics | None
-) -> tuple[Pose | None, Pose]:
-    """Where G54's zero sits, mm and degrees, as the caller says, and unless anyone says.
-
-    A program that was posted for another machine is read in that one's coordinates first.
-    """
-    if posted is not None:
-        return None, ZERO
-    return None if origin is None else _to_mm(origin), _to_mm(default_origin)
+    return _on_the_part(program, asked, posted, interpreter.tip_held, frames.offsets)
 
 
 def _on_the_part(
     program: Program,
+    asked: _Request,
     posted: PostedKinematics,
     tip_held: Sequence[tuple[int, bool]],
     offsets: Offsets,
-    origin: Iterable[float] | None,
-    default_origin: Iterable[float],
 ) -> Program:
     """A program as read for the machine that it was posted for, with the moves of the tool on the part."""
     from toolpath_stiff.nc.posted_program import check_rotary_offsets, recovered
 
     check_rotary_offsets(offsets, posted, program.name)
-    place, source = (default_origin, "default") if origin is None else (origin, "option")
-    return recovered(program, posted, tip_held, _six(place), source)
+    if asked.origin is None:
+        return recovered(program, posted, tip_held, asked.default_origin, "default")
+    return recovered(program, posted, tip_held, asked.origin, "option")
 
 
 def _six(origin: Iterable[float]) -> Pose:
