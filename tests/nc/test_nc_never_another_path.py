@@ -24,6 +24,10 @@ REFUSED = {
     "a length changed just before M6": ("F100 G1 X2\nG43 H3\nT2 M6\nG1 X4", "a cut before any Z"),
     "two codes that act once": ("F100 G1 X2\nG92.1 Z-9 G52\nG1 X3 Z3", "one of them in a block"),
     "a length changed just before M61": ("F100 G1 X2\nG43.1 Z5\nM61 Q1\nG1 X4", "a cut before any Z"),
+    "a length changed just before M6, then G1 alone": (
+        "F100 G0 X2\nG43.1 Z-3\nT2 M6\nG1\nG0 Z3\nG1 X3",
+        "a cut before any Z",
+    ),
     "the active offset turned": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nG1 Z3", "name both X and Y"),
     "the active offset turned, X alone": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nG1 X3", "name both X and Y"),
     "the active offset turned, in G91": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nG91 G1 X3 Y3", "name both X and Y"),

@@ -1,0 +1,179 @@
+"""`python -m benchmarks.hunt [--programs N] [--seed S]`: random programs through the built-in reader and LinuxCNC's.
+
+Where one of them refuses a line, the line is left out and the rest tried again: what is compared has been read by both.
+The feed path must be the same (0.01 mm and degrees, move by move). Prints how many came out how, and every program that
+both read differently; exit code 1 if there is one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import sys
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.hunt_programs import Cam, Harsh
+from tests.nc import rs274
+from toolpath_stiff.errors import TpsError
+from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
+from toolpath_stiff.nc.linuxcnc.reading import refusal
+from toolpath_stiff.nc.source import split_lines
+
+TOLERANCE = 0.01  # mm and degrees
+PRINTED = 0.011  # a move shorter than rs274's digits, and twice their sum
+CENTER_TOLERANCE = 0.05  # mm: a centre from R magnifies the digits where the chord is nearly a diameter
+MOST_REPAIRS = 15
+LENGTHS = {1: 50.0, 2: 75.5, 3: 101.6}  # mm
+SAME, RAPIDS, REFUSED, WE_REFUSE, ONLY_WE, OTHER = (
+    "same feed path", "same feed path, other rapids", "refused by both", "refused by the built-in reader",
+    "refused by LinuxCNC alone", "OTHER PATH",
+)  # fmt: skip
+Move = tuple[str, np.ndarray, np.ndarray, "tuple[np.ndarray, np.ndarray, float] | None"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a program: verdict, what differs, and the text that both were given in the end."""
+
+    verdict: str
+    detail: str
+    text: str
+
+
+def our_moves(program: Program) -> list[Move]:
+    """Moves in control coordinates, mm and degrees, as the witness has them."""
+    moves, origin = program.moves, np.array(program.origin[:3]) * 1e3
+    found: list[Move] = []
+    for i in range(len(moves)):
+        ends = [np.concatenate([p[:3] * 1e3 + origin, np.rad2deg(p[3:])]) for p in (moves.start[i], moves.end[i])]
+        turned = bool(moves.arc_sweep[i])
+        arc = (moves.arc_center[i] * 1e3 + origin, moves.arc_normal[i], float(moves.arc_sweep[i])) if turned else None
+        name = MOTION_NAMES[moves.motion[i]]
+        found.append(("rapid" if name == "rapid" else "arc" if turned else "feed", ends[0], ends[1], arc))
+    return found
+
+
+def kept(moves: list[Move], rapids: bool) -> list[Move]:
+    """Those that are compared."""
+    return [
+        move
+        for move in moves
+        if (rapids or move[0] != "rapid") and (move[3] is not None or np.abs(move[2] - move[1]).max() > PRINTED)
+    ]
+
+
+def difference(ours: list[Move], theirs: list[Move]) -> str:
+    """The first thing in which two lists of moves differ; "" if nothing."""
+    if len(ours) != len(theirs):
+        return f"{len(ours)} moves and {len(theirs)}"
+    for number, (mine, other) in enumerate(zip(ours, theirs, strict=True), 1):
+        if mine[0] != other[0]:
+            return f"move {number}: {mine[0]} and {other[0]}"
+        for what, a, b in (("start", mine[1], other[1]), ("end", mine[2], other[2])):
+            if np.abs(a - b).max() > TOLERANCE:
+                return f"move {number}: {what} {a.round(3).tolist()} and {b.round(3).tolist()}"
+        if mine[3] is not None and other[3] is not None:
+            apart = arcs_apart(mine[3], other[3])
+            if apart:
+                return f"move {number}: {apart}"
+    return ""
+
+
+def arcs_apart(mine: tuple[np.ndarray, np.ndarray, float], other: tuple[np.ndarray, np.ndarray, float]) -> str:
+    """In what two arcs differ; the witness' third entry is its signed number of turns."""
+    (center, normal, sweep), (their_center, their_normal, turns) = mine, other
+    if np.abs(normal - their_normal).max() > 1e-3:
+        return "planes"
+    if np.sign(sweep) != np.sign(turns) or max(1, math.ceil(abs(sweep) / math.tau - 1e-6)) != abs(turns):
+        return f"a sweep of {sweep:.4f} rad and {turns} turns"
+    apart = center - their_center
+    return "centres" if np.linalg.norm(apart - (apart @ normal) * normal) > CENTER_TOLERANCE else ""
+
+
+def hunt_one(text: str, folder: Path) -> Outcome | None:
+    """Hold a program against the witness; None if LinuxCNC must not be given it."""
+    ours_table = "".join(f"T{n} P{n} Z{z} D6.35 ;\n" for n, z in LENGTHS.items())
+    # rs274 takes the lengths of its table as inches.
+    their_table = "".join(f"T{n} P{n} Z{z / 25.4:.8f} D0.25 ;\n" for n, z in LENGTHS.items())
+    (folder / "ours.tbl").write_text(ours_table)
+    file = folder / "part.ngc"
+    for _ in range(MOST_REPAIRS):
+        try:
+            if refusal(split_lines(text, file.name), file.name) is not None:
+                return None
+        except TpsError:
+            return None
+        file.write_text(text, newline="")
+        for left in ("rs274.var", "canon.txt"):  # it keeps its parameters from run to run
+            (folder / left).unlink(missing_ok=True)
+        theirs = rs274.run(file, folder, their_table)
+        program, answer = None, ""
+        try:
+            program = read_program(file, tool_table=folder / "ours.tbl")
+        except TpsError as error:
+            answer = str(error)
+        if program is not None and not theirs.error:
+            return _both_read(program, theirs, text)
+        line = _refused_line(text, answer, theirs.error)
+        if line is None:
+            verdict = REFUSED if answer and theirs.error else WE_REFUSE if answer else ONLY_WE
+            if "no cutting move" in answer and not theirs.error:
+                verdict = OTHER if kept(theirs.moves, rapids=False) else SAME
+            return Outcome(verdict, answer or theirs.error.strip().splitlines()[-1], text)
+        lines = text.splitlines()
+        text = "\n".join([*lines[: line - 1], *lines[line:], ""])
+    return Outcome(REFUSED, "too many lines", text)
+
+
+def _both_read(program: Program, theirs: rs274.Canon, text: str) -> Outcome:
+    ours = our_moves(program)
+    apart = difference(kept(ours, False), kept(theirs.moves, False))
+    if apart:
+        return Outcome(OTHER, apart, text)
+    apart = difference(kept(ours, True), kept(theirs.moves, True))
+    return Outcome(RAPIDS if apart else SAME, apart, text)
+
+
+def _refused_line(text: str, ours: str, theirs: str) -> int | None:
+    """The line (from 1) to leave out: that which the built-in reader names, else that which rs274 repeats."""
+    found = re.match(r"part\.ngc:(\d+)", ours)
+    if found:
+        return int(found[1])
+    repeated = theirs.strip().splitlines()[-1].strip() if theirs and not ours else None
+    for number, line in enumerate(text.splitlines(), 1):
+        if repeated and line.strip() == repeated:
+            return number
+    return None
+
+
+def main() -> int:
+    """Hunt; the exit code is 1 if a path differs."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.hunt", description=__doc__)
+    parser.add_argument("--programs", type=int, default=2000, metavar="N", help="how many (default: 2000)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the first one (default: 0)")
+    args = parser.parse_args()
+    counts: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory() as name:
+        for seed in range(args.seed, args.seed + args.programs):
+            outcome = hunt_one(program_of(seed), Path(name))
+            counts[outcome.verdict if outcome else "not given to LinuxCNC"] += 1
+            if outcome and outcome.verdict == OTHER:
+                print(f"seed {seed}: {outcome.detail}\n{outcome.text}\n")
+    for verdict, count in counts.most_common():
+        print(f"{count:7d}  {verdict}")
+    return 1 if counts[OTHER] else 0
+
+
+def program_of(seed: int) -> str:
+    """The program of a seed: every fourth is as CAM writes it."""
+    return (Cam if seed % 4 == 3 else Harsh)(seed).program()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
