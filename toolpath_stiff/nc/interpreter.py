@@ -364,7 +364,7 @@ class Interpreter(Zeros):
             self._arc()
         elif self.motion in CYCLES and (axes or given):
             self._cycle(given is not None)
-        elif given is not None and self.motion == "G1" and self.height_lost:  # LinuxCNC's rs274 moves to where it takes itself to be
+        elif given is not None and self.motion == "G1" and self.height_lost:  # rs274 moves then
             self._find_height(FEED, named=False)
 
     def _machine_move(self, word: Word) -> None:
