@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.nc.cutter_location import MM, START, read, refused
-from toolpath_stiff.nc.moves import ARC, FEED
-from toolpath_stiff.path import move_lengths
+from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
+from toolpath_stiff.path import move_lengths, sample_moves
 
 
 def test_helix_of_ptcs_manual():
@@ -108,6 +108,81 @@ def test_moves_of_autodesks_iso_4343_post():
     assert move_lengths(read(text.format(630)).moves)[0] == pytest.approx(3.5 * math.pi * 5 * MM)
     error = refused(text.format(90))
     assert error.line == 5 and "ANGLE says 90" in str(error)
+
+
+def test_a_slot_that_creo_wrote():
+    """One level of `profilfräsen_2.ncl.2` of github.com/MichaHofft/CreoPost: a rectangle, corners of 1.5 mm."""
+    corners = [((0, 0), (1.5, 0)), ((0, -33), (0, -34.5)), ((-24, -33), (-25.5, -33)), ((-24, 0), (-24, 1.5))]
+    starts = [(0, 1.5), (1.5, -33), (-24, -34.5), (-25.5, 0)]
+    text = "UNITS / MM\nRAPID \nGOTO / 0.0000000000, 1.5000000000, 2.0000000000\nFEDRAT / 400.000000,  MMPM\n"
+    for start, (center, end) in zip(starts, corners, strict=True):
+        text += f"GOTO / {start[0]:.10f}, {start[1]:.10f}, -1.5000000000\n"
+        text += f"CIRCLE / {center[0]:.10f}, {center[1]:.10f}, -1.5000000000,  $\n"
+        text += "0.0000000000, 0.0000000000, -1.0000000000,  1.5000000000\n"
+        text += f"GOTO / {end[0]:.10f}, {end[1]:.10f}, -1.5000000000\n"
+    program = read(text + "GOTO / 0.0000000000, 1.5000000000, -1.5000000000\nSPINDL / OFF\n$$-> END / \nFINI \n")
+    down, *around = move_lengths(program.moves)
+    assert down == pytest.approx(3.5 * MM)
+    assert sum(around) == pytest.approx((2 * 33 + 2 * 24 + math.tau * 1.5) * MM)
+    assert not program.warnings
+
+
+def corner_angles(program) -> np.ndarray:
+    """Degrees by which the path turns where one move meets the next."""
+    samples = sample_moves(program.moves, step=1 * MM)
+    joins = np.flatnonzero(np.diff(samples.move))
+    cosines = np.einsum("ni,ni->n", samples.tangent[joins], samples.tangent[joins + 1])
+    return np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+
+
+def test_a_contour_that_nx_wrote_goes_on_smoothly():
+    """From `_1_KONTUR_NAR_40_N2.cls` of github.com/HumMan/CLSFProcessor: arcs both ways, to 0.0001 mm.
+
+    Read by the other hand, every arc would turn back where it begins.
+    """
+    program = read(
+        "TOOL PATH/8_KONTUR_NAR_40_N2,TOOL,FACE_MILL_1\n"
+        "MSYS/393.0000,-297.5000,3.0000,0.0000000,1.0000000,0.0000000,1.0000000,0.0000000,0.0000000\n"
+        "FEDRAT/MMPM,621.0000\nGOTO/741.2841,-9.9637,466.0000,0.0000000,0.0000000,1.0000000\nPAINT/COLOR,31\n"
+        "GOTO/1221.5423,14.3929,466.0000\n"
+        "CIRCLE/1245.5000,-458.0000,466.0000,0.0000000,0.0000000,1.0000000,473.0000,0.0600,0.5000,40.0000,1.0000\n"
+        "GOTO/1563.1794,-107.5591,466.0000\n"
+        "CIRCLE/1749.2200,97.6673,466.0000,0.0000000,0.0000000,-1.0000000,277.0000,0.0600,0.5000,40.0000,1.0000\n"
+        "GOTO/1597.8754,-134.3323,466.0000\n"
+        "CIRCLE/1749.3435,97.9506,466.0000,0.0000000,0.0000000,-1.0000000,277.3047,0.0600,0.5000,40.0000,1.0000\n"
+        "GOTO/1682.2255,-171.1090,466.0000\nGOTO/1688.9327,-172.7813,466.0000\nGOTO/1889.9378,-222.8975,466.0000\n"
+        "CIRCLE/1884.3736,-245.2143,466.0000,0.0000000,0.0000000,1.0000000,23.0000,0.0600,0.5000,40.0000,1.0000\n"
+        "GOTO/1906.6904,-250.7786,466.0000\nGOTO/1899.7068,-278.7886,466.0000\nPAINT/TOOL,NOMORE\nEND-OF-PATH\n"
+    )
+    assert not program.warnings
+    assert np.abs(program.moves.arc_sweep).max() < math.pi
+    assert corner_angles(program).max() < 0.2
+
+
+def test_arcs_without_a_radius():
+    """From `basemach.apt` of github.com/aamorim1913/AptPostProcessor: `UNIT/`, `RAPID/`, circles of six numbers."""
+    program = read(
+        "PARTNO/1\nUNIT/MM\nCUTTER/8.,0,4.,0,0,0,40.\nLOAD/TOOL,17\nCSYS/1.,0,0,0,0,1.,0,0,0,0,1.,0\nRAPID/\n"
+        "GOTO/46.615938,17.969848,-4.\nFEDRAT/190.023753,MMPM\nGOTO/50.292893,14.292893,-4.\nCIRCLE/51.,15.,-4.,0,0,1.\n"
+        "GOTO/51.,14.,-4.\nFEDRAT/253.365004,MMPM\nGOTO/56.,14.,-4.\nFINI\n"
+    )
+    assert not program.warnings and corner_angles(program).max() < 0.01
+    assert move_lengths(program.moves)[1] == pytest.approx(math.pi / 4 * MM, rel=1e-5)
+
+
+def test_holes_that_creo_wrote():
+    """`bohren_1.ncl.8` of github.com/MichaHofft/CreoPost: pecks of 1 mm from 1 mm above each hole."""
+    program = read(
+        "UNITS / MM\nLOADTL / 1\nSPINDL / RPM, 9000.000000,  CLW\nRAPID \n"
+        "GOTO / -7.2290790757, -23.0000000000, 2.0000000000\n"
+        "CYCLE / DEEP, DEPTH, 3.500000, STEP, 1.000000, MMPM, 50.000000, CLEAR,$\n 1.000000\n"
+        "GOTO / -7.2290790757, -23.0000000000, 0.5000000000\nGOTO / -16.7803891180, -23.0000000000, 0.5000000000\n"
+        "CYCLE / OFF\nRAPID \nGOTO / -16.7803891180, -23.0000000000, 2.0000000000\nSPINDL / OFF\n$$-> END / \nFINI \n"
+    )
+    moves = program.moves
+    assert moves.end[moves.motion == CYCLE, 2].min() == pytest.approx((0.5 - 3.5) * MM)
+    assert len(moves.take(moves.motion == CYCLE)) == 2 * 5  # from 1.5 to -3 in pecks of 1
+    assert moves.end[moves.line == 8][0, 2] == pytest.approx(1.5 * MM)  # across to the second hole, 1 mm above it
 
 
 CATIA = """\

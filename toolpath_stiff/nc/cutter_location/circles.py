@@ -1,6 +1,7 @@
 """Circles of a cutter-location file: which way round, how far, and whether start, end and radius agree. mm.
 
 - `CIRCLE/x,y,z,i,j,k,r`: by the right hand about i, j, k (PTC, "CL Output for Circular Interpolation").
+- `CIRCLE/x,y,z,i,j,k`: by the right hand too (files of a post for CAMplete, whose arcs enter smoothly so).
 - `CIRCLE/x,y,z,i,j,k,r,t,f,d,e`: clockwise about i, j, k (Siemens NX, "CLSF Manager": "assuming a clockwise direction";
   Autodesk's post for CAMplete).
 - `MOVARC/x,y,z,i,j,k,r,ANGLE,a`: by the right hand (ISO 4343; Autodesk's post for it).
@@ -28,7 +29,8 @@ SWEEP_TOLERANCE_DEG = 0.05
 class Circle:
     """A circle that the next motion follows: centre, unit axis (the motion is right-handed about it), radius.
 
-    `turns` are whole turns, given for a start that is the end; `sweep` is the angle in degrees, if given.
+    The radius is nan where the file gives none. `turns` are whole turns, given for a start that is the end; `sweep` is
+    the angle in degrees, if given.
     """
 
     center: Vector
@@ -84,7 +86,7 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
             f"{last:.4f} mm at the end)",
             f"radii that agree within {allowed:.4f} mm",
         )
-    if abs(circle.radius - radius) > allowed:
+    if abs(circle.radius - radius) > allowed:  # never, if the file gives no radius
         raise arcs.ArcError(
             f"a circle of radius {circle.radius:.4f} mm whose centre lies {radius:.4f} mm from the tool's position",
             f"radii that agree within {allowed:.4f} mm",

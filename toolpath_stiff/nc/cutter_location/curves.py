@@ -33,7 +33,7 @@ class Curves(Modes):
                 raise self.fail("CIRCLE/ ... TIMES", "a whole number of turns", at=arguments[-1])
             times, arguments = int(count), arguments[:-2]
         numbers = [number_of(argument, self.name) for argument in arguments]
-        if len(numbers) not in (4, 7, 11):
+        if len(numbers) not in (4, 6, 7, 11):
             raise self.fail(
                 f"CIRCLE/ with {len(numbers)} numbers", "x,y,z,i,j,k,r or NX' x,y,z,i,j,k,r,t,f,d,e or x,y,z,r"
             )
@@ -43,7 +43,7 @@ class Curves(Modes):
             if self.direction is None:
                 raise self.fail("CIRCLE/x,y,z,r, which does not say which way round", "INDIRV/ before it, or i,j,k")
         else:
-            axis, radius = self._circle_axis(numbers[3:6]), numbers[6]
+            axis, radius = self._circle_axis(numbers[3:6]), numbers[6] if len(numbers) > 6 else math.nan
             if len(numbers) == 11:
                 axis = (-axis[0], -axis[1], -axis[2])
         self._await_circle(Circle(center, axis, radius * self.scale, times))

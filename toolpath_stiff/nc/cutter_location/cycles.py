@@ -50,9 +50,11 @@ def read_cycle(
     if arguments and arguments[0].text.upper() in ("DEEP", "BRKCHP"):  # NX, CAMplete: CYCLE/DRILL,DEEP
         code = KINDS[arguments.pop(0).text.upper()]
     values: dict[str, float] = {}
+    fedto = False
     unit = ""
     for key, value in zip(arguments[::2], arguments[1::2], strict=False):
         word = key.text.upper()
+        fedto = fedto or word == "FEDTO"
         word = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}.get(word, word)
         if is_number(word):
             raise fail(
@@ -79,6 +81,8 @@ def read_cycle(
         raise fail("RETURN,0 goes to a plane of the CAM system's", "a height above the point")
     if back < clear:
         raise fail("a return below CLEAR", "a height of CLEAR or more", hint="")
+    if fedto and back != clear:
+        raise fail("CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate", "DEPTH")
     if code == "G81" and peck:
         raise fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP", hint="")
     if code != "G81" and (not peck > 0.0 or (clear + depth) / peck > MOST_PECKS):

@@ -48,6 +48,7 @@ class CutterLocation(Curves):
             "FEDRAT": self._fedrat,
             "SPINDL": self._spindl,
             "UNITS": self._units,
+            "UNIT": self._units,
             "MULTAX": self._multax,
             "TLAXIS": self._tlaxis,
             "CIRCLE": self._circle,
@@ -69,6 +70,7 @@ class CutterLocation(Curves):
             "ORIGIN": self._shift,
             "MSYS": self._frame_word,
             "MCS": self._frame_word,
+            "CSYS": self._frame_word,
             "ZERO": self._frame_word,
             "FINI": self._fini,
         }

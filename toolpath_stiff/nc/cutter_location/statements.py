@@ -20,7 +20,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?"
 _IS_NUMBER = re.compile(_NUMBER)
 # What no line of G code looks like.
 _SIGN = re.compile(
-    r"\s*(?:N?\d+\s+)?(?:(?:GOTO|FROM|FEDRAT|CUTTER|LOADTL|UNITS|MACHIN|SPINDL|TLDATA|MSYS|TOOL\s+PATH|TLAXIS|TOOLNO"
+    r"\s*(?:N?\d+\s+)?(?:(?:GOTO|FROM|FEDRAT|CUTTER|LOADTL|UNITS?|MACHIN|SPINDL|TLDATA|MSYS|TOOL\s+PATH|TLAXIS|TOOLNO"
     r"|GODLTA|INTOL|OUTTOL)\s*/|PPRINT\b|PARTNO\b|MULTAX\s*(?:/|$)|(?:RAPID|FINI)\s*$)",
     re.IGNORECASE,
 )
@@ -32,7 +32,7 @@ _FRAME = re.compile(r"\s*\$\$(?:(\*)CATIA0\b|->\s*CSYS\s*/)", re.IGNORECASE)
 FRAME_NUMBERS = 12
 _ONLY_NUMBERS = re.compile(r"[\s\d.,+\-EeDd$]*")
 _NEW_STATEMENT = re.compile(
-    r"\s*(?:(?:GOTO|FROM|FEDRAT|GODLTA|CYCLE|LOADTL|SPINDL|CUTTER|UNITS|TLAXIS|INDIRV)\s*/|TLON\s*,|(?:RAPID|FINI)\s*$)",
+    r"\s*(?:(?:GOTO|FROM|FEDRAT|GODLTA|CYCLE|LOADTL|SPINDL|CUTTER|UNITS?|TLAXIS|INDIRV)\s*/|TLON\s*,|(?:RAPID|FINI)\s*$)",
     re.IGNORECASE,
 )
 _NEXT = rf"\s*,\s*({_NUMBER})"

@@ -17,6 +17,7 @@ ACTED_UPON = {
     "FEDRAT": "feed",
     "SPINDL": "spindle speed",
     "UNITS": "length unit",
+    "UNIT": "length unit",
     "MULTAX": "whether points carry a tool axis",
     "TLAXIS": "tool axis",
     "CIRCLE": "the next motion follows a circle",
@@ -60,8 +61,7 @@ HARMLESS = {
     **dict.fromkeys(("CLAMP", "UNCLMP"), "clamps of machine axes"),
 }
 FRAMES = {
-    "MSYS": _FRAME,
-    "MCS": _FRAME,
+    **dict.fromkeys(("MSYS", "MCS", "CSYS"), _FRAME),
     "ZERO": "the work offset of the posted program; here it is program zero",
 }  # a second, different one is refused
 
@@ -71,15 +71,20 @@ _CALL = ("repeats or calls a part of the file", "have the CAM system write the p
 _DRIVE = ("is driven along surfaces", "give the file of points that APT's processor writes")
 _SHIFT = ("shifts all that follows", "have the CAM system write the points where they are cut")
 
+TURNING = ("is not milling", "this is a mill")
+COMPENSATION = ("is cutter compensation", "have the CAM system write the path of the tool centre")
+
 # Refused by name: word -> what it does, what to do.
 REFUSED = {
     **dict.fromkeys(("TRACUT", "MIRROR", "SCALE"), _WHOLE_PATH),
     **dict.fromkeys(("ROTATE", "ROTABL", "ROTHED", "TABLE", "PIVOTZ", "INDEX", "TILT"), _TURN),
     **dict.fromkeys(
-        ("COPY", "CALSUB", "CALL", "CALLUB", "DEFSUB", "ENDSUB", "MACRO", "TERMAC", "LOOPST", "JUMPTO"), _CALL
+        ("COPY", "CALSUB", "CALL", "CALLSUB", "DEFSUB", "ENDSUB", "MACRO", "TERMAC", "LOOPST", "JUMPTO"), _CALL
     ),
     **dict.fromkeys(("TLLFT", "TLRGT", "TLON", "TLONPS", "TLOFPS", "TLNDON"), _DRIVE),
     **dict.fromkeys(("GO", "GOFWD", "GOBACK", "GOLFT", "GORGT", "GOUP", "GODOWN", "OFFSET", "POCKET", "SCURV"), _DRIVE),
+    "TLCOMP": COMPENSATION,
+    "PLUNGE": ("feeds the tool to where a post processor knows", "have the CAM system write the point"),
     "RETRCT": ("retracts the tool to a plane of the post processor's", "have the CAM system write the point"),
     "THREAD": ("cuts a thread", "leave threading out"),
     "ARC": ("is an arc of one post processor", "have the CAM system write CIRCLE/ or points"),
@@ -88,8 +93,6 @@ REFUSED = {
     "POLYNO": ("is a polynomial", "have the CAM system write points"),
 }
 SHIFTS = {"TRANS": _SHIFT, "ORIGIN": _SHIFT}  # refused unless they are zero
-TURNING = ("is not milling", "this is a mill")
-COMPENSATION = ("is cutter compensation", "have the CAM system write the path of the tool centre")
 
 # Read, not acted upon, and a warning: what they do hangs on the machine.
 DOUBTFUL = {
