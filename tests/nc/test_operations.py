@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.nc import rs274
+from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.dialects import DIALECTS
 from toolpath_stiff.nc.headings import headings, plain_name
 from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, find_operations, operations
 from toolpath_stiff.nc.reader import parse_program
@@ -413,6 +415,15 @@ def test_a_list_of_calls_has_the_subprograms_for_operations() -> None:
     assert names(text) == ["BORE", "WALL", "BORE"]
 
 
+def test_comments_between_calls_of_one_line_name_its_runs() -> None:
+    text = "O1\nG91\n(LEFT)\nM98 P10\n(RIGHT)\nM98 P10 L2\nM98 P10\nM30\nO10\nG1 X1 F100\nM99\n"
+    got = found(text)
+    assert [row.name for row in got.rows] == ["LEFT", "RIGHT"]
+    assert got.of_move.tolist() == [0, 1, 1, 1]
+    local = "G91\n(LEFT)\nM97 P100\n(RIGHT)\nM97 P100\nM30\nN100 G1 X1. F100.\nM99\n"
+    assert names(local, controller=Controller(dialect=DIALECTS["haas"])) == ["LEFT", "RIGHT"]
+
+
 @needs_rs274
 def test_the_second_interpreter_gives_the_same_operations() -> None:
     for text in (FREECAD, SUBPROGRAM.replace("O1 (PLATE)\n", ""), ESTLCAM):
@@ -527,3 +538,61 @@ def test_any_text_is_looked_through(lines: list[str]) -> None:
     for heading in headings(lines):
         assert heading.name
         assert 1 <= heading.line <= len(lines)
+
+
+ITEM = st.sampled_from(["cut", "cut", "rapid", "head", "blank"])
+CALL = st.sampled_from(["call 20", "twice 20"])
+ITEMS = st.lists(ITEM, max_size=5)
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    st.lists(ITEM | CALL | st.sampled_from(["call 10", "twice 10"]), max_size=12),
+    st.lists(ITEM | CALL, max_size=5),
+    ITEMS,
+)
+def test_operations_of_calls_are_those_of_the_run(main: list[str], ten: list[str], twenty: list[str]) -> None:
+    """A run line by line, which notes the headings that it passes, finds the same operations."""
+    lines = ["O1", "G21 G94 F100", "G91"]
+    where: dict[str, tuple[int, list[str]]] = {}
+    programs = {"1": ["cut", *main, "cut"], "10": ten, "20": twenty}
+    for name, items in programs.items():
+        lines += [] if name == "1" else [f"O{name}"]
+        where[name] = (len(lines) + 1, items)
+        for item in items:
+            plain = {"cut": "G1 X1", "rapid": "G0 X1", "head": f"(HEAD {len(lines)})", "blank": ""}
+            call = f"M98 P{item.split()[-1]}" + (" L2" if item.startswith("twice") else "")
+            lines.append(plain.get(item, call))
+        lines.append("M30" if name == "1" else "M99")
+    program = parse_program("\n".join(lines), "part.nc")
+
+    expected: list[tuple[str, int]] = [("part.nc", 0)]  # name, moves
+    current: set[int] = set()
+    passed: list[int] = []
+    waiting = early = 0  # rapids before and after the first heading since the last cut
+
+    def run(name: str) -> None:
+        nonlocal current, passed, waiting, early
+        first, items = where[name]
+        for number, item in enumerate(items, first):
+            if item == "head":
+                passed.append(number)
+            elif item == "rapid":
+                fresh = [head for head in passed if head not in current]
+                waiting, early = (waiting + 1, early) if fresh else (waiting, early + 1)
+            elif item == "cut":
+                fresh = [head for head in passed if head not in current]
+                expected[-1] = (expected[-1][0], expected[-1][1] + early)
+                if fresh and expected[0][1]:
+                    expected.append((lines[fresh[0] - 1].strip("()"), 0))
+                    current = set(passed)
+                expected[-1] = (expected[-1][0], expected[-1][1] + waiting + 1)
+                passed, waiting, early = [], 0, 0
+            elif item != "blank":
+                for _ in range(2 if item.startswith("twice") else 1):
+                    run(item.split()[-1])
+
+    run("1")
+    expected[-1] = (expected[-1][0], expected[-1][1] + waiting + early)
+    got = operations(program)
+    assert list(zip([row.name for row in got.rows], np.bincount(got.of_move).tolist(), strict=True)) == expected

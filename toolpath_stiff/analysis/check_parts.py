@@ -36,7 +36,7 @@ def check_parts(
         {"tool": int(numbers[i]), "remark": checked.remarks.get(int(numbers[i]), ""), **figure_rows(found[i])}
         for i in np.argsort(first).tolist()
     ]
-    operations = find_operations(lines, moves, name, checked.remarks, checked.marks)
+    operations = find_operations(lines, moves, name, checked.remarks, checked.marks, checked.jumps)
     parts = figures_of_parts(moves, operations.of_move, len(operations.rows), rapid_feed)
     return tools, [
         {

@@ -16,7 +16,7 @@ from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_locat
 from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Unsupported
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Unsupported
 from toolpath_stiff.nc.plain_lines import G_COLUMN
 from toolpath_stiff.nc.posted import PostedKinematics
 from toolpath_stiff.nc.reader import ZERO
@@ -89,8 +89,8 @@ class Checked:
         What the file was taken for, where that is not the control's dialect.
     remarks
         What the tool table says of the tools that were used, by number.
-    marks
-        Where operations begin, as in `Program`.
+    marks, jumps
+        Where operations begin, where the run left the order of the lines; as in `Program`.
     """
 
     used: tuple[UsedCode, ...]
@@ -104,6 +104,7 @@ class Checked:
     dialect: str = ""
     remarks: dict[int, str] = field(default_factory=dict)
     marks: tuple[tuple[int, str], ...] | None = None
+    jumps: tuple[Jump, ...] | None = None
 
 
 class _CheckingRun(ProgramRun):
@@ -207,6 +208,7 @@ def check_lines(
         origin=(m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c)),
         complete=not errors,
         remarks={tool.number: tool.remark for tool in interpreter.used_tools.values()},
+        jumps=tuple(run.jumps) if posted is None else None,
     )
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
@@ -79,6 +79,14 @@ class Moves:
         return Moves(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
 
+class Jump(NamedTuple):
+    """A run that leaves the order of the lines: moves before it, the line left, the line after which it goes on."""
+
+    moves: int
+    left: int
+    after: int
+
+
 @dataclass(frozen=True)
 class Unsupported:
     """A word of the program that was read, is harmless to the path, and was not acted upon."""
@@ -135,6 +143,8 @@ class Program:
     marks
         (line, name) where operations begin, ascending, in a language whose text says so otherwise than by comment
         lines; None: the comment lines of `source` say it.
+    jumps
+        Where the run left the order of the lines, for a subprogram or back from it; None: not known.
     """
 
     name: str
@@ -151,3 +161,4 @@ class Program:
     dialect: str = "generic"
     kinematics: str = ""
     marks: tuple[tuple[int, str], ...] | None = None
+    jumps: tuple[Jump, ...] | None = None

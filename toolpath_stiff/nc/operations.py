@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.nc.headings import MARKED, NAMED, TOOL, Heading, headings, plain_name, split_comments
-from toolpath_stiff.nc.moves import RAPID, Moves, Program
+from toolpath_stiff.nc.moves import RAPID, Jump, Moves, Program
 
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 MOST_OPERATIONS = 1000  # beyond, comments name passes or moves, not operations: the tools are taken
 # A call, a return, a loop or a condition: M97, M98, M99 and LinuxCNC's O words (`o100 call`, `o<name> while`).
@@ -67,7 +68,7 @@ class Operations:
 def operations(program: Program) -> Operations:
     """The operations of a program that was read, by either interpreter."""
     remarks = {tool.number: tool.remark for tool in program.tools}
-    return find_operations(program.source, program.moves, program.name, remarks, program.marks)
+    return find_operations(program.source, program.moves, program.name, remarks, program.marks, program.jumps)
 
 
 def find_operations(
@@ -76,6 +77,7 @@ def find_operations(
     name: str,
     remarks: dict[int, str] | None = None,
     marks: Sequence[tuple[int, str]] | None = None,
+    jumps: Sequence[Jump] | None = None,
 ) -> Operations:
     """The operations of moves.
 
@@ -92,12 +94,14 @@ def find_operations(
     marks
         (line, name) where operations begin, ascending, on the line of their first move or before it: of a language
         whose text says so otherwise than by comment lines.
+    jumps
+        Where the run left the order of the lines; None: not known, then calls and loops are looked for in the text.
     """
     cuts = np.flatnonzero(moves.motion != RAPID)
     if not len(cuts):
         return Operations((), np.zeros(len(moves), dtype=np.int64))
-    text = _Text(lines, marks)
-    begins = _beginnings(text, moves, cuts, text.heads, MOST_OPERATIONS) or _beginnings(text, moves, cuts, [])
+    text, way = _Text(lines, marks), _Way(lines, moves, jumps if marks is None else ())
+    begins = _beginnings(text, way, moves, cuts, text.heads, MOST_OPERATIONS) or _beginnings(text, way, moves, cuts, [])
     first = [0] + [begin.move for begin in begins[1:]]
     names = [_name(begin, text, remarks or {}, alone=len(begins) == 1) or name for begin in begins]
     of_move = np.repeat(np.arange(len(first)), np.diff([*first, len(moves)]))
@@ -126,42 +130,70 @@ class _Beginning:
 
 
 class _Text:
-    """A program's text: headings, its title, and which of its lines are passed between two moves."""
+    """A program's text: its headings and its title."""
 
     def __init__(self, lines: Sequence[str], marks: Sequence[tuple[int, str]] | None) -> None:
         self.lines = lines
-        self.title, self.header_end = ("", 0) if marks is not None else _title(lines)
+        self.title, header_end = ("", 0) if marks is not None else _title(lines)
         found = headings(lines) if marks is None else [Heading(line, name, MARKED) for line, name in marks]
         if not self.title:
-            self.title = next((h.name for h in found if h.line <= self.header_end and h.kind == NAMED), "")
-        self.heads = [h for h in found if h.line > self.header_end or h.kind == MARKED]
+            self.title = next((h.name for h in found if h.line <= header_end and h.kind == NAMED), "")
+        self.heads = [h for h in found if h.line > header_end or h.kind == MARKED]
         said = [h for h in self.heads if h.kind == MARKED]
         if len(said) > 1:  # a post that marks operations means other things by other comments
             self.heads = said
-        self.leaves = np.array(
-            [
-                number
-                for number, text in enumerate(() if marks is not None else lines, 1)
-                if ("M" in text or "O" in text or "m" in text or "o" in text) and LEAVES.match(text)
-            ],
-            dtype=np.int64,
-        )
+
+
+class _Way:
+    """The lines that a run passes between two moves, as stretches: their first line left out, their last one in it."""
+
+    def __init__(self, lines: Sequence[str], moves: Moves, jumps: Sequence[Jump] | None) -> None:
+        self.lines = lines
+        self.line = np.concatenate([[0], moves.line])  # that of move i is at i + 1
+        self.jumps = jumps
+        self.jump_moves = np.array([jump.moves for jump in jumps or ()], dtype=np.int64)
+        self.leaves = np.empty(0, dtype=np.int64)
+        if jumps is None:
+            self.leaves = np.array(
+                [
+                    number
+                    for number, text in enumerate(lines, 1)
+                    if ("M" in text or "O" in text or "m" in text or "o" in text) and LEAVES.match(text)
+                ],
+                dtype=np.int64,
+            )
         self._enters: IntArray | None = None
 
     @property
     def enters(self) -> IntArray:
-        """Lines at which a run can arrive from elsewhere: calls and loops, and the heads of subprograms."""
+        """Lines at which a run can arrive from elsewhere: calls and loops, heads and ends of programs."""
         if self._enters is None:
             heads = [number for number, text in enumerate(self.lines, 1) if HEAD.match(text)]
             self._enters = np.union1d(self.leaves, np.array(heads, dtype=np.int64))
         return self._enters
 
-    def passed(self, before: int, line: int) -> list[tuple[int, int]]:
-        """Stretches of lines, their first left out, that a run passes from a move of `before` to one of `line`.
+    def turns(self) -> BoolArray:
+        """(n,) whether the run does not come straight on to a move from the one before."""
+        if self.jumps is not None:
+            found = np.zeros(len(self.line) - 1, dtype=bool)
+            found[self.jump_moves[self.jump_moves < len(found)]] = True
+            return found
+        return np.asarray((np.diff(self.line) < 0) | (np.diff(np.searchsorted(self.leaves, self.line)) != 0))
 
-        Straight on, all between them; where it leaves for a subprogram or a loop, those up to there and those from
-        where it arrives.
-        """
+    def passed(self, last: int, move: int) -> list[tuple[int, int]]:
+        """From move `last` (-1: from the start of the file) to a later one."""
+        start, end = int(self.line[last + 1]), int(self.line[move + 1])
+        if self.jumps is None:
+            return self._guessed(start, end)
+        first, stop = np.searchsorted(self.jump_moves, [last + 1, move + 1]).tolist()
+        found = []
+        for jump in self.jumps[first:stop]:
+            found.append((start, jump.left))
+            start = jump.after
+        return [*found, (start, end)]
+
+    def _guessed(self, before: int, line: int) -> list[tuple[int, int]]:
+        """The same from the text alone: up to where the run leaves for a call or a loop, and from where it arrives."""
         leaves = self.leaves
         at = int(np.searchsorted(leaves, before))
         stop = int(leaves[at]) if at < len(leaves) else len(self.lines) + 1
@@ -185,7 +217,7 @@ def _title(lines: Sequence[str]) -> tuple[str, int]:
 
 
 def _beginnings(
-    text: _Text, moves: Moves, cuts: IntArray, heads: list[Heading], most: float = np.inf
+    text: _Text, way: _Way, moves: Moves, cuts: IntArray, heads: list[Heading], most: float = np.inf
 ) -> list[_Beginning]:
     """One for every cut before which a heading is passed or the tool changes, and one for the first cut.
 
@@ -193,57 +225,60 @@ def _beginnings(
     """
     at = np.array([head.line for head in heads], dtype=np.int64)
     seen: dict[int, Sequence[int]] = {}  # move -> headings (rows of `heads`) passed right before it
-    line = np.concatenate([[0], moves.line])
-    below, left = np.searchsorted(at, line, side="right"), np.searchsorted(text.leaves, line)
-    odd = (np.diff(line) < 0) | (np.diff(left) != 0)
+    below, odd = np.searchsorted(at, way.line, side="right"), way.turns()
     straight = np.flatnonzero(~odd & (np.diff(below) != 0))
     for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
         seen[move] = range(low, high)
-    known: dict[tuple[int, int], list[int]] = {}
-    for move in np.flatnonzero(odd).tolist():
-        way = (int(line[move]), int(line[move + 1]))
-        if way not in known:
-            spans = [np.searchsorted(at, ends, side="right").tolist() for ends in text.passed(*way)]
-            known[way] = [row for low, high in spans for row in range(low, high)]
-        if known[way]:
-            seen[move] = known[way]
+    for move in np.flatnonzero(odd).tolist() if heads else ():
+        spans = [np.searchsorted(at, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
+        between = [row for low, high in spans for row in range(low, high)]
+        if between:
+            seen[move] = between
     changes = set((np.flatnonzero(np.diff(moves.tool) != 0) + 1).tolist())
     events = sorted(changes.union(seen))
     next_cut = np.searchsorted(cuts, events)
     tool = int(moves.tool[cuts[0]])
-    change = _tool_change(text, 0, int(moves.line[cuts[0]])) if tool else None
-    found, current, of_current = [_Beginning(0, [], tool, change)], 0, set[int]()
+    change = _tool_change(text, way.passed(-1, int(cuts[0]))) if tool else None
+    found = [_Beginning(0, [], tool, change)]
+    current = gap = (
+        0  # cuts (rows of `cuts`) that the running operation, and what stands before the next cut, begin with
+    )
+    said: set[int] = set()  # headings passed where the running operation began: passed again, they begin none
+    before, passed = said, set[int]()
     for event, ordinal in zip(events, next_cut.tolist(), strict=True):
         if ordinal == len(cuts):
             break  # nothing is cut after it
         if len(found) > most:
             return []
         rows = seen.get(event, [])
+        if ordinal != gap:
+            gap, before, passed = ordinal, said, set()
+        passed.update(rows)
+        fresh = [heads[row] for row in rows if row not in before]
         if ordinal == current:
-            of_current.update(rows)
-            found[-1].heads += [heads[row] for row in rows]
+            found[-1].heads += fresh
+            said = passed
             continue
         tool, last = int(moves.tool[cuts[ordinal]]), int(moves.tool[cuts[ordinal - 1]])
-        fresh = [row for row in rows if row not in of_current]
         if not fresh and tool == last:
-            continue  # the comments of a subprogram that runs again
-        ends = moves.line[cuts[ordinal - 1]], moves.line[cuts[ordinal]]
-        change = None if tool == last else _tool_change(text, int(ends[0]), int(ends[1]))
-        found.append(_Beginning(event, [heads[row] for row in fresh], tool, change))
-        current, of_current = ordinal, set(fresh)
+            continue
+        stretches = [] if tool == last else way.passed(int(cuts[ordinal - 1]), int(cuts[ordinal]))
+        change = _tool_change(text, stretches) if stretches else None
+        found.append(_Beginning(event, fresh, tool, change))
+        current, said = ordinal, passed
     return found if len(found) <= most else []
 
 
-def _tool_change(text: _Text, before: int, line: int) -> tuple[int, str]:
-    """Line of the first tool change between two lines, and the comment beside the last one that has any."""
-    first, remark = line, ""
-    for low, high in text.passed(before, line):
+def _tool_change(text: _Text, stretches: list[tuple[int, int]]) -> tuple[int, str]:
+    """Line of the first tool change in some stretches of lines, and the comment beside the last one that has any."""
+    first, remark = 0, ""
+    for low, high in stretches:
         for number, words in enumerate(text.lines[low:high], low + 1):
             code, comment = split_comments(words)
             if CHANGES_TOOL.search(code):
-                first = min(first, number)
+                first = first or number
                 remark = plain_name(comment) or remark
-    return first, remark
+    return first or stretches[-1][1], remark
 
 
 def _name(begin: _Beginning, text: _Text, remarks: dict[int, str], alone: bool) -> str:

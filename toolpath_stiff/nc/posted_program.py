@@ -69,6 +69,7 @@ def recovered(
         warnings=(*program.warnings, *part.warnings),
         assumptions=(*program.assumptions, *part.assumptions),
         kinematics=kinematics.label,
+        jumps=None,  # they count the moves of the other machine
     )
 
 

@@ -247,7 +247,8 @@ def _read_built_in(asked: _Request) -> Program:
     posted = asked.posted
     frames = Frames(copy.deepcopy(asked.offsets), *asked.zero, posted=posted)
     interpreter = Interpreter(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)
-    warnings = ProgramRun(interpreter, asked.lines, asked.name, asked.switches).run()
+    run = ProgramRun(interpreter, asked.lines, asked.name, asked.switches)
+    warnings = run.run()
     if not interpreter.recorder.cuts:
         raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=asked.name)
     g54 = asked.offsets.table[0].given or frames.offsets.table[0].given
@@ -267,6 +268,7 @@ def _read_built_in(asked: _Request) -> Program:
         assumptions=(START, *interpreter.assumptions),
         tools=tuple(interpreter.used_tools.values()),
         dialect=asked.controller.label,
+        jumps=tuple(run.jumps),
     )
     if posted is None:
         return program

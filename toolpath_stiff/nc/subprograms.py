@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.interpreter import Call, Interpreter
+from toolpath_stiff.nc.moves import Jump
 from toolpath_stiff.nc.words import Block, read_block
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ class ProgramRun:
         self._sequence: dict[int, list[int]] | None = None
         self._called: dict[int, Block] = {}  # blocks of subprograms by line, from 0: each is read once
         self._blocks = 0
+        self.jumps: list[Jump] = []
 
     def run(self) -> list[str]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
@@ -94,7 +96,7 @@ class ProgramRun:
                     if not self._execute(block):
                         return self._end(at, "the program's end", ended=True)
                     if self.interpreter.call is not None:
-                        at = self._enter(at, self.interpreter.call)
+                        at = self._jump(at, self._enter(at, self.interpreter.call))
                         continue
                     if self.interpreter.returns:
                         if not self._levels:
@@ -103,7 +105,7 @@ class ProgramRun:
                                 "again, without end: it is read once",
                                 *self._end(at, "M99"),
                             ]
-                        at = self._leave()
+                        at = self._jump(at, self._leave())
                         continue
             at += 1
         return self._end(len(self.lines) - 1, "the file")
@@ -180,6 +182,10 @@ class ProgramRun:
             raise self._fail(at, f"M98 calls {name}, the main program itself", column=call.column)
         self._levels.append(_Level(name, first, at + 1, repeats - 1))
         return first
+
+    def _jump(self, at: int, to: int) -> int:
+        self.jumps.append(Jump(len(self.interpreter.recorder), at + 1, to))
+        return to
 
     def _block_numbered(self, at: int, call: Call) -> int:
         """The line (from 0) of the block with M97's N number. Raises `InputError` unless there is one."""
