@@ -188,6 +188,82 @@ def test_divided_moves_stay_within_the_tolerance_of_the_true_curve(tmp_path_fact
     np.testing.assert_array_equal(moves.start[1:], moves.end[:-1])
 
 
+OFFSET_HEAD = """
+[kinematics]
+type = "head-head"
+tcp = false
+[kinematics.primary]
+letter = "C"
+pivot_mm = [30, 0, 0]
+[kinematics.secondary]
+letter = "B"
+axis = "y"
+pivot_mm = [0, -15, 120]
+"""
+HEAD_TABLE = """
+[kinematics]
+type = "head-table"
+tcp = false
+points = "program"
+[kinematics.head]
+letter = "B"
+pivot_mm = [12, 0, 120]
+[kinematics.table]
+letter = "C"
+point_mm = [40, 30, 0]
+"""
+TOOL_9 = "[[tools]]\nnumber = 9\nlength_mm = 80\n"
+
+
+def offset_head_part(x, y, z, b, c):
+    """The chain of `OFFSET_HEAD` by links: from C's axis to B's, from B's to the tip, 80 + 120 below it."""
+    to_c = np.array([x + 30, y, z + 80.0])  # C's axis rides with the linear axes
+    to_b, to_tip = np.array([-30.0, -15.0, 120.0]), np.array([0.0, 15.0, -200.0])
+    turn_c, turn_b = about("z", c, (0, 0, 0))[:3, :3], about("y", b, (0, 0, 0))[:3, :3]
+    return to_c + turn_c @ (to_b + turn_b @ to_tip), turn_c @ turn_b @ [0, 0, 1]
+
+
+def head_table_part(x, y, z, b, c):
+    turn = about("y", b, (0, 0, 0))[:3, :3]
+    tip = np.array([x + 12, y, z + 200.0]) + turn @ [-12.0, 0.0, -200.0]
+    table = about("z", c, (40, 30, 0))
+    return (table @ [*tip, 1.0])[:3], table[:3, :3] @ turn @ [0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("machine", "true_part"), [(OFFSET_HEAD, offset_head_part), (HEAD_TABLE, head_table_part)], ids=["head", "mixed"]
+)
+@settings(max_examples=25, deadline=None)
+@given(blocks=st.lists(words, min_size=2, max_size=5))
+def test_divided_moves_of_heads_stay_within_the_tolerance_too(tmp_path_factory, machine, true_part, blocks):
+    path = tmp_path_factory.mktemp("control") / "control.toml"
+    path.write_text(machine + TOOL_9)
+    text = "T9 M6\n" + "\n".join(f"G1 F500 X{x} Y{y} Z{z} B{b} C{c}" for x, y, z, b, c in blocks)
+    moves = parse_program(text + "\nG1 X1000", controller=read_controller(path)).moves
+    previous = np.zeros(5)
+    for line, block in enumerate(blocks, 2):
+        rows = np.flatnonzero(moves.line == line)
+        if not len(rows):
+            assert np.allclose(block, previous)
+            continue
+        nodes = 1e3 * np.concatenate([moves.start[rows[:1], :3], moves.end[rows, :3]])
+        for u in np.linspace(0.0, 1.0, 31):
+            true, axis = true_part(*(previous + u * (np.array(block) - previous)))
+            assert distance_to_polyline(true, nodes) <= TOLERANCE_MM + 1e-9
+        np.testing.assert_allclose(nodes[-1], true, atol=1e-8)
+        np.testing.assert_allclose(axes_of(moves.end[rows[-1], 3:]), axis, atol=1e-8)
+        previous = np.array(block)
+
+
+def test_moves_recovered_in_portions_are_the_same(control, monkeypatch):
+    text = hemisphere_program(40, 4).replace("M30", "G4 P1\nG93\nC900 F2\nG94\nG0 X20 Y-5 A0\nG93 G1 C0 F2\nX9 F3\nM30")
+    whole = parse_program(text, controller=control(AC)).moves
+    monkeypatch.setattr("toolpath_stiff.nc.posted_moves.MOVES_AT_A_TIME", 1)
+    portions = parse_program(text, controller=control(AC)).moves
+    for name in ("line", "motion", "start", "end", "feed", "dwell", "tool"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(portions, name))
+
+
 def distance_to_polyline(point: np.ndarray, nodes: np.ndarray) -> float:
     start, along = nodes[:-1], np.diff(nodes, axis=0)
     length = np.maximum(np.einsum("ni,ni->n", along, along), 1e-300)

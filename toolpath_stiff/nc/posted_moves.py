@@ -1,21 +1,14 @@
-"""Tool tip and tool axis on the part, from the machine axes that a program was posted for. SI.
+"""Moves of the tool on the part, from those of the machine that a program was posted for. SI.
 
-The chain runs from the tool to the work. With all rotary axes at 0 the tip stands at the numbers X of the linear axes,
-its axis along +z, and part and machine coordinates are one. Each rotary axis then turns tip q and axis k by its angle t
-about its line, which has the direction n and goes through c:
-
-    q' = c + R(n, t) (q - c),    k' = R(n, t) k,    R right-handed (ISO 841: the tool against the work)
-
-Heads first, from the spindle back to the column: their lines ride with the linear axes, c = X + pivot + L z with L the
-tool's length from the gauge line. Then tables, from the base to the work: c stays. It is the forward kinematics of
-R.-S. Lee, C.-H. She, Int J Adv Manuf Technol 13 (1997) 658-665, written with rotations about lines.
+Where rotary axes turn, a straight move of the axes is a curve on the part: it is divided. `posted_chain` has the
+kinematics.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +16,8 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.curves import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves
-from toolpath_stiff.nc.posted import HEAD, LETTERS, PostedKinematics, RotaryAxis
+from toolpath_stiff.nc.posted import HEAD, LETTERS, PostedKinematics
+from toolpath_stiff.nc.posted_chain import line_point, roll_pitch, tool_poses, turned
 from toolpath_stiff.units import deg_from_rad, mm_from_m, rad_from_deg
 
 FloatArray = NDArray[np.float64]
@@ -32,69 +26,9 @@ BoolArray = NDArray[np.bool_]
 
 AXIS_STEP = rad_from_deg(1.0)  # largest turn of the rotary axes in one piece
 SAME_PLACE = 1e-12  # m and rad: rounding, not motion
-UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
 MOST_PIECES = 10_000_000
+MOVES_AT_A_TIME = 50_000  # the columns in between are several times those of the moves
 HALF_TURN = math.pi * (1.0 + 1e-9)
-Z = np.array([0.0, 0.0, 1.0])
-
-
-@dataclass(frozen=True)
-class ToolPoses:
-    """Tips (n, 3) in m and unit vectors of the tool's axis (n, 3), tip to spindle, in part coordinates."""
-
-    tip: FloatArray
-    axis: FloatArray
-
-
-def tool_poses(
-    kinematics: PostedKinematics,
-    xyz: FloatArray,
-    abc: FloatArray,
-    tool_length: FloatArray | float = math.nan,
-    tip_held: BoolArray | bool = False,
-) -> ToolPoses:
-    """Where the tool stands on the part: the forward kinematics of the machine that a program was posted for.
-
-    Parameters
-    ----------
-    kinematics
-        With its tables' points in the coordinates of `xyz`.
-    xyz
-        (n, 3) m, X Y Z as programmed.
-    abc
-        (n, 3) rad, A B C as programmed.
-    tool_length
-        (n,) or one, m, from the spindle's gauge line to the tip; heads without tool centre point control alone need it.
-    tip_held
-        (n,) or one, whether tool centre point control is on where it is not for good (`kinematics.tcp`): X Y Z are the
-        tip's on the part.
-    """
-    held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(xyz),))
-    axis = np.tile(Z, (len(xyz), 1))
-    tip = np.array(xyz, dtype=float)
-    for rotary in kinematics.from_tool_to_work:
-        angle = abc[:, rotary.column]
-        axis = _turned(axis, rotary, angle)
-        if not kinematics.tcp:
-            center = _line_point(rotary, xyz, tool_length)
-            # Where nothing turns the numbers stay to their last digit, and a tool's unknown length does not matter.
-            turns = ~held & (angle != 0.0)
-            tip = np.where(turns[:, None], center + _turned(tip - center, rotary, angle), tip)
-    return ToolPoses(tip, axis)
-
-
-def roll_pitch(axis: FloatArray) -> FloatArray:
-    """Roll and pitch (n, 2), rad, of tool axes (n, 3) in their order, at a yaw of 0; see `tool_axis`.
-
-    Pitch runs on over half a turn, and stays what it was where the axis lies along y and has none.
-    """
-    i, j, k = axis.T
-    across = np.hypot(i, k)
-    pitch = np.arctan2(i, k)
-    known = np.where(across > UPRIGHT, np.arange(len(axis)), -1)
-    last = np.maximum.accumulate(known) if len(axis) else known
-    pitch = np.where(last >= 0, pitch[last], 0.0)
-    return np.stack([np.arctan2(-j, across), np.unwrap(pitch)], axis=1) + 0.0
 
 
 def recover_moves(
@@ -138,7 +72,8 @@ def recover_moves(
     moves = _shorter_way(moves, kinematics)
     held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(moves),))
     length = _lengths_at_heads(moves, kinematics, held, tool_lengths, name)
-    count = _pieces(moves, kinematics, held, length)
+    some = [slice(first, first + MOVES_AT_A_TIME) for first in range(0, len(moves), MOVES_AT_A_TIME)]
+    count = np.concatenate([_pieces(moves.take(rows), kinematics, held[rows], length[rows]) for rows in some])
     if count.sum() > MOST_PIECES:
         worst = int(moves.line[np.argmax(count)])
         raise InputError(
@@ -149,6 +84,26 @@ def recover_moves(
             file=name,
             line=worst,
         )
+    parts: list[Moves] = []
+    before: FloatArray | None = None
+    for rows in some:
+        part, before, waited = _divided(moves.take(rows), kinematics, held[rows], length[rows], count[rows], before)
+        if parts:  # a pause before the first move is none
+            parts[-1].dwell[-1] += waited
+        if len(part):
+            parts.append(part)
+    return _joined(parts) if parts else moves.take(slice(0, 0))
+
+
+def _divided(
+    moves: Moves,
+    kinematics: PostedKinematics,
+    held: BoolArray,
+    length: FloatArray,
+    count: IntArray,
+    before: FloatArray | None,
+) -> tuple[Moves, FloatArray, float]:
+    """Some moves on the part; the pose at their end, `before` of the next ones; the time before the first one, s."""
     move = np.repeat(np.arange(len(moves)), count + 1)
     step = np.arange(len(move)) - np.repeat(np.cumsum(count + 1) - (count + 1), count + 1)
     u = step / count[move]
@@ -158,12 +113,14 @@ def recover_moves(
     angles[last] = moves.end[:, 3:]
     found = tool_poses(kinematics, programmed, angles, length[move], held[move])
     pose = np.zeros((len(move), 6))
-    pose[:, :3] = _without_rounding(found.tip)
-    pose[:, 3:5] = _without_rounding(roll_pitch(found.axis))
+    pose[:, :3] = _without_rounding(found.tip, None if before is None else before[:3])
+    pitch = 0.0 if before is None else float(before[4])
+    pose[:, 3:5] = _without_rounding(roll_pitch(found.axis, pitch), None if before is None else before[3:5])
     start, end = np.flatnonzero(~last), np.flatnonzero(step > 0)
     pieces = _on_the_part(moves, kinematics, held, length, move[start], u[start])
     pieces = replace(pieces, start=pose[start], end=pose[end])
-    return _with_times(pieces, moves, move[start], count, last[end])
+    part, waited = _with_times(pieces, moves, move[start], count, last[end])
+    return part, pose[-1], waited
 
 
 def turns_far(moves: Moves, kinematics: PostedKinematics) -> list[tuple[int, str, float]]:
@@ -174,23 +131,6 @@ def turns_far(moves: Moves, kinematics: PostedKinematics) -> list[tuple[int, str
         far = np.flatnonzero((turn > HALF_TURN) & (moves.motion != RAPID) & (not rotary.rollover))
         found += [(int(moves.line[i]), rotary.letter, deg_from_rad(float(turn[i]))) for i in far]
     return sorted(found)
-
-
-def _turned(vectors: FloatArray, rotary: RotaryAxis, angle: FloatArray) -> FloatArray:
-    """Vectors (n, 3) turned by angles (n,) about the axis' direction: Rodrigues' formula."""
-    n = np.array(rotary.direction)
-    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    along = (vectors[:, 0] * n[0] + vectors[:, 1] * n[1] + vectors[:, 2] * n[2])[:, None] * n
-    return np.asarray(along + cos * (vectors - along) + sin * np.cross(n, vectors))
-
-
-def _line_point(rotary: RotaryAxis, xyz: FloatArray, tool_length: FloatArray | float) -> FloatArray:
-    """(n, 3) a point of the rotary axis at the numbers X Y Z of the linear axes."""
-    assert rotary.point is not None
-    if rotary.turns == HEAD:
-        reach = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(xyz),))
-        return np.asarray(xyz + np.array(rotary.point) + reach[:, None] * Z)
-    return np.broadcast_to(np.array(rotary.point), xyz.shape)
 
 
 def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> None:
@@ -276,23 +216,23 @@ def _bend(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> Flo
         rate = turning[:, rotary.column]
         head = rotary.turns == HEAD
         points = rides if head else ends
-        reach, turned = np.zeros(len(moves)), []
+        reach, there = np.zeros(len(moves)), []
         for point, pose in zip(points, (moves.start, moves.end), strict=True):
-            center = _line_point(rotary, np.zeros_like(point) if head else pose[:, :3], length)
+            center = line_point(rotary, np.zeros_like(point) if head else pose[:, :3], length)
             turns = (rate != 0.0) | (pose[:, 3 + rotary.column] != 0.0)
             # A head that stands upright may have a tool of unknown length.
             out = np.where(turns[:, None], point - center, 0.0)
             reach = np.maximum(reach, np.linalg.norm(np.cross(rotary.direction, out), axis=1))  # from the line
-            turned.append(np.where(turns[:, None], center + _turned(out, rotary, pose[:, 3 + rotary.column]), point))
+            there.append(np.where(turns[:, None], center + turned(out, rotary, pose[:, 3 + rotary.column]), point))
         # No point of the move is farther than half of it from one of its ends.
         reach = reach + (ride_speed if head else speed) / 2.0
         bend = bend + 2.0 * rate * (ride_speed if head else speed) + rate**2 * reach
         if head:
-            rides, ride_speed = turned, ride_speed + rate * reach
+            rides, ride_speed = there, ride_speed + rate * reach
             ends = [pose[:, :3] + ride for pose, ride in zip((moves.start, moves.end), rides, strict=True)]
             speed = linear + ride_speed
         else:
-            ends, speed = turned, speed + rate * reach
+            ends, speed = there, speed + rate * reach
     return bend
 
 
@@ -309,11 +249,12 @@ def _linear_bounds(moves: Moves) -> tuple[FloatArray, FloatArray]:
     return speed, bend
 
 
-def _without_rounding(points: FloatArray) -> FloatArray:
+def _without_rounding(points: FloatArray, before: FloatArray | None) -> FloatArray:
     """Points (n, k) in which a step below `SAME_PLACE` is none: the point before stands in its place."""
+    points = np.concatenate([points[:1] if before is None else before[None], points])
     moved = np.ones(len(points), dtype=bool)
     moved[1:] = (np.abs(np.diff(points, axis=0)) > SAME_PLACE).any(axis=1)
-    return points[np.maximum.accumulate(np.where(moved, np.arange(len(points)), 0))]
+    return points[np.maximum.accumulate(np.where(moved, np.arange(len(points)), 0))[1:]]
 
 
 def _on_the_part(
@@ -352,8 +293,11 @@ def _on_the_part(
     )
 
 
-def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, last: BoolArray) -> Moves:
-    """The pieces that move tip or tool axis, with feeds and dwells that keep the time of every move."""
+def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, last: BoolArray) -> tuple[Moves, float]:
+    """The pieces that move tip or tool axis, with feeds and dwells that keep the time of every move.
+
+    And the time, s, before the first of them.
+    """
     length, turn = move_lengths(moves), _turning(moves).max(axis=1)
     share = (np.where(length > 0.0, length, turn) / moves.feed / count)[move]  # s; nan: a rapid
     way = move_lengths(pieces)
@@ -363,7 +307,9 @@ def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, la
     feed = np.where(same, pieces.feed, way / share)
     kept = way > 0.0
     waits = np.where(last, moves.dwell[move], 0.0) + np.where(kept, 0.0, np.nan_to_num(share))
-    before = np.cumsum(kept) - 1  # a pause before the first move is none
-    dwell = np.zeros(int(kept.sum()))
-    np.add.at(dwell, before[before >= 0], waits[before >= 0])
-    return replace(replace(pieces, feed=feed).take(kept), dwell=dwell)
+    dwell = np.bincount(np.cumsum(kept), waits, int(kept.sum()) + 1).astype(float)
+    return replace(replace(pieces, feed=feed).take(kept), dwell=dwell[1:]), float(dwell[0])
+
+
+def _joined(parts: list[Moves]) -> Moves:
+    return Moves(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Moves)})
