@@ -84,15 +84,16 @@ def recover_moves(
             file=name,
             line=worst,
         )
-    parts: list[Moves] = []
+    found, filled = _room(moves, int(count.sum())), 0
     before: FloatArray | None = None
     for rows in some:
         part, before, waited = _divided(moves.take(rows), kinematics, held[rows], length[rows], count[rows], before)
-        if parts:  # a pause before the first move is none
-            parts[-1].dwell[-1] += waited
-        if len(part):
-            parts.append(part)
-    return _joined(parts) if parts else moves.take(slice(0, 0))
+        if filled:  # a pause before the first move is none
+            found.dwell[filled - 1] += waited
+        for column in fields(Moves):
+            getattr(found, column.name)[filled : filled + len(part)] = getattr(part, column.name)
+        filled += len(part)
+    return found.take(slice(0, filled))
 
 
 def _divided(
@@ -311,5 +312,7 @@ def _with_times(pieces: Moves, moves: Moves, move: IntArray, count: IntArray, la
     return replace(replace(pieces, feed=feed).take(kept), dwell=dwell[1:]), float(dwell[0])
 
 
-def _joined(parts: list[Moves]) -> Moves:
-    return Moves(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Moves)})
+def _room(like: Moves, n: int) -> Moves:
+    """Columns of n rows, to be filled."""
+    columns = {f.name: getattr(like, f.name) for f in fields(Moves)}
+    return Moves(**{name: np.empty((n, *column.shape[1:]), column.dtype) for name, column in columns.items()})
