@@ -150,13 +150,14 @@ def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> Non
 
 def _shorter_way(moves: Moves, kinematics: PostedKinematics) -> Moves:
     """Axes with roll-over go to their angle the shorter way; where they stand then is the same."""
+    rolling = [3 + axis.column for axis in kinematics.axes if axis.rollover]
+    if not rolling:
+        return moves
     end = moves.end.copy()
-    for rotary in kinematics.axes:
-        if rotary.rollover:
-            column = 3 + rotary.column
-            turn = end[:, column] - moves.start[:, column]
-            far = np.abs(turn) > math.pi
-            end[far, column] -= (2.0 * math.pi * np.round(turn / (2.0 * math.pi)))[far]
+    for column in rolling:
+        turn = end[:, column] - moves.start[:, column]
+        far = np.abs(turn) > math.pi
+        end[far, column] -= (2.0 * math.pi * np.round(turn / (2.0 * math.pi)))[far]
     return replace(moves, end=end)
 
 

@@ -107,7 +107,7 @@ def on_the_part(
     """
     placed = _points_at(kinematics, zero, name)
     known, warnings, assumptions = _known_points(moves, placed, zero, name)
-    kept = moves.take(known)
+    kept = moves if known.all() else moves.take(known)
     held = np.full(len(moves), kinematics.tcp)
     for first, on in tip_held:
         held[first:] = on or kinematics.tcp
