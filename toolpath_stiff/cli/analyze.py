@@ -33,7 +33,7 @@ example:
 
 files written to --out:
   samples.csv   every sample: line, position, stiffness, strut lengths, margin to the nearest limit
-  summary.json  the figures, what was assumed, what the program holds that was not acted upon
+  summary.json  the figures, those of each tool and operation too, what was assumed, what was not acted upon
   path.png      three views of the path coloured by stiffness
   profile.png   stiffness along the path
   report.html   the path in 3-D, linked to profile and program text; one file, no network
