@@ -71,6 +71,26 @@ def test_random_programs_read_the_same(seed, write, tmp_path):
 
 
 @needs_rs274
+@pytest.mark.parametrize(
+    "after",
+    [
+        "G0 X4\nG0 Y3 Z3",
+        "G53 G0 X3\nG43 H2\nG0 Y5\nG0 Z3",
+        "T1 M6\nG0 X4\nG43 H1 Y3 Z3",
+        "G28 Z8\nG0 X4\nZ3",
+        "M61 Q1\nG0 X4\nZ3",
+    ],
+)
+def test_a_length_that_changes_just_before_a_tool_change(after):
+    """rs274 forgets at M6 what the change did to Z's number."""
+    tools = {number: ToolEntry(number, 25.0 * number, 6.0) for number in (1, 2, 3)}
+    text = f"G21 G90 F100\nG0 X1 Z40\nG43 H3\nG1 X2\nG49\nT2 M6\n{after}\nG1 X9\n"
+    assert_same(parse_program(text, tools=tools).moves, linuxcnc(text, tools=tools).moves)
+    with pytest.raises(InputError, match="the tool length changed between the last move and M6"):
+        linuxcnc(text.replace("T2 M6", "T2 M6\nG91 G0 Z5\nG90"), tools=tools)
+
+
+@needs_rs274
 def test_variables_loops_and_subprograms():
     """A staircase of three steps from a sub that stands before the main part: positions and lines by hand."""
     program = linuxcnc(

@@ -30,6 +30,7 @@ CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
 MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
+DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
 LENGTH_UNKNOWN_BELOW_MM = -9e4  # see tables.UNKNOWN_LENGTH_MM
 # Four decimals are printed of point, offset and tool length: two units in the last place, in the unit in force.
@@ -76,6 +77,8 @@ class Follower:
     cycle: bool = False
     frame_changed: bool = False
     turned_by: int = 0
+    raised: float = 0.0  # mm that changes of length since the last move added to Z's number
+    lost: float = 0.0  # the same, where a tool change has made rs274 forget them
     moves_of_line: int = 0
     from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
 
@@ -159,6 +162,7 @@ class Follower:
         if self.renamed and "G43" in words and "H" not in words and "G43.1" not in words:
             raise self.fail(self.reading, "G43 after M61: LinuxCNC's rs274 takes the length of the tool before", "H")
         self.position = [*self.position[:2], self.position[2] + self.tool_z - z, *self.position[3:]]
+        self.raised += self.tool_z - z
         self.tool_z = z
         cancelled = z == 0.0 and "G49" in words
         self.tool_length = math.nan if cancelled or not self.reading else z
@@ -197,6 +201,7 @@ class Follower:
         place = int(_numbers(inner)[0])
         self.tool = self.numbers[place - 1] if place else 0
         self.renamed = False
+        self.lost, self.raised = self.lost + self.raised, 0.0
 
     def _on_change_tool_number(self, inner: str) -> None:
         self._on_change_tool(inner)
@@ -284,6 +289,9 @@ class Follower:
     def _move(self, motion: int, printed: Vector, arc: tuple[int, int, int, float, float, float] | None) -> None:
         """One move to a point as printed; an arc with its axes, centre and turns."""
         end = self.world(printed)
+        if self.lost and self.line:
+            self._find_height(end)
+        self.raised = 0.0
         start, self.position = self.position, end
         if self.line == 0:  # a move of ours, before the program
             self.frame_changed = False
@@ -349,6 +357,23 @@ class Follower:
                 "X and Y in the move that follows",
             )
         self.turned_by = 0
+
+    def _find_height(self, end: Vector) -> None:
+        """Until a move names Z, rs274 prints the number that Z had before the length changed."""
+        words = self._words(self.line)
+        named = "Z" in AXIS_WORD.findall(words)
+        modes = [mode for line in self.lines[: self.line] for mode in DISTANCE_MODE.findall(line.plain)]
+        if self.cycle or (named and modes and modes[-1] == "1") or (HOME_MOVE.search(words) and not named):
+            raise self.fail(
+                self.line,
+                "a move from where LinuxCNC's rs274 no longer knows the height: the tool length changed between the "
+                "last move and M6",
+                "G90 G0 with Z before it",
+            )
+        if named:
+            self.lost = 0.0
+        else:
+            end[2] += self.lost
 
     def _machine_flags(self, start: Vector, end: Vector) -> tuple[bool, bool]:
         """Whether start and end were given in machine coordinates (G53, G28, G30), axis by axis as in `Frames`."""
