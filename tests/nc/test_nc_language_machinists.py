@@ -124,6 +124,12 @@ def test_an_m97_that_cannot_be_followed_is_refused(text, dialect, message):
         parse_program(text, controller=Controller(dialect_named(dialect)))
 
 
+def test_m61_names_the_tool_and_leaves_what_is_selected():
+    """As rs274 does: M6 takes the tool of the last T."""
+    program = parse_program("F100 T2\nM61 Q5\nG1 X1\nM6\nG1 X2\nM2\n")
+    assert list(program.moves.tool) == [5, 2]
+
+
 SWITCHED = "G1 X1 F100\n/X2\n/1 X3\n/2 X4\n/ 3 X5\nM30\n"
 
 

@@ -19,9 +19,10 @@ from toolpath_stiff.nc.codes import (
 )
 from toolpath_stiff.nc.dialects import GENERIC, Dialect
 from toolpath_stiff.nc.moves import Unsupported
-from toolpath_stiff.nc.words import Block, Word
+from toolpath_stiff.nc.words import POLAR, Block, Word
 
 AXES = "XYZABC"
+POINT_WORDS = (*AXES, *POLAR)
 FARTHEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
 
 
@@ -77,7 +78,7 @@ class BlockReader:
         for letter in ("U", "V", "W"):
             if letter in self.values:
                 raise self.fail(self.values[letter], "moves an axis that this machine does not have", "X Y Z A B C")
-        for letter in AXES:
+        for letter in (*AXES, "@"):
             if letter in self.values and abs(self.values[letter].value) > FARTHEST_MM:
                 raise self.fail(self.values[letter], "is beyond 100 m", f"at most {FARTHEST_MM:g}")
         return codes

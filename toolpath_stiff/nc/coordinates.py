@@ -101,6 +101,8 @@ class Coordinates(BlockReader):
 
     def _point_words(self) -> dict[int, float]:
         """As `_axis_words`, of a block that moves in program coordinates: under G16 the second one is an angle."""
+        if self.has("@") or self.has("^"):
+            return self._at_radius_and_angle()
         if self.polar is None:
             words = self._axis_words()
             if self.unsettled:
@@ -111,6 +113,31 @@ class Coordinates(BlockReader):
         words = self._axis_words()
         if angle is not None:
             words[second] = angle
+        return words
+
+    def _at_radius_and_angle(self) -> dict[int, float]:
+        """LinuxCNC's polar words: @ the radius, ^ the angle about the program zero, of the XY plane.
+
+        As measured on `rs274` 2.9: the one that is absent is that of the present point; in G91 both add to it.
+        """
+        word = self.values["@" if self.has("@") else "^"]
+        if self.dialect.increments:
+            raise self.fail(word, f"is not a word of the dialect {self.dialect.name}", "X and Y, or G16")
+        if self.plane != "G17" or self.polar is not None or self.unsettled or self.frames.rotation is not None:
+            raise self.fail(word, "is a polar word outside of G17, or under G16 or a rotation", "X and Y")
+        if self.has("X") or self.has("Y"):
+            raise self.fail(word, "is a polar word beside X or Y", "either")
+        here = self.frames.to_program(self.frames.position)
+        radius, angle = self.take("@"), self.take("^")
+        present = math.hypot(here[0], here[1])
+        if present < SAME_PLACE_MM and (radius is None or angle is None or not self.absolute):
+            raise self.fail(word, "counts from the present point, which is the program zero", "both @ and ^, in G90")
+        at, turn = (0.0, 0.0) if self.absolute else (present, math.atan2(here[1], here[0]))
+        at = present if radius is None else at + radius * self.length_scale
+        turn = math.atan2(here[1], here[0]) if angle is None else turn + math.radians(angle)
+        words = self._axis_words()
+        for axis, value in enumerate((at * math.cos(turn), at * math.sin(turn))):
+            words[axis] = value if self.absolute else value - here[axis]
         return words
 
     def _cartesian(self, here: list[float], words: dict[int, float]) -> list[float]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from toolpath_stiff.nc.blocks import AXES, Codes
+from toolpath_stiff.nc.blocks import POINT_WORDS, Codes
 from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, ARCS, CYCLES, M_SUBPROGRAM, MOTION, WORK_OFFSETS
 from toolpath_stiff.nc.dialects import GENERIC, SECONDS, Dialect
 from toolpath_stiff.nc.frames import Frames
@@ -185,7 +185,7 @@ class Interpreter(Zeros):
 
     def _drop_m_parameters(self, codes: Codes) -> None:
         """M codes may carry P, Q, E words; unless the block moves, these are theirs."""
-        moves = codes.get(MOTION) is not None or codes.once or any(self.has(a) for a in AXES)
+        moves = codes.get(MOTION) is not None or codes.once or any(self.has(a) for a in POINT_WORDS)
         if not moves:
             for letter in "PQERS":
                 self.take(letter)
@@ -224,14 +224,13 @@ class Interpreter(Zeros):
         number = self.take("T")
         if number is not None:
             self.selected = int(number)
-        change = codes.get("M tool change")
+        change, chosen = codes.get("M tool change"), None
         if change == "M61":
             chosen = self.take("Q")
             if chosen is None or chosen < 0 or chosen != int(chosen):
                 raise self.fail(codes.groups["M tool change"][1], "needs the tool number", "Q with a whole number")
-            self.selected = int(chosen)
-        if change is not None:
-            self.tool = self.selected
+        if change is not None:  # M61 leaves alone what T has selected for the next M6
+            self.tool = self.selected if chosen is None else int(chosen)
             self.renamed = change == "M61"
             self.height_lost = self.height_lost or self.length_changed
 
@@ -346,10 +345,10 @@ class Interpreter(Zeros):
                 kept = ("level", "unit") if self.motion in CYCLES else ()
                 self.sticky = {name: self.sticky[name] for name in kept if name in self.sticky}
             self.motion = None if given[0] == "G80" else given[0]
-        axes = any(self.has(letter) for letter in AXES)
+        axes = any(self.has(letter) for letter in POINT_WORDS)
         if self.motion is None:
             if axes:
-                first = next(self.values[a] for a in AXES if self.has(a))
+                first = next(self.values[a] for a in POINT_WORDS if self.has(a))
                 raise self.fail(first, "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it")
             if machine_word:
                 raise self.fail(machine_word, "without G0 or G1")

@@ -18,8 +18,9 @@ from toolpath_stiff.errors import InputError
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 # ASCII digits alone: the digits of other scripts are no numbers to any control.
-WORD = re.compile(rf"([A-Z])({NUMBER})(E[+-]?\d+)?", re.ASCII)
-LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTUVWXYZ")
+WORD = re.compile(rf"([A-Z@^])({NUMBER})(E[+-]?\d+)?", re.ASCII)
+POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
+LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTUVWXYZ" + POLAR)
 COMMENT = re.compile("[();]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
@@ -199,9 +200,8 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
     elif character == "[" or follower == "[":
         found, expected = "expressions ([...]) are not supported", "numbers"
         hint = "post the program without expressions, or give --interpreter linuxcnc"
-    elif character in "@^":
-        found, expected = f"polar coordinates ({character}) are not supported", "X, Y, Z words"
-        hint = "post the program in Cartesian coordinates"
+    elif character in POLAR:
+        found, expected = f"the polar word {character!r} has no number", f"a number after {character}"
     elif character == "%":
         found, expected = "`%` among other words", "`%` alone on its line"
     return InputError(found, expected=expected, hint=hint, file=name, line=line, column=column)
@@ -214,12 +214,14 @@ def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...
     from pygcode.exceptions import GCodeWordStrError
     from pygcode.words import text2words
 
+    all_words, words = words, [word for word in words if word.letter not in POLAR]
+
     try:
         read = list(text2words(" ".join([_plain(word) for word in words])))
     except GCodeWordStrError:
         read = []
     if [(got.letter, float(got.value)) for got in read] == [(word.letter, word.value) for word in words]:
-        return tuple(words)
+        return tuple(all_words)
     for word in words:  # one at a time, to find the one that pygcode refuses
         try:
             (alone,) = text2words(_plain(word))
@@ -233,7 +235,7 @@ def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...
                 line=line,
                 column=word.column,
             )
-    return tuple(words)
+    return tuple(all_words)
 
 
 def _plain(word: Word) -> str:

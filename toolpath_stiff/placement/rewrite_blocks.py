@@ -12,7 +12,7 @@ from toolpath_stiff.nc.codes import ARCS, CYCLES
 from toolpath_stiff.nc.interpreter import USES_AXES
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.recorder import Arc
-from toolpath_stiff.nc.words import Block, read_block
+from toolpath_stiff.nc.words import POLAR, Block, read_block
 from toolpath_stiff.placement.rewrite_controls import OFF, Controls
 from toolpath_stiff.placement.rewrite_pieces import LEAN, LEVER, chords, lean, points_between
 from toolpath_stiff.placement.rewrite_words import FEED_DECIMALS, SAME, LineEdit
@@ -56,8 +56,10 @@ class Rewriter(Controls):
         if not source.segments:
             return [self._emit(edit)]
         last = source.segments[-1]
-        if source.polar is not None:
-            raise self._refusal("polar words (G16) cannot be rewritten", "post the program in Cartesian coordinates")
+        if source.polar is not None or any(word.letter in POLAR for word in source.block.words):
+            raise self._refusal(
+                "polar words (G16, @, ^) cannot be rewritten", "post the program in Cartesian coordinates"
+            )
         if "G53" in once:
             self._note("moves of G53 keep their machine coordinates")
         elif any(code in USES_AXES for code in once):

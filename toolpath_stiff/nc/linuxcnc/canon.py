@@ -30,6 +30,7 @@ CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
 MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
+POLAR = frozenset("@^")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
 LENGTH_UNKNOWN_BELOW_MM = -9e4  # see tables.UNKNOWN_LENGTH_MM
@@ -366,8 +367,7 @@ class Follower:
         if self.cycle or (named and modes and modes[-1] == "1") or (HOME_MOVE.search(words) and not named):
             raise self.fail(
                 self.line,
-                "a move from where LinuxCNC's rs274 no longer knows the height: the tool length changed between the "
-                "last move and M6",
+                "a move from a height that rs274 has lost: the tool length changed between the last move and M6",
                 "G90 G0 with Z before it",
             )
         if named:
@@ -383,6 +383,7 @@ class Follower:
         was = any(self.from_machine[of])
         words = self._words(self.line)
         named = {AXES.index(letter) for letter in AXIS_WORD.findall(words)}
+        named |= {0, 1} if POLAR & set(words) else set()
         machine = bool(MACHINE_MOVE.search(words))
         if HOME_MOVE.search(words):  # first to the intermediate point, then home
             machine = self.moves_of_line > 0
