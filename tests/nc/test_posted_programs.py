@@ -109,6 +109,46 @@ def ac_table_words(tip: np.ndarray, axis: np.ndarray, before: float) -> tuple[fl
     return x, y, z, a, c
 
 
+def bc_head_words(tip: np.ndarray, axis: np.ndarray, before: float) -> tuple[float, float, float, float, float]:
+    """X Y Z B C of the machine of `BC_HEAD` with its tool of 100 mm: the pivot is 250 mm up the tool's axis.
+
+    X Y Z are the tip's as it would be under the pivot.
+    """
+    b = math.degrees(math.acos(np.clip(axis[2], -1.0, 1.0)))
+    c = math.degrees(math.atan2(axis[1], axis[0])) if b > 1e-9 else before
+    x, y, z = tip + 250.0 * axis - [0, 0, 250.0]
+    return x, y, z, b, c
+
+
+locations = st.tuples(
+    *[st.floats(-80.0, 80.0)] * 3, st.floats(0.0, 1.5), st.floats(-math.pi, math.pi)
+)  # tip, and the axis' angles from the pole and about it
+
+
+@pytest.mark.parametrize(
+    ("machine", "inverse", "letters"),
+    [(AC, ac_table_words, "AC"), (BC_HEAD, bc_head_words, "BC")],
+    ids=["table", "head"],
+)
+@settings(max_examples=40, deadline=None)
+@given(found=st.lists(locations, min_size=1, max_size=6))
+def test_cutter_locations_come_back_from_their_posted_words(tmp_path_factory, machine, inverse, letters, found):
+    path = tmp_path_factory.mktemp("control") / "control.toml"
+    path.write_text(machine)
+    lines, tips, axes, before = ["T1 M6", "G0 X500 Y500 Z500"], [], [], 0.0
+    for x, y, z, polar, azimuth in found:
+        tips.append(np.array([x, y, z]))
+        axes.append([math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)])
+        numbers = inverse(tips[-1], np.array(axes[-1]), before)
+        before = numbers[-1]
+        lines.append("G1 F1000 " + " ".join(f"{w}{n:.9f}" for w, n in zip("XYZ" + letters, numbers, strict=True)))
+    moves = parse_program("\n".join(lines), controller=read_controller(path)).moves
+    for line, tip, axis in zip(range(3, 3 + len(found)), tips, axes, strict=True):
+        rows = np.flatnonzero(moves.line <= line)  # a location that repeats the one before has no row
+        np.testing.assert_allclose(1e3 * moves.end[rows[-1], :3], tip, atol=1e-6)
+        np.testing.assert_allclose(axes_of(moves.end[rows[-1], 3:]), axis, atol=1e-8)
+
+
 RADIUS = 40.0
 
 

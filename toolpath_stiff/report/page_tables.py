@@ -64,7 +64,7 @@ def _figures(summary: Mapping[str, Any]) -> str:
         ("Samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
         ("Program zero (G54) mm, deg", f"{origin} ({summary['origin_source']})"),
         ("Program read by", READERS[summary["interpreter"]]),
-        ("Posted for", summary["kinematics"] or "the platform (A, B, C: roll, pitch, yaw)"),
+        *([("Posted for", f"{summary['kinematics']}; tool tip and axis recovered")] if summary["kinematics"] else []),
         ("Effects", ", ".join(summary["effects"]) or "none"),
         ("Outside the strut law", f"{summary['extrapolated_share']:.1%} of the cutting samples"),
         ("Out of reach", f"{number(summary['out_of_reach_samples'])} cutting samples"),
