@@ -130,6 +130,13 @@ def test_m61_names_the_tool_and_leaves_what_is_selected():
     assert list(program.moves.tool) == [5, 2]
 
 
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_h0_is_no_offset_there(dialect):
+    text = "G90 F100. G10 L10 P1 R20.\nG43 H1\nG1 X1. Z1.\nG43 H0 Z2.\nM30\n"
+    moves = parse_program(text, controller=Controller(dialect_named(dialect))).moves
+    assert moves.start[1, 2] == pytest.approx(0.021) and moves.end[1, 2] == pytest.approx(0.002)
+
+
 SWITCHED = "G1 X1 F100\n/X2\n/1 X3\n/2 X4\n/ 3 X5\nM30\n"
 
 

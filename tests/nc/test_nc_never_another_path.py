@@ -20,6 +20,7 @@ REFUSED = {
         "between G20 and G21",
     ),
     "G43 after M61": ("F100 T1 M6\nM61 Q2\nG43 G1 X1 Z1", "without H after M61"),
+    "H0": ("F100 T1 M6\nG43 H0 G1 X1 Z1", "is no offset on some controls"),
     "a length in the other unit": ("F100 G43 H1\nG20 F5 G1 X1", "G49 before it"),
     "a length changed just before M6": ("F100 G1 X2\nG43 H3\nT2 M6\nG1 X4", "a cut before any Z"),
     "two codes that act once": ("F100 G1 X2\nG92.1 Z-9 G52\nG1 X3 Z3", "one of them in a block"),

@@ -291,6 +291,10 @@ class Interpreter(Zeros):
     def _table_length(self, word: Word) -> float:
         """Length of the tool that G43 names by H, or of the one in the spindle."""
         number = self.take("H")
+        if number == 0:
+            if self.dialect.increments:
+                return math.nan
+            raise self.fail(self.values["H"], "is no offset on some controls, on LinuxCNC that of its tool", "H or G49")
         tool = self.tool if number is None else int(number)
         if number is None and self.renamed:
             raise self.fail(
