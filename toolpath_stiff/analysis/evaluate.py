@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-BLOCK = 65536  # poses at a time: some 100 MB of work arrays
+BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
 Progress = Callable[[int, int], None]
 
 

@@ -43,12 +43,11 @@ def weakest_places(analysis: Analysis, count: int = 3) -> list[int]:
         return []
     s, line = analysis.samples.s, analysis.samples.line
     apart = (s[rows[-1]] - s[rows[0]]) / 20.0
-    order = rows[np.argsort(analysis.at.stiffness[rows], kind="stable")]
     chosen: list[int] = []
-    while len(order) and len(chosen) < count:
-        best = int(order[0])
+    while len(rows) and len(chosen) < count:
+        best = int(rows[np.argmin(analysis.at.stiffness[rows])])
         chosen.append(best)
-        order = order[(np.abs(s[order] - s[best]) >= apart) & (line[order] != line[best])]
+        rows = rows[(np.abs(s[rows] - s[best]) >= apart) & (line[rows] != line[best])]
     return chosen
 
 

@@ -130,8 +130,12 @@ def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
     fresh = np.concatenate([[True], (np.diff(column) != 0) | (missing[1:] != missing[:-1])])
     first = np.flatnonzero(fresh)
     last = np.append(first[1:], len(x)) - 1
-    by_value = np.lexsort((y, np.cumsum(fresh)))  # ascending within each run, the runs in order
-    kept = np.concatenate([first, last, by_value[first], by_value[last]])
+    run = np.cumsum(fresh) - 1
+    lowest = np.flatnonzero(y == np.minimum.reduceat(y, first)[run])
+    highest = np.flatnonzero(y == np.maximum.reduceat(y, first)[run])
+    lowest = lowest[np.diff(run[lowest], prepend=-1) != 0]  # the first of equals
+    highest = highest[np.diff(run[highest], append=-1) != 0]  # the last of equals
+    kept = np.concatenate([first, last, lowest, highest])
     rows = np.unique(kept)
     return np.asarray(rows[~missing[rows] | fresh[rows]])
 
