@@ -37,6 +37,8 @@ class Coordinates(BlockReader):
     ----------
     polar
         The last programmed radius (mm) and angle (degrees), nan before there is one; None: Cartesian words (G15).
+    spoke
+        The polar words (@, ^) of the block: the first one, radius and angle.
     unsettled
         "G68", "G69" or "G10", whichever turned the numbers of the present X and Y last, until both are programmed.
     """
@@ -48,6 +50,7 @@ class Coordinates(BlockReader):
         self.absolute, self.inch = True, False
         self.polar: list[float] | None = None
         self.unsettled: str | None = None
+        self.spoke: tuple[Word, float | None, float | None] | None = None
 
     @property
     def length_scale(self) -> float:
@@ -101,6 +104,7 @@ class Coordinates(BlockReader):
 
     def _point_words(self) -> dict[int, float]:
         """As `_axis_words`, of a block that moves in program coordinates: under G16 the second one is an angle."""
+        self.spoke = None
         if self.has("@") or self.has("^"):
             return self._at_radius_and_angle()
         if self.polar is None:
@@ -127,18 +131,23 @@ class Coordinates(BlockReader):
             raise self.fail(word, "is a polar word outside of G17, or under G16 or a rotation", "X and Y")
         if self.has("X") or self.has("Y"):
             raise self.fail(word, "is a polar word beside X or Y", "either")
+        self.spoke = (word, self.take("@"), self.take("^"))
+        return {**self._axis_words(), **self._xy_of_spoke()}
+
+    def _xy_of_spoke(self) -> dict[int, float]:
+        """X and Y, as words in the distance mode in force, of the block's polar words at the present point."""
+        assert self.spoke is not None
+        word, radius, angle = self.spoke
         here = self.frames.to_program(self.frames.position)
-        radius, angle = self.take("@"), self.take("^")
-        present = math.hypot(here[0], here[1])
+        present, turn = math.hypot(here[0], here[1]), math.atan2(here[1], here[0])
         if present < SAME_PLACE_MM and (radius is None or angle is None or not self.absolute):
             raise self.fail(word, "counts from the present point, which is the program zero", "both @ and ^, in G90")
-        at, turn = (0.0, 0.0) if self.absolute else (present, math.atan2(here[1], here[0]))
-        at = present if radius is None else at + radius * self.length_scale
-        turn = math.atan2(here[1], here[0]) if angle is None else turn + math.radians(angle)
-        words = self._axis_words()
-        for axis, value in enumerate((at * math.cos(turn), at * math.sin(turn))):
-            words[axis] = value if self.absolute else value - here[axis]
-        return words
+        if radius is not None:
+            present = radius * self.length_scale + (0.0 if self.absolute else present)
+        if angle is not None:
+            turn = math.radians(angle) + (0.0 if self.absolute else turn)
+        point = (present * math.cos(turn), present * math.sin(turn))
+        return {axis: value if self.absolute else value - here[axis] for axis, value in enumerate(point)}
 
     def _cartesian(self, here: list[float], words: dict[int, float]) -> list[float]:
         """The point that words name in the distance mode in force, coming from `here`."""

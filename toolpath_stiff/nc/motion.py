@@ -243,7 +243,9 @@ class Mover(Coordinates):
         level = here if here > retract + SAME_HEIGHT_MM else clear
         self._check_pecks(code, retract - bottom, repeats)
         hole = Drilling(code, bottom, retract, clear, self.sticky.get("Q", 0.0), self.sticky.get("P", 0.0))
-        for _ in range(repeats):
+        for number in range(repeats):
+            if number and self.spoke is not None:  # each hole's polar words count from the one before
+                words |= self._xy_of_spoke()
             place = self._destination(frames.to_program(frames.position), words)
             place[normal] = level
             self._straight(RAPID, frames.to_control(place), set(words))
