@@ -446,6 +446,16 @@ def test_g43_4_without_kinematics_is_refused_as_before(control):
         parse_program("G43.4 H1\nG1 F100 X1\n")
 
 
+def test_haas_says_g234(control):
+    table = "[[tools]]\nnumber = 1\nlength_mm = 0\n"
+    text = "G43.4 H1\nG1 F100. X9. Y3. Z2. A20. C30.\nG49\nX1. Y2. Z3. A0. C0.\n"
+    fanuc, haas = (control(f'dialect = "{name}"\n{AC}{table}') for name in ("fanuc", "haas"))
+    ours, theirs = parse_program(text, controller=fanuc), parse_program(text.replace("43.4", "234"), controller=haas)
+    np.testing.assert_array_equal(ours.moves.end, theirs.moves.end)
+    with pytest.raises(InputError, match="not a G code that is known"):
+        parse_program(text.replace("43.4", "234"), controller=fanuc)
+
+
 def test_machine_points_while_the_tip_is_held_are_refused(control):
     table = "[[tools]]\nnumber = 1\nlength_mm = 0\n"
     for home in ("G53 G0 Z0", "G28 G91 Z0"):

@@ -9,6 +9,7 @@ from toolpath_stiff.nc.codes import (
     G_GROUPS,
     G_HARMLESS,
     G_REFUSED,
+    HOLDS_TIP,
     INCH_METRIC,
     M_GROUPS,
     M_HARMLESS,
@@ -85,6 +86,8 @@ class BlockReader:
 
     def _collect_g(self, codes: Codes, word: Word) -> None:
         code = code_name("G", word.value)
+        if code == self.dialect.holds_tip:
+            code = HOLDS_TIP
         if code in INCH_METRIC:
             if not self.dialect.inch_metric:
                 raise self.fail(word, f"is {self.dialect.g70[0]}, which is not supported", hint=self.dialect.g70[1])

@@ -36,6 +36,7 @@ G_GROUPS: dict[str, str] = {
     **dict.fromkeys(("G68", "G69"), "rotation"),
     "G50": "scaling",
 }
+HOLDS_TIP = "G43.4"  # tool centre point control
 INCH_METRIC = {"G70": "G20", "G71": "G21"}  # where the dialect has them
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
@@ -128,6 +129,7 @@ MEANINGS = {
     "G19": "plane YZ", "G20": "inch", "G21": "mm", "G28": "to the first reference point",
     "G30": "to the second reference point", "G40": "cutter compensation off", "G43": "tool length",
     "G43.1": "tool length in the block", "G43.4": "tool centre point control",
+    "G234": "tool centre point control (Haas)",
     "G49": "tool length off", "G52": "local shift", "G53": "machine coordinates",
     "G54.1": "additional work offset", "G154": "additional work offset (Haas)",
     "G68": "rotated coordinates", "G69": "rotation off", "G73": "chip-breaking drilling", "G80": "motion mode off",

@@ -57,6 +57,8 @@ class Dialect:
         Whether M97 calls a block by its N number.
     feed_needs_point
         Units in which F without a decimal point hangs on a parameter, and is refused.
+    holds_tip
+        Its code for tool centre point control.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Dialect:
     additional: tuple[str, ...] = ("G54.1", "G154")
     local_calls: bool = False
     feed_needs_point: tuple[str, ...] = ()
+    holds_tip: str = "G43.4"
 
 
 GENERIC = Dialect("generic")
@@ -106,6 +109,7 @@ DIALECTS = {
             additional=("G154",),
             local_calls=True,
             feed_needs_point=("mm", "inch"),
+            holds_tip="G234",
         ),
     )
 }

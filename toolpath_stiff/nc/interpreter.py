@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.blocks import POINT_WORDS, Codes
-from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, ARCS, CYCLES, M_SUBPROGRAM, MOTION, WORK_OFFSETS
+from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, ARCS, CYCLES, HOLDS_TIP, M_SUBPROGRAM, MOTION, WORK_OFFSETS
 from toolpath_stiff.nc.dialects import GENERIC, SECONDS, Dialect
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.motion import SECONDS_PER_DAY
@@ -19,7 +19,6 @@ from toolpath_stiff.nc.words import Block, Word
 from toolpath_stiff.nc.zeros import Zeros
 from toolpath_stiff.units import MM_PER_INCH
 
-HOLDS_TIP = "G43.4"
 HOLDS_HINT = (
     "post X, Y, Z, A, B, C of the tip, or name the machine it is posted for ([kinematics] of a controller file)"
 )

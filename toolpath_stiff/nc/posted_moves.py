@@ -26,7 +26,7 @@ BoolArray = NDArray[np.bool_]
 
 AXIS_STEP = rad_from_deg(1.0)  # largest turn of the rotary axes in one piece
 SAME_PLACE = 1e-12  # m and rad: rounding, not motion
-MOST_PIECES = 10_000_000
+MOST_PIECES = 5_000_000
 MOVES_AT_A_TIME = 50_000  # the columns in between are several times those of the moves
 HALF_TURN = math.pi * (1.0 + 1e-9)
 
