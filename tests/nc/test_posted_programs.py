@@ -100,8 +100,8 @@ def ac_table_words(tip: np.ndarray, axis: np.ndarray, before: float) -> tuple[fl
     Its tables turn by minus the words (ISO 841): the part's axis must come out along the spindle, and the part's point
     where the tip is. A in [0, 180], C the one next to `before`.
     """
-    a = math.degrees(math.acos(np.clip(axis[2], -1.0, 1.0)))
-    c = math.degrees(math.atan2(axis[0], -axis[1])) if a > 1e-9 else before
+    a = math.degrees(math.atan2(math.hypot(axis[0], axis[1]), axis[2]))
+    c = math.degrees(math.atan2(axis[0], -axis[1])) if a > 0.0 else before
     c += 360.0 * round((before - c) / 360.0)
     table = about("x", -a, (0, 10, -50)) @ about("z", -c, (20, -5, 0))
     assert np.allclose(table[:3, :3] @ axis, [0, 0, 1], atol=1e-9)
@@ -114,8 +114,8 @@ def bc_head_words(tip: np.ndarray, axis: np.ndarray, before: float) -> tuple[flo
 
     X Y Z are the tip's as it would be under the pivot.
     """
-    b = math.degrees(math.acos(np.clip(axis[2], -1.0, 1.0)))
-    c = math.degrees(math.atan2(axis[1], axis[0])) if b > 1e-9 else before
+    b = math.degrees(math.atan2(math.hypot(axis[0], axis[1]), axis[2]))
+    c = math.degrees(math.atan2(axis[1], axis[0])) if b > 0.0 else before
     x, y, z = tip + 250.0 * axis - [0, 0, 250.0]
     return x, y, z, b, c
 
