@@ -30,12 +30,10 @@ CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
 MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
-POLAR = frozenset("@^")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
 LENGTH_UNKNOWN_BELOW_MM = -9e4  # see tables.UNKNOWN_LENGTH_MM
-# Four decimals are printed of point, offset and tool length: two units in the last place, in the unit in force.
-SAME_PLACE = 2e-4
+SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
 
 Vector = list[float]
 
@@ -383,7 +381,7 @@ class Follower:
         was = any(self.from_machine[of])
         words = self._words(self.line)
         named = {AXES.index(letter) for letter in AXIS_WORD.findall(words)}
-        named |= {0, 1} if POLAR & set(words) else set()
+        named |= {0, 1} if {"@", "^"} & set(words) else set()
         machine = bool(MACHINE_MOVE.search(words))
         if HOME_MOVE.search(words):  # first to the intermediate point, then home
             machine = self.moves_of_line > 0
