@@ -682,3 +682,14 @@ def test_place_works_and_write_is_refused(files, capsys):
     assert main(["place", *files, *few, "--write", "placed.nc"]) == 2
     assert "posted for another kinematics (table-table A C) is not rewritten" in capsys.readouterr().err
     assert not Path("placed.nc").exists()
+
+
+def test_without_the_kinematics_the_words_turn_the_platform_and_that_is_said(files, capsys):
+    """Out of reach then, most often; the message points to the controller file."""
+    assert main(["analyze", "part.nc", "--no-plots", "--json"]) == 0
+    assert any(
+        "roll, pitch, yaw of the platform" in text for text in json.loads(capsys.readouterr().out)["assumptions"]
+    )
+    Path("part.nc").write_text("G0 X0 Y0 Z20\nG1 F500 Z0\nX20 A80\n")
+    assert main(["analyze", "part.nc", "--no-plots"]) == 2
+    assert "posted for another machine" in capsys.readouterr().err

@@ -14,7 +14,7 @@ from toolpath_stiff.analysis.loads import RULES, Load, parse_load
 from toolpath_stiff.analysis.parameter_band import ParameterBand, parameter_band
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Machine, Pose
-from toolpath_stiff.nc.moves import Moves, Program
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
 from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path import place, sample_moves
 from toolpath_stiff.path.samples import Samples
@@ -255,6 +255,8 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     hint = "place the work elsewhere with --origin, or keep the reachable part with --partial"
     if partial:
         hint = "place the work elsewhere with --origin"
+    if _words_turn_the_platform(analysis.program):
+        hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"
     raise UnreachableError(
         f"{int(bad.sum())} of {int(samples.cutting.sum())} cutting samples are out of reach, first "
         f"{describe_pose(samples, first)}: {at.reach.describe(first)}",
@@ -264,10 +266,20 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     )
 
 
+def _words_turn_the_platform(program: Program) -> bool:
+    """Whether rotary words were taken for the platform's own angles."""
+    own = not program.kinematics and program.dialect != CUTTER_LOCATION
+    return own and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
+
+
 def assumptions(analysis: Analysis) -> list[str]:
     """Everything that was assumed or recovered rather than published or given, sentences for people."""
     machine = analysis.machine
     found = list(analysis.program.assumptions)
+    if _words_turn_the_platform(analysis.program):
+        found.append(
+            "A, B, C of the program are roll, pitch, yaw of the platform (see [kinematics] of controller files)"
+        )
     x, y, z, *angles = analysis.origin
     where = f"X{mm_from_m(x):g} Y{mm_from_m(y):g} Z{mm_from_m(z):g}" + (
         " A{:g} B{:g} C{:g}".format(*(deg_from_rad(v) for v in angles)) if any(angles) else ""
