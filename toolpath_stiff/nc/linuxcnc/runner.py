@@ -33,7 +33,7 @@ class Limits:
 
     seconds: int = 60
     memory_bytes: int = 1 << 30
-    file_bytes: int = 1 << 29
+    file_bytes: int = 1 << 28
 
 
 class StoppedError(TpsError):
