@@ -18,7 +18,7 @@ from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Unsupported
 from toolpath_stiff.nc.plain_lines import G_COLUMN
-from toolpath_stiff.nc.posted import PostedKinematics
+from toolpath_stiff.nc.posted.kinematics import PostedKinematics
 from toolpath_stiff.nc.reader import ZERO
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets
@@ -216,7 +216,7 @@ def _on_the_part(
     moves: Moves | None, kinematics: PostedKinematics, interpreter: Interpreter, name: str
 ) -> tuple[Moves | None, list[InputError], tuple[str, ...], tuple[str, ...]]:
     """Moves of the posted machine on the part, None where that is refused; errors, warnings, assumptions."""
-    from toolpath_stiff.nc.posted_program import check_rotary_offsets, on_the_part
+    from toolpath_stiff.nc.posted.program import check_rotary_offsets, on_the_part
 
     if moves is None:
         return None, [], (), ()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from toolpath_stiff.nc.posted import PostedKinematics
+from toolpath_stiff.nc.posted.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
 
 Pose = tuple[float, float, float, float, float, float]

@@ -277,7 +277,7 @@ class Interpreter(Zeros):
         if frames.posted.tcp or (frames.bound and frames.source != "program"):
             frames.from_machine[:3] = [True] * 3  # not known until X, Y and Z are named
             return
-        from toolpath_stiff.nc.posted_program import switched
+        from toolpath_stiff.nc.posted.program import switched
 
         length = self.tool_length
         if math.isnan(length):

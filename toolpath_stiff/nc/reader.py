@@ -15,7 +15,7 @@ from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.nc.posted import PostedKinematics
+from toolpath_stiff.nc.posted.kinematics import PostedKinematics
 from toolpath_stiff.nc.source import read_lines, split_lines
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
@@ -283,7 +283,7 @@ def _on_the_part(
     offsets: Offsets,
 ) -> Program:
     """A program as read for the machine that it was posted for, with the moves of the tool on the part."""
-    from toolpath_stiff.nc.posted_program import check_rotary_offsets, recovered
+    from toolpath_stiff.nc.posted.program import check_rotary_offsets, recovered
 
     check_rotary_offsets(offsets, posted, program.name)
     if asked.origin is None:

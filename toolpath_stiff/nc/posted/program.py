@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
-from toolpath_stiff.nc.posted import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis
-from toolpath_stiff.nc.posted_chain import tool_poses
-from toolpath_stiff.nc.posted_moves import recover_moves, turns_far
+from toolpath_stiff.nc.posted.chain import tool_poses
+from toolpath_stiff.nc.posted.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis
+from toolpath_stiff.nc.posted.moves import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 

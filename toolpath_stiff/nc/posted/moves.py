@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.curves import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves
-from toolpath_stiff.nc.posted import HEAD, LETTERS, PostedKinematics
-from toolpath_stiff.nc.posted_chain import line_point, roll_pitch, tool_poses, turned
+from toolpath_stiff.nc.posted.chain import line_point, roll_pitch, tool_poses, turned
+from toolpath_stiff.nc.posted.kinematics import HEAD, LETTERS, PostedKinematics
 from toolpath_stiff.units import deg_from_rad, mm_from_m, rad_from_deg
 
 FloatArray = NDArray[np.float64]

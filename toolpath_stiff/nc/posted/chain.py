@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.nc.posted import HEAD, PostedKinematics, RotaryAxis
+from toolpath_stiff.nc.posted.kinematics import HEAD, PostedKinematics, RotaryAxis
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
