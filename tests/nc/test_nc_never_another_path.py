@@ -25,6 +25,10 @@ REFUSED = {
     "a length changed just before M6": ("F100 G1 X2\nG43 H3\nT2 M6\nG1 X4", "a cut before any Z"),
     "two codes that act once": ("F100 G1 X2\nG92.1 Z-9 G52\nG1 X3 Z3", "one of them in a block"),
     "a length changed just before M61": ("F100 G1 X2\nG43.1 Z5\nM61 Q1\nG1 X4", "a cut before any Z"),
+    "a length changed just before M6, then Z in G91": (
+        "F100 G0 Z5\nG43 H3\nT2 M6\nG91 G0 Z-5\nG1 X3",
+        "a cut before any Z",
+    ),
     "a length changed just before M6, then G1 alone": (
         "F100 G0 X2\nG43.1 Z-3\nT2 M6\nG1\nG0 Z3\nG1 X3",
         "a cut before any Z",

@@ -55,7 +55,7 @@ class Mover(Coordinates):
         frames = self.frames
         self.length_changed = False
         if self.height_lost:
-            self._find_height(motion, 2 in work or 2 in machine)
+            self._find_height(motion, (2 in work and self.absolute) or 2 in machine)
         start, was = frames.to_setup(frames.position), frames.bound
         for axis in work:
             frames.from_machine[axis] = False
