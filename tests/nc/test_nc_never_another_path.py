@@ -25,6 +25,12 @@ REFUSED = {
     "a length changed just before M6": ("F100 G1 X2\nG43 H3\nT2 M6\nG1 X4", "a cut before any Z"),
     "two codes that act once": ("F100 G1 X2\nG92.1 Z-9 G52\nG1 X3 Z3", "one of them in a block"),
     "a length changed just before M61": ("F100 G1 X2\nG43.1 Z5\nM61 Q1\nG1 X4", "a cut before any Z"),
+    "a length changed just before M6, then G92": ("F100 G1 X2\nG43 H3\nT2 M6\nG92 Z0\nG0 Z3\nG1 X5", "present height"),
+    "a length changed just before M6, then L20": (
+        "F100 G1 X2\nG43 H3\nT2 M6\nG10 L20 P1 Z0\nG0 Z3\nG1 X5",
+        "present height",
+    ),
+    "a length changed just before M6, then G28.1": ("F100 G1 X2\nG43 H3\nT2 M6\nG28.1\nG0 Z3\nG1 X5", "present height"),
     "a length changed just before M6, then Z in G91": (
         "F100 G0 Z5\nG43 H3\nT2 M6\nG91 G0 Z-5\nG1 X3",
         "a cut before any Z",
@@ -38,6 +44,9 @@ REFUSED = {
     "the active offset turned, in G91": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nG91 G1 X3 Y3", "name both X and Y"),
 }
 SAME = {
+    "G49 of no length before M6": "F100 G1 X2\nG49\nT2 M6\nG1 X3",
+    "a length changed before M6, then cycles": "F100 G1 X2\nG43 H3\nT2 M6\nG98 G89 P1 X1 Z-1 R2\nG80 G1 X3",
+    "a length changed before M6, then G52": "F100 G1 X2\nG43 H3\nT2 M6\nG52 Z5\nG0 Z3\nG1 X3",
     "polar words": "F100 G1 X3 Y4\n@10\n^90\n@5 ^30 Z1 A2\nG91 @5\n^90 Z1\n@-1 ^20\nG90 G92 X1\n@7\n^10",
     "polar words of arcs": "F100 G1 X5\nG3 @5 ^90 I-5 J0\nG2 ^-30 R9\nG20 F9 G90.1 G3 ^120 I0 J0 Z1",
     "polar words of cycles": "F100 G1 X5 Z5\nG81 Z-1 R1 @5 ^0\n^90\n^180 L2\nG91 @1 Z-2 R.5",

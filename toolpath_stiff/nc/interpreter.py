@@ -259,8 +259,9 @@ class Interpreter(Zeros):
         else:
             length = self._table_length(word)
         self.tool_length = length
-        self.length_changed = True
-        self.frames.set_tool(0.0 if math.isnan(length) else length)
+        new = 0.0 if math.isnan(length) else length
+        self.length_changed = self.length_changed or new != self.frames.tool
+        self.frames.set_tool(new)
         self._hold_tip(code == HOLDS_TIP, word)
 
     def _hold_tip(self, hold: bool, word: Word) -> None:
@@ -331,6 +332,7 @@ class Interpreter(Zeros):
             elif code in ("G28", "G30"):
                 self._go_home(code, word)
             elif code in ("G28.1", "G30.1"):
+                self._know_height(word)
                 home = self.frames.offsets.home_g28 if code == "G28.1" else self.frames.offsets.home_g30
                 home[:] = self.frames.machine_position()
             elif code in ("G92", "G52"):

@@ -13,6 +13,7 @@ from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import ARC, CYCLE, RAPID, ToolUse
 from toolpath_stiff.nc.recorder import Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
 SECONDS_PER_DAY = 86400.0
@@ -84,12 +85,18 @@ class Mover(Coordinates):
 
     def _find_height(self, motion: int, named: bool) -> None:
         if motion != RAPID:
-            raise self.fail(
-                None,
-                "a cut before any Z, after a tool length that changed between the last move and M6",
-                "G0 with Z before it",
-            )
+            self._know_height(None)
         self.height_lost = not named
+
+    def _know_height(self, word: Word | None) -> None:
+        """Refuse what hangs on the present height, if that is lost."""
+        if self.height_lost:
+            raise self.fail(
+                word,
+                "a cut before any Z" if word is None else "takes the present height",
+                "G0 with Z before it: the tool length changed between the last move and M6, and LinuxCNC's interpreter "
+                "forgets that",
+            )
 
     def note_tool(self) -> None:
         """Keep the tool in the spindle among those that moved."""

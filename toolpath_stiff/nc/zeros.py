@@ -40,6 +40,8 @@ class Zeros(Mover):
             offset.rotation = rotation
         words = self._axis_words()
         if level == 20:
+            if 2 in words:
+                self._know_height(word)
             self._offset_from_here(index, words)
         else:
             for axis, value in words.items():
@@ -136,6 +138,8 @@ class Zeros(Mover):
             for axis, value in words.items():
                 frames.g92[axis] = value
         else:
+            if 2 in words:
+                self._know_height(word)
             here = frames.to_program(frames.position)
             for axis, value in words.items():
                 frames.g92[axis] += here[axis] - value
