@@ -31,6 +31,11 @@ REFUSED = {
         "present height",
     ),
     "a length changed just before M6, then G28.1": ("F100 G1 X2\nG43 H3\nT2 M6\nG28.1\nG0 Z3\nG1 X5", "present height"),
+    "the active offset turned, then G92": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nM61 Q1\nG92 X5\nG1 X3 Y3", "turned"),
+    "the active offset turned, then L20": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nG10 L20 P2 Y5\nG1 X3 Y3", "turned"),
+    "the active offset turned, then G53": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nM61 Q1\nG53 G1 Y0\nG1 X3 Y3", "turned"),
+    "the active offset turned, then G28": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nG28 Z5\nG1 X3 Y3", "turned"),
+    "the active offset turned, then G28.1": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nG28.1\nG1 X3 Y3", "turned"),
     "a length changed just before M6, then Z in G91": (
         "F100 G0 Z5\nG43 H3\nT2 M6\nG91 G0 Z-5\nG1 X3",
         "a cut before any Z",

@@ -260,6 +260,16 @@ class Coordinates(BlockReader):
             angle,
         )
 
+    def _know_place(self, word: Word) -> None:
+        """Refuse what hangs on the present X and Y, after a G10 that turned the offset in force."""
+        if self.unsettled == "G10":
+            raise self.fail(
+                word,
+                "hangs on the present X and Y after a G10 that turned the offset in force: LinuxCNC's interpreter may "
+                "have other ones",
+                "a move with both X and Y before it",
+            )
+
     def _settle(self, words: dict[int, float]) -> None:
         """Refuse what a control may take for another point: X and Y had other numbers before the rotation changed."""
         named = XY & words.keys()

@@ -332,7 +332,7 @@ class Interpreter(Zeros):
             elif code in ("G28", "G30"):
                 self._go_home(code, word)
             elif code in ("G28.1", "G30.1"):
-                self._know_height(word)
+                self._know_position(word, range(6))
                 home = self.frames.offsets.home_g28 if code == "G28.1" else self.frames.offsets.home_g30
                 home[:] = self.frames.machine_position()
             elif code in ("G92", "G52"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, WORK_OFFSETS
 from toolpath_stiff.nc.coordinates import XY
 from toolpath_stiff.nc.motion import Mover
@@ -40,8 +42,7 @@ class Zeros(Mover):
             offset.rotation = rotation
         words = self._axis_words()
         if level == 20:
-            if 2 in words:
-                self._know_height(word)
+            self._know_position(word, words)
             self._offset_from_here(index, words)
         else:
             for axis, value in words.items():
@@ -121,11 +122,20 @@ class Zeros(Mover):
         """A move of `words` (none: all axes) by machine coordinates: harmless under G68 only off the rotated plane."""
         if self.frames.tip_held:
             raise self.fail(word, "while tool centre point control is on (G43.4)", "G49 before it")
+        if words and not words.keys() >= XY:
+            self._know_place(word)
         if not words or XY & words.keys():
             self._refuse_while_rotated(word, "moves X and Y by machine coordinates")
             self._forget_polar()
             if not words or words.keys() >= XY:
                 self.unsettled = None
+
+    def _know_position(self, word: Word, axes: Collection[int]) -> None:
+        """Refuse a code that takes the present numbers of axes that LinuxCNC's interpreter may have otherwise."""
+        if 2 in axes:
+            self._know_height(word)
+        if XY & set(axes):
+            self._know_place(word)
 
     def _shift(self, code: str, word: Word) -> None:
         self._refuse_while_rotated(word, "shifts the zero")
@@ -138,8 +148,7 @@ class Zeros(Mover):
             for axis, value in words.items():
                 frames.g92[axis] = value
         else:
-            if 2 in words:
-                self._know_height(word)
+            self._know_position(word, words)
             here = frames.to_program(frames.position)
             for axis, value in words.items():
                 frames.g92[axis] += here[axis] - value
