@@ -1,4 +1,4 @@
-"""Random programs for `benchmarks.hunt`: harsh ones, line by line at odds with each other, and some as of CAM."""
+"""Random programs for `benchmarks.hunt`: lines at odds with each other, zeros that move, and some as of CAM."""
 
 # ruff: noqa: SIM905 (long lists of words are easier to read as one text)
 
@@ -307,3 +307,43 @@ class Cam(Harsh):
             words += [f"{axis}{r.uniform(-30, 30):.3f}" for axis in "ABC" if kind == 3 and self.often(0.5)]
             lines.append(f"{self.one('', '', '', 'G1', 'G01', 'G0')} {' '.join(words)}".strip())
         return [*lines, f"G0 Z{value(0.3, 0.6)}"]
+
+
+class Zeros(Harsh):
+    """Programs of valid blocks that move the zero, the tool's length and the unit between a few moves."""
+
+    def words(self, letters: str = "XYZ", count: int = 0) -> str:
+        """Axis words of a few plain numbers."""
+        r = self.random
+        chosen = r.sample(letters, count or r.randint(1, len(letters)))
+        return " ".join(f"{letter}{r.choice([-7, -3, 0, 1, 2, 5, 11, 4.25])}" for letter in chosen)
+
+    def program(self) -> str:
+        """A program of three to fourteen such blocks, of few kinds or many."""
+        r = self.random
+        kinds: list[Callable[[], str]] = [
+            lambda: f"G10 L2 {self.one('P0', 'P1', 'P2')} {self.words()} {self.one('', '', 'R20', 'R-45', 'R0')}",
+            lambda: f"G10 L20 {self.one('P0', 'P1', 'P2', 'P9')} {self.words()}",
+            lambda: self.one("G54", "G55", "G59.3"),
+            lambda: f"G92 {self.words()}",
+            lambda: f"G52 {self.words()}",
+            lambda: self.one("G92.1", "G92.2", "G92.3"),
+            lambda: self.one("G28.1", "G30.1", "G28", "G30", f"G28 {self.words()}", f"G30 {self.words()}"),
+            lambda: f"G53 {self.one('G0', 'G1')} {self.words()}",
+            lambda: self.one("T1 M6", "T2 M6", "M6", "M61 Q1"),
+            lambda: self.one("G43 H1", "G43 H2", "G49", "G43.1 Z4", "G43"),
+            lambda: self.one("G90", "G91"),
+            lambda: self.one("G20 F5", "G21 F90"),
+            lambda: f"{self.one('G0', 'G1')} {self.words('XYZABC')}",
+            lambda: f"{self.one('G0', 'G1')} {self.words()}",
+            lambda: f"{self.one('G0', 'G1')} {self.words(count=3)}",
+            lambda: self.one("G91 G2 X4 Y4 I4 J0", "G91 G3 X6 R5", "G91 G3 X8 R5"),
+            lambda: f"{self.one('G81', 'G82 P1', 'G83 Q2')} {self.words('XY')} Z-9 R3",
+            lambda: "G80",
+            lambda: self.one("G17", "G18", "G19"),
+            lambda: self.one("@3 ^10", "@5 ^90", "^45", "@4"),
+        ]
+        few = r.sample(kinds, r.randint(3, len(kinds)))
+        lines = ["G21 F100", self.one("", "G0 X1 Y2 Z3", "T1 M6\nG43 H1\nG0 Z9")]
+        lines += [r.choice(few)() for _ in range(r.randint(3, 14))]
+        return "\n".join([*lines, "G80", "G1 X50 Y50 Z50", "M2", ""])
