@@ -265,8 +265,8 @@ class Coordinates(BlockReader):
         if self.unsettled == "G10":
             raise self.fail(
                 word,
-                "hangs on the present X and Y after a G10 that turned the offset in force: LinuxCNC's interpreter may "
-                "have other ones",
+                "hangs on the present X and Y after G10, or another work offset and M6, turned the coordinates: "
+                "LinuxCNC's interpreter may have other ones",
                 "a move with both X and Y before it",
             )
 
@@ -276,8 +276,8 @@ class Coordinates(BlockReader):
         if self.unsettled == "G10" and not (self.absolute and named == XY):
             raise self.fail(
                 None,
-                "G10 turned the work offset in force, and the next move does not name both X and Y: LinuxCNC would "
-                "take the old numbers for them",
+                "G10, or another work offset and M6, turned the coordinates, and the next move does not name both X "
+                "and Y: LinuxCNC would take the old numbers for them",
                 "absolute X and Y in the first move after it",
             )
         if not named:

@@ -154,6 +154,8 @@ class Interpreter(Zeros):
         index = WORK_OFFSETS.index(code) if code in WORK_OFFSETS else self._additional_offset(code, word)
         if index != self.frames.active:
             self._refuse_while_rotated(word, "takes another work offset")
+            turned = self.frames.offsets.at(index).rotation != self.frames.offsets.at(self.frames.active).rotation
+            self.rotation_changed = self.rotation_changed or turned
             self.frames.active = index
             self._forget_polar()
 
@@ -232,6 +234,8 @@ class Interpreter(Zeros):
             self.tool = self.selected if chosen is None else int(chosen)
             self.renamed = change == "M61"
             self.height_lost = self.height_lost or self.length_changed
+            if self.rotation_changed:
+                self.unsettled = "G10"
 
     def _dwell(self, word: Word) -> None:
         seconds = self._seconds("X" if self.dialect.dwell != SECONDS and self.has("X") else "P")

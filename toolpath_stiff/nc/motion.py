@@ -39,8 +39,8 @@ class Mover(Coordinates):
         self.tool, self.selected = 0, 0
         self.renamed = False  # the tool in the spindle is M61's
         self.tool_length = math.nan
-        # LinuxCNC's rs274 forgets a change of length since the last move at M6: it would start the next cut elsewhere.
-        self.length_changed = self.height_lost = False
+        # LinuxCNC's rs274 forgets at M6 that length or rotation changed since the last move: the next begins elsewhere.
+        self.length_changed = self.height_lost = self.rotation_changed = False
         self.sticky: dict[str, float] = {}
         self._heights = (True, 0.0, 0.0)  # of the last hole: whether in G90, R plane, bottom
 
@@ -54,7 +54,7 @@ class Mover(Coordinates):
 
     def _record(self, motion: int, control: list[float], work: set[int], machine: set[int], arc: Arc | None) -> None:
         frames = self.frames
-        self.length_changed = False
+        self.length_changed = self.rotation_changed = False
         if self.height_lost:
             self._find_height(motion, (2 in work and self.absolute) or 2 in machine)
         start, was = frames.to_setup(frames.position), frames.bound

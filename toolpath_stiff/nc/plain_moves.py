@@ -335,6 +335,6 @@ class _Lines:
             state.feed = float(self.feed[last])
         if control is not None:
             state.frames.position = control[self.end].tolist()
-            state.length_changed = False
+            state.length_changed = state.rotation_changed = False
         state.call, state.returns = None, False
         return self.end
