@@ -32,6 +32,10 @@ REFUSED = {
     ),
     "a length changed just before M6, then G28.1": ("F100 G1 X2\nG43 H3\nT2 M6\nG28.1\nG0 Z3\nG1 X5", "present height"),
     "a turned offset just before M6": ("F100 G10 L2 P2 R-45\nG0 X3 Y3\nG55\nM6\nG0 Y-7\nG1 X5 Y5", "both X"),
+    "a turned zero moved just before M61": (
+        "F100 G10 L2 P1 R20\nG1 X3 Y3\nG10 L20 P1 X5 Y5\nM61 Q1\nG91 G1 X5 Y5",
+        "both X",
+    ),
     "the active offset turned, then G92": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nM61 Q1\nG92 X5\nG1 X3 Y3", "turned"),
     "the active offset turned, then L20": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nG10 L20 P2 Y5\nG1 X3 Y3", "turned"),
     "the active offset turned, then G53": ("F100 G1 X5 Y5\nG10 L2 P1 R30\nM61 Q1\nG53 G1 Y0\nG1 X3 Y3", "turned"),

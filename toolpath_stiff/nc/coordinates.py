@@ -50,6 +50,7 @@ class Coordinates(BlockReader):
         self.absolute, self.inch = True, False
         self.polar: list[float] | None = None
         self.unsettled: str | None = None
+        self.rotation_changed = False
         self.spoke: tuple[Word, float | None, float | None] | None = None
 
     @property
@@ -259,6 +260,11 @@ class Coordinates(BlockReader):
             here[1] if y is None else y * self.length_scale,
             angle,
         )
+
+    def _zero_moved(self) -> None:
+        """Note that the zero of turned coordinates moved: LinuxCNC's rs274 forgets that at the next M6."""
+        if self.frames.offsets.at(self.frames.active).rotation:
+            self.rotation_changed = True
 
     def _know_place(self, word: Word) -> None:
         """Refuse what hangs on the present X and Y, after a G10 that turned the offset in force."""

@@ -157,6 +157,7 @@ class Interpreter(Zeros):
             turned = self.frames.offsets.at(index).rotation != self.frames.offsets.at(self.frames.active).rotation
             self.rotation_changed = self.rotation_changed or turned
             self.frames.active = index
+            self._zero_moved()
             self._forget_polar()
 
     def _additional_offset(self, code: str, word: Word) -> int:

@@ -40,7 +40,7 @@ class Mover(Coordinates):
         self.renamed = False  # the tool in the spindle is M61's
         self.tool_length = math.nan
         # LinuxCNC's rs274 forgets at M6 that length or rotation changed since the last move: the next begins elsewhere.
-        self.length_changed = self.height_lost = self.rotation_changed = False
+        self.length_changed = self.height_lost = False
         self.sticky: dict[str, float] = {}
         self._heights = (True, 0.0, 0.0)  # of the last hole: whether in G90, R plane, bottom
 

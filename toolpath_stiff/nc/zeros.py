@@ -48,6 +48,8 @@ class Zeros(Mover):
             for axis, value in words.items():
                 offset.axes[axis] = value
         offset.given = True
+        if index == self.frames.active:
+            self._zero_moved()
 
     def _fanuc_g10(self, word: Word, level: float | None, number: float | None) -> None:
         """Fanuc's and Haas' G10: L2 sets G54 to G59, L20 the additional offsets, L10 the length of the tool of an H.
@@ -153,10 +155,12 @@ class Zeros(Mover):
             for axis, value in words.items():
                 frames.g92[axis] += here[axis] - value
         frames.g92_kept = list(frames.g92)
+        self._zero_moved()
 
     def _g92_state(self, code: str, word: Word) -> None:
         self._refuse_while_rotated(word, "shifts the zero")
         self._forget_polar()
+        self._zero_moved()
         frames = self.frames
         if code == "G92.3":
             frames.g92 = list(frames.g92_kept)
