@@ -675,7 +675,7 @@ def test_check_says_what_does_not_suit_the_kinematics(files, capsys):
 
 
 def test_place_works_and_write_is_refused(files, capsys):
-    few = ["--points", "2", "--no-plots", "--step", "20", "--x", "0", "--y", "0", "--z", "700:800", "--rotate", "0"]
+    few = ["--points", "2", "--no-plots", "--step", "20", "--x", "0", "--y", "0", "--z", "750", "--rotate", "0"]
     assert main(["place", *files, *few, "--json"]) == 0
     blocks = json.loads(capsys.readouterr().out)["offset_blocks"]
     assert not blocks["linuxcnc"] and "posted for another kinematics" in blocks["linuxcnc_reason"]
