@@ -71,7 +71,7 @@ CALLS_FILES = [
     "o#1 call",
     "M098 P77",
     "o+100 call",
-    "o</tmp/evil> call\no</tmp/evil> sub\no</tmp/evil> endsub",
+    "o</srv/evil> call\no</srv/evil> sub\no</srv/evil> endsub",
     "/o<../evil> sub",
     "o<sub/evil> call",
 ]

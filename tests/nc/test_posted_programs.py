@@ -15,6 +15,7 @@ from tests.nc import rs274
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import Program, parse_program
+from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import Controller, read_controller
 from toolpath_stiff.nc.moves import ARC, RAPID
 from toolpath_stiff.path import move_lengths, sample_moves
@@ -650,6 +651,13 @@ def files(tmp_path, monkeypatch):
     Path("part.nc").write_text("G0 X0 Y0 Z20\nG1 F500 Z0\nX20 A10 C20\nX30 Y30\n")
     Path("posted.toml").write_text(AC)
     return ["part.nc", "--controller", "posted.toml"]
+
+
+def test_check_places_the_part_where_it_is_asked_for(files):
+    """Not where the machine that it was posted for has its G54."""
+    lines, place = tuple(Path(files[0]).read_text().splitlines()), (0.1, -0.2, 0.9, 0.0, 0.0, 0.5)
+    found = check_lines(lines, "part.nc", origin=place, controller=read_controller(files[2]))
+    assert found.origin == pytest.approx(place)
 
 
 def test_check_analyze_and_path_take_it(files, capsys):

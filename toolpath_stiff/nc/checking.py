@@ -14,7 +14,7 @@ from toolpath_stiff.nc.cutter_location.checking import CheckedCutterLocation
 from toolpath_stiff.nc.cutter_location.program import not_for
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
-from toolpath_stiff.nc.frames import Frames, Pose
+from toolpath_stiff.nc.frames import Frames, Pose, pose_in_mm, pose_in_si
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Unsupported
 from toolpath_stiff.nc.plain_lines import G_COLUMN
@@ -23,7 +23,7 @@ from toolpath_stiff.nc.reader import ZERO
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import Block
-from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.units import m_from_mm
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 NO_CHANGE = "nothing of the path"
@@ -166,7 +166,7 @@ def check_lines(
         raise InputError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
         return _check_cutter_location(lines, name, origin or default_origin, bool(block_delete), controller)
-    place, default = None if origin is None else _to_mm(origin), _to_mm(default_origin)
+    place, default = None if origin is None else pose_in_mm(origin), pose_in_mm(default_origin)
     posted = controller.kinematics
     if posted is None:
         frames = Frames(copy.deepcopy(controller.offsets or Offsets()), place, default)
@@ -195,9 +195,8 @@ def check_lines(
         moves, refused, more, assumed = _on_the_part(moves, posted, interpreter, name)
         errors, warnings, assumptions = [*errors, *refused], [*warnings, *more], [*assumptions, *assumed]
     findings = [finding_of(error) for error in errors]
-    findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in warnings]
+    findings += [Finding(line_in(text), 0, "warning", text, WARNING) for text in warnings]
     findings += [Finding(0, 0, "assumption", text, NOTE) for text in assumptions]
-    x, y, z, a, b, c = at
     return Checked(
         used=tuple(UsedCode(*run.first[code], code, code_meaning(code), NOTE, run.count[code]) for code in run.first),
         unsupported=tuple(_of_unsupported(word) for word in interpreter.unsupported),
@@ -205,7 +204,7 @@ def check_lines(
         start=start,
         end=modal_state(interpreter),
         moves=moves,
-        origin=(m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c)),
+        origin=pose_in_si(at),
         complete=not errors,
         remarks={tool.number: tool.remark for tool in interpreter.used_tools.values()},
         jumps=tuple(run.jumps) if posted is None else None,
@@ -240,7 +239,7 @@ def _check_cutter_location(
     offsets = controller.offsets is not None and any(offset.given for offset in controller.offsets.table)
     warnings = (*not_for(controller, offsets, block_delete), *reading.warnings)
     findings = [finding_of(error) for error in reading.errors]
-    findings += [Finding(_line_in(text), 0, "warning", text, WARNING) for text in warnings]
+    findings += [Finding(line_in(text), 0, "warning", text, WARNING) for text in warnings]
     findings += [Finding(0, 0, "assumption", text, NOTE) for text in reading.assumptions]
     x, y, z, a, b, c = origin
     return Checked(
@@ -280,7 +279,7 @@ def _of_unsupported(word: Unsupported) -> Finding:
     return Finding(word.line, word.column, word.word, text, NOTE)
 
 
-def _line_in(text: str) -> int:
+def line_in(text: str) -> int:
     """The line that a warning names; 0 if it names none."""
     _, found, rest = text.partition("line ")
     digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
@@ -309,8 +308,3 @@ def modal_state(interpreter: Interpreter) -> dict[str, str]:
         "rotation": "G69" if frames.rotation is None else f"G68 R{frames.rotation[2]:g}",
         "shift (G92, G52)": "none" if not any(frames.g92) else " ".join(f"{v:g}" for v in frames.g92),
     }
-
-
-def _to_mm(origin: Iterable[float]) -> Pose:
-    x, y, z, a, b, c = origin
-    return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))

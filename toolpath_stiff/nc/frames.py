@@ -9,10 +9,12 @@ motion) is zero; the machine frame places that at the origin.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.nc.posted.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 
 Pose = tuple[float, float, float, float, float, float]
 Rotation = tuple[float, float, float]  # of G68: centre X, Y in program coordinates, angle in degrees
@@ -148,6 +150,18 @@ class Frames:
         """Another tool length: the machine stands still, the controlled point's numbers change."""
         self.position[2] += self.tool - length
         self.tool = length
+
+
+def pose_in_mm(pose: Iterable[float]) -> Pose:
+    """A pose in m and rad, in mm and degrees."""
+    x, y, z, a, b, c = pose
+    return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))
+
+
+def pose_in_si(pose: Pose) -> Pose:
+    """A pose in mm and degrees, in m and rad."""
+    x, y, z, a, b, c = pose
+    return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))
 
 
 def _turned(x: float, y: float, degrees: float) -> tuple[float, float]:

@@ -181,7 +181,7 @@ class _Lines:
         )
         if len(rows):
             state.note_tool()
-        return self._leave(control)
+        return self._leave(control if moving.any() else None)
 
     # -- modes -----------------------------------------------------------------------------------------------------
 

@@ -12,14 +12,13 @@ from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, 
 from toolpath_stiff.nc.cutter_location import program as cutter_location
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
-from toolpath_stiff.nc.frames import Frames, Pose
+from toolpath_stiff.nc.frames import Frames, Pose, pose_in_mm, pose_in_si
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.nc.posted.kinematics import PostedKinematics
 from toolpath_stiff.nc.source import read_lines, split_lines
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
-from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -147,7 +146,7 @@ class _Request:
         """
         if self.posted is not None:
             return None, ZERO
-        return None if self.origin is None else _to_mm(self.origin), _to_mm(self.default_origin)
+        return None if self.origin is None else pose_in_mm(self.origin), pose_in_mm(self.default_origin)
 
 
 def _read(asked: _Request) -> Program:
@@ -231,7 +230,7 @@ def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
         path=asked.path,
         source=asked.lines,
         moves=reading.moves,
-        origin=_to_si(reading.origin),
+        origin=pose_in_si(reading.origin),
         origin_source=reading.source,
         unsupported=reading.unsupported,
         warnings=reading.warnings,
@@ -261,7 +260,7 @@ def _read_built_in(asked: _Request) -> Program:
         path=asked.path,
         source=asked.lines,
         moves=interpreter.recorder.moves(),
-        origin=_to_si(frames.origin),
+        origin=pose_in_si(frames.origin),
         origin_source=frames.source,
         unsupported=tuple(interpreter.unsupported),
         warnings=(*warnings, *interpreter.warnings),
@@ -294,13 +293,3 @@ def _on_the_part(
 def _six(origin: Iterable[float]) -> Pose:
     x, y, z, a, b, c = origin
     return (x, y, z, a, b, c)
-
-
-def _to_mm(origin: Iterable[float]) -> Pose:
-    x, y, z, a, b, c = origin
-    return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))
-
-
-def _to_si(origin: Pose) -> Pose:
-    x, y, z, a, b, c = origin
-    return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))

@@ -8,7 +8,17 @@ from dataclasses import replace
 from typing import Any
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.checking import ERROR, NOTE, WARNING, Checked, Finding, UsedCode, check_lines, finding_of
+from toolpath_stiff.nc.checking import (
+    ERROR,
+    NOTE,
+    WARNING,
+    Checked,
+    Finding,
+    UsedCode,
+    check_lines,
+    finding_of,
+    line_in,
+)
 from toolpath_stiff.nc.codes import code_meaning, code_name
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
@@ -57,7 +67,7 @@ def check_by(
             )
         said = Finding(refused.line, refused.column, "not read", f"nor by LinuxCNC: {refused.text}", ERROR)
         return replace(ours, findings=_sorted([*ours.findings, said])), "builtin"
-    findings = [Finding(_line_of(text), 0, "warning", text, WARNING) for text in program.warnings]
+    findings = [Finding(line_in(text), 0, "warning", text, WARNING) for text in program.warnings]
     findings += [Finding(0, 0, "assumption", text, NOTE) for text in program.assumptions]
     if ours is not None:
         why = next(finding for finding in ours.findings if finding.severity == ERROR)
@@ -89,11 +99,6 @@ def _sorted(findings: list[Finding]) -> tuple[Finding, ...]:
 def _pose(origin: Iterable[float] | None, default: Iterable[float]) -> tuple[float, float, float, float, float, float]:
     x, y, z, a, b, c = default if origin is None else origin
     return (x, y, z, a, b, c)
-
-
-def _line_of(text: str) -> int:
-    found = re.match(r"line (\d+)", text)
-    return int(found[1]) if found else 0
 
 
 def _used(lines: tuple[str, ...], name: str) -> tuple[UsedCode, ...]:

@@ -19,7 +19,7 @@ from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
-from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.frames import Frames, pose_in_mm
 from toolpath_stiff.nc.frames import Pose as ShopPose
 from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
@@ -30,7 +30,7 @@ from toolpath_stiff.nc.words import read_block
 from toolpath_stiff.placement.rewrite_blocks import Rewriter
 from toolpath_stiff.placement.rewrite_trace import Tracer
 from toolpath_stiff.placement.rewrite_turn import Turn
-from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.units import mm_from_m
 
 LINE_END = re.compile("\r\n|\n|\r")
 FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # 0.01 mm is no machining; beyond nine a double has no more to say
@@ -103,7 +103,7 @@ def rewrite_program(
             file=program.name,
         )
     text, encoding = _text_of(program)
-    placement, original = _in_shop_units(placement_origin), _in_shop_units(original_origin)
+    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
 
     def frames(origin: ShopPose) -> Frames:
         return Frames(copy.deepcopy(offsets or Offsets()), origin, origin)
@@ -216,8 +216,3 @@ def _text_of(program: Program) -> tuple[str, str]:
         return content.decode(encoding), encoding
     except UnicodeDecodeError:
         return content.decode("latin-1"), "latin-1"
-
-
-def _in_shop_units(origin: Pose) -> ShopPose:
-    x, y, z, a, b, c = origin
-    return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))
