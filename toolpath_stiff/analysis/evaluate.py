@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,7 +141,8 @@ def _evaluate_block(
     compliance = np.full((len(tip), 3, 3), np.nan)
     turned = None if rotation is None else rotation[within]
     compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, route)
-    direction, substituted = load_directions(load, compliance, tip, rotation, tangent[rows])
+    softest = partial(_softest, model, tip, rotation, tool, force, within) if model.load_dependent else None
+    direction, substituted = load_directions(load, compliance, tip, rotation, tangent[rows], softest)
     along = np.full(len(tip), np.nan)
     if model.load_dependent:
         along[within] = core.compliance_along(model, direction[within], tip[within], turned, tool[within], force)
@@ -154,6 +156,26 @@ def _evaluate_block(
     result.margin[rows] = stand.margin
     result.limit[rows] = stand.limit
     result.limit_value[rows] = stand.value
+
+
+def _softest(
+    model: StiffnessModel,
+    tip: FloatArray,
+    rotation: FloatArray | None,
+    tool: FloatArray,
+    force: float,
+    within: BoolArray,
+    rows: BoolArray,
+    across: FloatArray | None,
+) -> FloatArray:
+    """Softest directions under the load, of some rows; nan where these are out of reach."""
+    found = np.full((int(rows.sum()), 3), np.nan)
+    inside = within[rows]
+    some = rows & within
+    turn = None if rotation is None else rotation[some]
+    normals = None if across is None else across[inside]
+    found[inside] = core.extreme_directions(model, tip[some], turn, tool[some], force, across=normals)
+    return found
 
 
 def _one_if_equal(tool_length: FloatArray) -> FloatArray | float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,8 @@ from toolpath_stiff.errors import InputError
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+# Poses (n,) of all and, unless all directions are meant, unit vectors (k, 3) to stay across: to directions (k, 3).
+Softest = Callable[[BoolArray, FloatArray | None], FloatArray]
 
 LOADS = ("tangential", "axial", "normal", "softest", "radial", "x", "y", "z")
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -67,6 +71,7 @@ def load_directions(
     position: FloatArray,
     rotation: FloatArray | None,
     tangent: FloatArray,
+    softest: Softest | None = None,
 ) -> tuple[FloatArray, BoolArray]:
     """Unit vectors of the load at n poses, and where the softest direction had to stand in.
 
@@ -82,6 +87,8 @@ def load_directions(
         (n, 3, 3); None: vertical spindle.
     tangent
         (n, 3) unit vectors of the motion, 0 where the tip does not move.
+    softest
+        Where to find the softest directions if they are not the compliance's own (`Softest`).
 
     Returns
     -------
@@ -94,8 +101,9 @@ def load_directions(
         return np.broadcast_to(np.array(load.vector), (n, 3)), nowhere
     if load.kind in AXES:
         return np.broadcast_to(np.array(AXES[load.kind]), (n, 3)), nowhere
+    softest = softest or partial(_softest_of, compliance)
     if load.kind == "softest":
-        return softest_directions(compliance), nowhere
+        return softest(np.ones(n, dtype=bool), None), nowhere
     if load.kind == "radial":
         return _radial(position), nowhere
     axis = np.broadcast_to(np.array(AXES["z"]), (n, 3)) if rotation is None else rotation[:, :, 2]
@@ -103,10 +111,10 @@ def load_directions(
         return axis, nowhere
     still = ~np.any(tangent != 0.0, axis=1)
     if load.kind == "normal":
-        return _normal(compliance, axis, tangent, still)
+        return _normal(softest, axis, tangent, still)
     directions = tangent.copy()
     if still.any():
-        directions[still] = softest_directions(compliance[still])
+        directions[still] = softest(still, None)
     return directions, still
 
 
@@ -120,24 +128,24 @@ def _radial(position: FloatArray) -> FloatArray:
     return directions
 
 
-def _normal(
-    compliance: FloatArray, axis: FloatArray, tangent: FloatArray, still: BoolArray
-) -> tuple[FloatArray, BoolArray]:
+def _normal(softest: Softest, axis: FloatArray, tangent: FloatArray, still: BoolArray) -> tuple[FloatArray, BoolArray]:
     sideways = np.cross(axis, tangent)
     sine = np.linalg.norm(sideways, axis=1)
     plunge = ~still & (sine < ALONG_AXIS)
     directions = sideways / np.where(sine > 0.0, sine, 1.0)[:, None]
     if plunge.any():
-        directions[plunge] = _softest_across(compliance[plunge], axis[plunge])
+        directions[plunge] = softest(plunge, axis[plunge])
     if still.any():
-        directions[still] = softest_directions(compliance[still])
+        directions[still] = softest(still, None)
     return directions, still | plunge
 
 
-def _softest_across(compliance: FloatArray, axis: FloatArray) -> FloatArray:
-    """Softest direction in the plane across `axis`."""
+def _softest_of(compliance: FloatArray, rows: BoolArray, axis: FloatArray | None) -> FloatArray:
+    """Softest directions of some rows of the compliance (n, 3, 3), in the planes across `axis` if it is given."""
+    if axis is None:
+        return softest_directions(compliance[rows])
     across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
-    return softest_directions(across @ compliance @ across)
+    return softest_directions(across @ compliance[rows] @ across)
 
 
 def softest_directions(compliance: FloatArray) -> FloatArray:

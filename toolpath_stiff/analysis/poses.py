@@ -68,7 +68,10 @@ def evaluate_poses(
             return core.compliance_along(model, direction, tip, turn, tool_length, force)
         return np.asarray(np.einsum("ni,nij,nj->n", direction, compliance, direction))
 
-    soft, stiff = softest_directions(compliance), stiffest_directions(compliance)
+    if model.load_dependent:
+        soft, stiff = (core.extreme_directions(model, tip, turn, tool_length, force, which) for which in (True, False))
+    else:
+        soft, stiff = softest_directions(compliance), stiffest_directions(compliance)
     axes = np.stack([along(np.broadcast_to(axis, (len(tip), 3))) for axis in np.eye(3)], axis=1)
     everything = {
         "axes": 1.0 / axes,

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness import closed_form, exact
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
+from toolpath_stiff.stiffness import closed_form, exact, extremes
+from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 
 FloatArray = NDArray[np.float64]
@@ -143,4 +143,34 @@ def compliance_along(
         turn = None if rotation is None else rotation[rows]
         path = load_path(model, position[rows], turn, lengths[rows], force)
         result[rows] = exact.compliance_along(model, path, direction[rows])
+    return result
+
+
+def extreme_directions(
+    model: StiffnessModel,
+    position: FloatArray,
+    rotation: FloatArray | None = None,
+    tool_length: FloatArray | float = np.nan,
+    force: float = DEFAULT_FORCE,
+    softest: bool = True,
+    across: FloatArray | None = None,
+) -> FloatArray:
+    """Directions (n, 3) in which the tip gives way most, or least, load-dependent effects included.
+
+    With `across` (n, 3), unit vectors, only directions across these are looked at. Some 300 times the work of one
+    direction: without load-dependent effects the eigenvectors of the compliance say the same.
+    """
+    result = np.empty((len(position), 3))
+    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(position),))
+    at_a_time = max(1, BLOCK // extremes.DIRECTIONS)
+    for start in range(0, len(position), at_a_time):
+        rows = slice(start, start + at_a_time)
+        turn = None if rotation is None else rotation[rows]
+        path = load_path(model, position[rows], turn, lengths[rows], force)
+
+        def along(directions: FloatArray, poses: NDArray[np.int64], path: LoadPath = path) -> FloatArray:
+            return exact.compliance_along(model, path.take(poses), directions)
+
+        normals = None if across is None else across[rows]
+        result[rows] = extremes.extreme_directions(along, exact.tip_compliance(model, path), softest, normals)
     return result

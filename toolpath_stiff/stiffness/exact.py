@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.stiffness.shared_load import SharedLoad, settle
 from toolpath_stiff.units import mm_from_m
 
 FloatArray = NDArray[np.float64]
@@ -150,17 +151,81 @@ def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     return np.asarray(0.5 * (compliance + np.swapaxes(compliance, 1, 2)))
 
 
-def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
-    """(n,) m/N, displacement along unit vectors (n, 3) per force along them, load-dependent effects included.
+@dataclass(frozen=True)
+class Loaded:
+    """The machine under a load along one direction at n poses.
 
-    Those see the strut forces that the load would cause without them. Equilibrium alone fixes these forces, so that
-    this is exact unless a stiffness parallel to the struts shares the load.
+    Attributes
+    ----------
+    path, links
+        With the strut forces of the loaded machine, where effects depend on them.
+    twists, forces
+        (n, 6) m and rad of the tip, (n, 6) forces in the struts, both per newton of load.
+    """
+
+    path: LoadPath
+    links: Links
+    twists: FloatArray
+    forces: FloatArray
+
+
+def under_load(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> Loaded:
+    """The machine under a load of `path.force` along unit vectors (n, 3), load-dependent effects included.
+
+    Those see the strut forces of the loaded machine: the ones of equilibrium or, where a stiffness parallel to the
+    struts shares the load, the ones that agree with the compliances that they cause (`shared_load`).
+
+    Raises
+    ------
+    InputError
+        The strut forces do not settle.
     """
     wrenches = np.zeros((len(path), 6, 1))
     wrenches[:, :3, 0] = direction
     links = assemble_links(model, path)
     twists, forces = respond(path, links, wrenches)
     if model.load_dependent:
-        loaded = replace(path, strut_forces=forces[..., 0] * path.force[:, None])
-        twists, _ = respond(loaded, assemble_links(model, loaded), wrenches)
-    return np.asarray(np.einsum("ni,ni->n", twists[:, :3, 0], direction))
+        path = replace(path, strut_forces=forces[..., 0] * path.force[:, None])
+        if links.parallel is not None:
+            path = _settled(model, path, links.parallel, wrenches[..., 0])
+        links = assemble_links(model, path)
+        twists, forces = respond(path, links, wrenches)
+    return Loaded(path, links, twists[..., 0], forces[..., 0])
+
+
+def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
+    """(n,) m/N, displacement along unit vectors (n, 3) per force along them; see `under_load`."""
+    return np.asarray(np.einsum("ni,ni->n", under_load(model, path, direction).twists[:, :3], direction))
+
+
+def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenches: FloatArray) -> LoadPath:
+    """The path with strut forces that agree with the compliances that they cause."""
+    assert loaded.strut_forces is not None
+    regular = np.isfinite(loaded.strut_forces).all(axis=1)  # nan: a singular pose, which stays nan
+    if not regular.any():
+        return loaded
+    part = loaded.take(np.flatnonzero(regular))
+    assert part.strut_forces is not None
+    wrench = wrenches[regular] * part.force[:, None]
+
+    def compliance(forces: FloatArray, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+        links = assemble_links(model, replace(part.take(rows), strut_forces=forces))
+        return links.strut, np.zeros((len(rows), 6, 12)) if links.loads is None else links.loads[:, :6]
+
+    problem = SharedLoad(compliance, part.struts.jacobian, parallel[regular], wrench, part.force)
+    forces, settled = settle(problem, part.strut_forces)
+    if not settled.all():
+        raise _unsettled(model, part, int(np.argmin(settled)))
+    everywhere = np.full((len(loaded), 6), np.nan)
+    everywhere[regular] = forces
+    return replace(loaded, strut_forces=everywhere)
+
+
+def _unsettled(model: StiffnessModel, path: LoadPath, row: int) -> InputError:
+    x, y, z = (mm_from_m(float(v)) for v in path.position[row])
+    names = ", ".join(active.effect.name for active in model.effects if active.effect.load_dependent)
+    return InputError(
+        f"the strut forces do not settle at X{x:.1f} Y{y:.1f} Z{z:.1f} (mm) under {path.force[row]:g} N with {names}",
+        expected="a stretch of each strut that grows with its force",
+        hint="check the parameters of these effects",
+    )

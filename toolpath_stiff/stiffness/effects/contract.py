@@ -15,7 +15,7 @@ Everything is SI and batched over n poses. A method that an effect does not impl
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -107,7 +107,7 @@ class LoadPath:
     force
         (n,) N, size of the load at the tip.
     strut_forces
-        (n, 6) N, forces in the struts under that load, from equilibrium; None where no direction is given. Only
+        (n, 6) N, forces in the struts under that load, these effects included; None where no direction is given. Only
         effects that depend on the load (`load_dependent`) may ask for it.
     direction
         (n, 3) unit vectors, along which the load acts and the displacement is read; None where no direction is given.
@@ -131,6 +131,14 @@ class LoadPath:
 
     def __len__(self) -> int:
         return len(self.position)
+
+    def take(self, rows: NDArray[np.int64]) -> LoadPath:
+        """Some of the poses, by index; repeated as the index says."""
+        struts = Struts(*(values[rows] for values in vars(self.struts).values()))
+        arrays: dict[str, Any] = {
+            name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)
+        }
+        return replace(self, struts=struts, **arrays)
 
 
 class Effect:

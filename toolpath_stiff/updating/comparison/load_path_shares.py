@@ -53,16 +53,9 @@ def load_path_shares(model: StiffnessModel, data: Measurements) -> Shares:
 
 def _by_link(model: StiffnessModel, data: Measurements) -> FloatArray:
     """(n, links) m/N along each row's direction."""
-    path = measured_path(model, data)
-    wrenches = np.zeros((len(data), 6, 1))
-    wrenches[:, :3, 0] = data.direction
-    links = exact.assemble_links(model, path)
-    _, forces = exact.respond(path, links, wrenches)
-    if model.load_dependent:
-        path = replace(path, strut_forces=forces[..., 0] * path.force[:, None])
-        links = exact.assemble_links(model, path)
-        _, forces = exact.respond(path, links, wrenches)
-    f, w = forces[..., 0], wrenches[..., 0]
+    loaded = exact.under_load(model, measured_path(model, data), data.direction)
+    path, links, f = loaded.path, loaded.links, loaded.forces
+    w = np.concatenate([data.direction, np.zeros((len(data), 3))], axis=1)
     loads = np.concatenate([f, w], axis=1)
     columns = [*(f**2 / path.machine.strut_law.stiffness(path.struts.lengths)).T]
     for active in model.effects:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -104,7 +103,7 @@ class Predictor:
     def _full_path(self) -> LoadPath:
         """What instruments see of every row."""
         prepared = self._timeless
-        path = measured_path_rows(prepared.path, prepared.which)
+        path = prepared.path.take(prepared.which)
         missing = self.data.missing
         return replace(
             path,
@@ -199,17 +198,6 @@ def prepared_first(prepared: _Prepared) -> NDArray[np.int64]:
     first = np.zeros(len(prepared.data), dtype=np.int64)
     first[prepared.which[::-1]] = np.arange(len(prepared.which))[::-1]
     return first
-
-
-def measured_path_rows(path: LoadPath, rows: NDArray[np.int64]) -> LoadPath:
-    """The load path of some rows, repeated as the index says."""
-    struts = replace(path.struts, **{k: getattr(path.struts, k)[rows] for k in _array_fields(path.struts)})
-    chosen: dict[str, Any] = {k: getattr(path, k)[rows] for k in _array_fields(path)}
-    return replace(path, struts=struts, **chosen)
-
-
-def _array_fields(thing: object) -> list[str]:
-    return [name for name, value in vars(thing).items() if isinstance(value, np.ndarray)]
 
 
 def _prepare(model: StiffnessModel, data: Measurements, timed: bool) -> _Prepared:

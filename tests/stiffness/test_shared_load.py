@@ -1,0 +1,243 @@
+"""Load-dependent effects beside joints that resist turning, and extreme directions, against solves of their own.
+
+The opponent assembles six nonlinear springs and twelve rotational ones node by node and minimises the potential energy
+of the platform's six displacements with scipy; it knows neither secant compliances nor strut forces.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from tests.effects.cases import neutral_values
+from tests.stiffness.cases import nist, random_poses
+from toolpath_stiff.analysis.evaluate import evaluate
+from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.analysis.poses import evaluate_poses
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.path.rotations import roll_pitch_yaw
+from toolpath_stiff.stiffness import core, exact
+from toolpath_stiff.stiffness.effects import Effect, find_effect
+from toolpath_stiff.stiffness.effects.contract import Parameter
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path
+
+POSITION, ROTATION = random_poses(40, seed=11)
+
+
+def model_of(kappa: float = 0.0, gap: float = 0.0, contact: float = 0.0, more: tuple = ()) -> StiffnessModel:
+    given = (("joint_moment_stiffness", "stiffness", kappa), ("joint_clearance", "lost_motion", gap))
+    given += (("contact_nonlinearity", "compliance", contact),)
+    extra = [ActiveEffect(find_effect(name), {key: value}) for name, key, value in given if value]
+    for name, values in more:
+        effect = find_effect(name)
+        extra.append(ActiveEffect(effect, neutral_values(effect) | values))
+    return build_model(nist(), extra=extra)
+
+
+def strut_force(stretch: float, compliance: float, gap: float, contact: float) -> float:
+    """N in one strut that is `stretch` m longer: nothing within its gap, beyond it Hertz' contacts and the strut."""
+    beyond = abs(stretch) - gap
+    if beyond <= 0.0:
+        return 0.0
+    if contact < 1e-20:
+        return float(np.sign(stretch) * beyond / compliance)
+    hertz = contact * 500.0 ** (1.0 / 3.0)
+    most = 1.001 * beyond / compliance  # without the contact it would be all but this
+    force = brentq(lambda f: compliance * f + hertz * f ** (2.0 / 3.0) - beyond, 0.0, most, xtol=1e-9, rtol=1e-14)
+    return float(np.sign(stretch) * force)
+
+
+def spring_matrix(axis, arms, length):
+    """(6, 6) twice the energy of unit springs at both ends of all struts, from the motions of twelve hinges."""
+    matrix = np.zeros((6, 6))
+    for u, arm, reach in zip(axis, arms, length, strict=True):
+        for twist in np.eye(6):
+            swing = np.cross(u, twist[:3] + np.cross(twist[3:], arm)) / reach
+            for other in np.eye(6):
+                beside = np.cross(u, other[:3] + np.cross(other[3:], arm)) / reach
+                across = [t[3:] - (u @ t[3:]) * u for t in (twist, other)]
+                energy = swing @ beside + (swing - across[0]) @ (beside - across[1])
+                matrix += energy * np.outer(twist, other)
+    return matrix
+
+
+def opponent(machine, position, rotation, direction, force, kappa, gap, contact) -> float:
+    """N/m, secant stiffness of the tip at one pose: least potential energy over the platform's displacements."""
+    arms = machine.platform_joints @ rotation.T
+    spans = position + arms - machine.frame_joints
+    length = np.linalg.norm(spans, axis=1)
+    axis = spans / length[:, None]
+    law = machine.strut_law
+    rate = (law.stiffness_2 - law.stiffness_1) / (law.length_2 - law.length_1)
+    compliance = 1.0 / (law.stiffness_1 + rate * (length - law.length_1))
+    hertz = contact * 500.0 ** (1.0 / 3.0)
+    rows = np.array([[*u, *np.cross(arm, u)] for u, arm in zip(axis, arms, strict=True)])
+    springs, load = kappa * spring_matrix(axis, arms, length), np.array([*(force * direction), 0.0, 0.0, 0.0])
+
+    def parts(x):
+        stretch = rows @ x
+        pull = np.array([strut_force(e, c, gap, contact) for e, c in zip(stretch, compliance, strict=True)])
+        size = np.abs(pull)
+        stored = size * np.maximum(np.abs(stretch) - gap, 0.0) - 0.5 * compliance * size**2
+        stored -= 0.6 * hertz * size ** (5.0 / 3.0)
+        loaded = np.maximum(size, 1e-9)
+        rate = np.where(size > 0.0, 1.0 / (compliance + hertz * 2.0 / 3.0 * loaded ** (-1.0 / 3.0)), 0.0)
+        return stored.sum() + 0.5 * x @ springs @ x - load @ x, rows.T @ pull + springs @ x - load, rate
+
+    x = np.linalg.solve(rows.T @ (rows / compliance[:, None]) + springs, load)
+    for _ in range(500):
+        energy, gradient, rate = parts(x)
+        step = -np.linalg.solve(rows.T @ (rows * rate[:, None]) + springs, gradient)
+        share = 1.0
+        while share > 1e-12 and parts(x + share * step)[0] > energy + 1e-4 * share * (gradient @ step):
+            share *= 0.5
+        x = x + share * step
+        if np.abs(step).max() < 1e-13:
+            break
+    assert np.abs(parts(x)[1]).max() < 1e-4 * force
+    return float(force / (x[:3] @ direction))
+
+
+def unit(vector) -> np.ndarray:
+    return np.asarray(vector, dtype=float) / np.linalg.norm(vector)
+
+
+def stiffness(model, i, direction, force) -> float:
+    path = load_path(model, POSITION[i : i + 1], ROTATION[i : i + 1], force=force, direction=direction[None])
+    return float(1.0 / exact.compliance_along(model, path, direction[None])[0])
+
+
+@pytest.mark.parametrize("force", [100.0, 500.0, 4000.0])
+@pytest.mark.parametrize(("gap", "contact"), [(4e-6, 0.0), (0.0, 10e-9), (4e-6, 10e-9), (40e-6, 0.0)])
+@pytest.mark.parametrize("kappa", [5.0, 1e5, 5.5e5])
+def test_gaps_and_contacts_beside_stiff_joints_are_those_of_an_independent_solve(kappa, gap, contact, force):
+    """1e-5: below a thousandth of a newton a strut counts as idle here, the opponent's gaps are free."""
+    model = model_of(kappa, gap, contact)
+    rng = np.random.default_rng(5)
+    for i in range(3):
+        direction = unit(rng.normal(size=3))
+        expected = opponent(nist(), POSITION[i], ROTATION[i], direction, force, kappa, gap, contact)
+        assert stiffness(model, i, direction, force) == pytest.approx(expected, rel=1e-5)
+
+
+def test_one_pass_was_too_stiff_by_several_per_cent():
+    """What the forces of the linear machine, taken for those of the loaded one, would give here: the check can fail."""
+    model, linear = model_of(1e5, 4e-6), model_of(1e5)
+    direction, worst = np.eye(3), 0.0
+    for i in range(10):
+        for along in direction:
+            path = load_path(linear, POSITION[i : i + 1], ROTATION[i : i + 1], force=500.0)
+            wrench = np.array([[*along, 0.0, 0.0, 0.0]])[..., None]
+            forces = exact.respond(path, exact.assemble_links(linear, path), wrench)[1][0, :, 0] * 500.0
+            struts = exact.assemble_links(linear, path).strut + 4e-6 / np.abs(forces)
+            links = exact.Links(struts, None, exact.assemble_links(linear, path).parallel)
+            once = 1.0 / (exact.respond(path, links, wrench)[0][0, :3, 0] @ along)
+            worst = max(worst, once / stiffness(model, i, along, 500.0) - 1.0)
+    assert 0.03 < worst < 0.2
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(0, 39),
+    st.floats(0.0, 6.3),
+    st.floats(0.0, 6.3).map(lambda power: 10.0**power),
+    st.floats(-7.0, -3.7).map(lambda power: 10.0**power),
+    st.floats(0.0, 200e-9),
+    st.floats(2.0, 4.5).map(lambda power: 10.0**power),
+)
+def test_any_sizes_settle_on_the_independent_solve(i, turn, kappa, gap, contact, force):
+    direction = unit([np.cos(turn), np.sin(turn), 0.3])
+    found = stiffness(model_of(kappa, gap, contact), i, direction, force)
+    # A gap makes any equilibrium softer: twice the complementary energy of the linear parts alone is least without it.
+    assert found <= stiffness(model_of(kappa), i, direction, force) * (1.0 + 1e-9)
+    expected = opponent(nist(), POSITION[i], ROTATION[i], direction, force, kappa, gap, contact)
+    assert found == pytest.approx(expected, rel=1e-4)  # idle below 1e-3 N here, within the gap there
+
+
+@pytest.mark.parametrize("force", [1.0, 30.0, 2000.0])
+def test_every_pose_settles_beside_a_soft_frame_too(force):
+    more = (("frame_compliance", {}), ("spindle_compliance", {}))
+    direction = np.tile(unit([0.6, -0.2, 0.5]), (40, 1))
+    for kappa in (1e2, 1e5, 2e6):
+        model = model_of(kappa, 20e-6, 50e-9, more)
+        assert np.isfinite(core.compliance_along(model, direction, POSITION, ROTATION, force=force)).all()
+
+
+class Slack(Effect):
+    """A strut that gives less the more it is loaded: no equilibrium to be trusted."""
+
+    name, title, link, equation, source = "slack", "snaps through", "struts", "c = a / F^2", "this test"
+    parameters = (Parameter("size", "m N", 1.0, (0.0, 1.0), (0.0, 1.0), "this test"),)
+    load_dependent = True
+
+    def strut_compliance(self, path, p):
+        if path.strut_forces is None:
+            return None
+        return p["size"] / np.maximum(np.abs(path.strut_forces), 1e-3) ** 2
+
+
+def test_forces_that_do_not_settle_are_an_error_that_names_effect_and_pose():
+    model = build_model(
+        nist(),
+        extra=[
+            ActiveEffect(find_effect("joint_moment_stiffness"), {"stiffness": 5e5}),
+            ActiveEffect(Slack(), {"size": 2e-3}),
+        ],
+    )
+    position, _ = random_poses(200, 2)
+    with pytest.raises(InputError, match=r"do not settle at X.* under 400 N with slack"):
+        core.compliance_along(model, np.tile(unit([1, 2, 3]), (200, 1)), position, force=400.0)
+
+
+@pytest.mark.parametrize("kappa", [0.0, 1e5])
+def test_no_direction_is_softer_than_the_softest_or_stiffer_than_the_stiffest(kappa):
+    model = model_of(kappa, 4e-6, 10e-9)
+    rng = np.random.default_rng(8)
+    count = 1500
+    found = evaluate_poses(model, POSITION[:5], roll_pitch_yaw(ROTATION[:5]), force=500.0)
+    linear = evaluate_poses(model_of(kappa), POSITION[:5], roll_pitch_yaw(ROTATION[:5]), force=500.0)
+    beyond = []
+    for i in range(5):
+        directions = rng.normal(size=(count, 3))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        place = np.repeat(POSITION[i : i + 1], count, axis=0), np.repeat(ROTATION[i : i + 1], count, axis=0)
+        tried = 1.0 / core.compliance_along(model, directions, *place, force=500.0)
+        assert found.softest_stiffness[i] <= tried.min() * (1.0 + 1e-6)
+        assert found.stiffest_stiffness[i] >= tried.max() * (1.0 - 1e-6)
+        by_tensor = stiffness(model, i, linear.softest[i], 500.0)
+        beyond.append(by_tensor / found.softest_stiffness[i] - 1.0)
+        assert by_tensor >= found.softest_stiffness[i] * (1.0 - 1e-9)
+    assert max(beyond) > 1e-3  # the eigenvector of the linear tensor was not the softest direction
+
+
+def test_without_load_dependence_the_search_finds_the_eigenvectors():
+    model = model_of(1e5)
+    place = POSITION[:6], ROTATION[:6]
+    found = core.extreme_directions(model, *place)
+    values = np.linalg.eigvalsh(core.tip_compliance(model, *place))
+    along = core.compliance_along(model, found, *place)
+    assert along == pytest.approx(values[:, -1], rel=1e-6)
+
+
+def test_loads_that_mean_the_softest_direction_mean_it_under_the_load():
+    """`softest`, and a move along the tool axis under `normal`, which takes the softest direction across it."""
+    model = model_of(0.0, 4e-6, 10e-9)
+    place = POSITION[:4], roll_pitch_yaw(ROTATION[:4])
+    axis = ROTATION[:4, :, 2]
+    soft = evaluate(model, *place, axis, load=Load("softest"), force=500.0)
+    poses = evaluate_poses(model, *place, force=500.0)
+    assert soft.stiffness == pytest.approx(poses.softest_stiffness, rel=1e-9)
+    across = evaluate(model, *place, axis, load=Load("normal"), force=500.0)
+    assert np.einsum("ni,ni->n", across.direction, axis) == pytest.approx(np.zeros(4), abs=1e-9)
+    assert across.substituted.all()
+    turns = np.linspace(0.0, np.pi, 360, endpoint=False)
+    for i in range(4):
+        one = unit(np.cross(axis[i], [1.0, 0.3, 0.2]))
+        two = np.cross(axis[i], one)
+        around = np.cos(turns)[:, None] * one + np.sin(turns)[:, None] * two
+        same = np.repeat(POSITION[i : i + 1], 360, axis=0), np.repeat(ROTATION[i : i + 1], 360, axis=0)
+        tried = 1.0 / core.compliance_along(model, around, *same, force=500.0)
+        assert across.stiffness[i] <= tried.min() * (1.0 + 1e-6)
