@@ -139,7 +139,7 @@ def test_one_pass_was_too_stiff_by_several_per_cent():
     assert 0.03 < worst < 0.2
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.integers(0, 39),
     st.floats(0.0, 6.3),
@@ -167,16 +167,16 @@ def test_every_pose_settles_beside_a_soft_frame_too(force):
 
 
 class Slack(Effect):
-    """A strut that gives less the more it is loaded: no equilibrium to be trusted."""
+    """A strut whose stretch jumps up and down with its force: no equilibrium to be found."""
 
-    name, title, link, equation, source = "slack", "snaps through", "struts", "c = a / F^2", "this test"
-    parameters = (Parameter("size", "m N", 1.0, (0.0, 1.0), (0.0, 1.0), "this test"),)
+    name, title, link, equation, source = "slack", "snaps to and fro", "struts", "c = a (F mod 2 < 1)", "this test"
+    parameters = (Parameter("size", "m/N", 1.0, (0.0, 1.0), (0.0, 1.0), "this test"),)
     load_dependent = True
 
     def strut_compliance(self, path, p):
         if path.strut_forces is None:
             return None
-        return p["size"] / np.maximum(np.abs(path.strut_forces), 1e-3) ** 2
+        return p["size"] * (np.abs(path.strut_forces) % 2.0 < 1.0)
 
 
 def test_forces_that_do_not_settle_are_an_error_that_names_effect_and_pose():
@@ -184,7 +184,7 @@ def test_forces_that_do_not_settle_are_an_error_that_names_effect_and_pose():
         nist(),
         extra=[
             ActiveEffect(find_effect("joint_moment_stiffness"), {"stiffness": 5e5}),
-            ActiveEffect(Slack(), {"size": 2e-3}),
+            ActiveEffect(Slack(), {"size": 1e-6}),
         ],
     )
     position, _ = random_poses(200, 2)
