@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.analysis.cut_classes import headline_of, headline_words
 from toolpath_stiff.analysis.path_analysis import Analysis
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
@@ -32,6 +33,38 @@ def weighted_figures(stiffness: FloatArray, weight: FloatArray, force: float) ->
         "max_N_per_mm": n_per_mm_from_n_per_m(high),
         "range_N_per_mm": n_per_mm_from_n_per_m(high - low),
         "mean_deflection_um": um_from_m(float(np.average(force / stiffness, weights=weight))),
+    }
+
+
+def class_figures(analysis: Analysis, rows: IntArray) -> dict[str, Any]:
+    """The headline figures of the samples `rows`, what they are about, their weakest place, and the plunges beside.
+
+    `rows` (m,) are rows of samples, in order; only those in the statistics count. `plunges` is None without any.
+    """
+    counted, plunging = analysis.counted[rows], analysis.plunging[rows]
+    about = rows[headline_of(counted, plunging)]
+    return {
+        "headline": headline_words(analysis.load, counted, plunging),
+        **_figures_and_weakest(analysis, about),
+        "plunges": _plunges(analysis, rows[plunging]) if plunging.any() else None,
+    }
+
+
+def _plunges(analysis: Analysis, rows: IntArray) -> dict[str, Any]:
+    samples = analysis.samples
+    return {
+        "samples": len(rows),
+        "moves": len(np.unique(samples.move[rows])),
+        "length_mm": mm_from_m(float(samples.weight[rows].sum())),
+        **_figures_and_weakest(analysis, rows),
+    }
+
+
+def _figures_and_weakest(analysis: Analysis, rows: IntArray) -> dict[str, Any]:
+    stiffness = analysis.at.stiffness[rows]
+    return {
+        **weighted_figures(stiffness, analysis.samples.weight[rows], analysis.force),
+        "weakest": describe_sample(analysis, int(rows[np.argmin(stiffness)])) if len(rows) else None,
     }
 
 
@@ -97,7 +130,7 @@ class _Parts:
         self.cutting_length = np.bincount(of_move, np.where(cutting, length, 0.0), count)
         self.rapid_length = np.bincount(of_move, np.where(cutting, 0.0, length), count)
         self.time = np.bincount(of_move, time, count)
-        self.counted, self.out_of_reach = analysis.counted, analysis.out_of_reach
+        self.out_of_reach = analysis.out_of_reach
         self.margin = np.where(samples.cutting & analysis.at.reachable, analysis.at.margin, np.inf)
         of_sample = of_move[samples.move]
         order = np.argsort(of_sample, kind="stable")
@@ -107,16 +140,13 @@ class _Parts:
     def row(self, part: int) -> dict[str, Any]:
         """Length, time, figures, weakest place and nearest limit of one part."""
         analysis, rows = self.analysis, self.rows[part]
-        counted = rows[self.counted[rows]]
-        stiffness = analysis.at.stiffness[counted]
         nearest = int(rows[np.argmin(self.margin[rows])])
         known = bool(np.isfinite(self.margin[nearest]))
         return {
             "cutting_length_mm": mm_from_m(float(self.cutting_length[part])),
             "rapid_length_mm": mm_from_m(float(self.rapid_length[part])),
             "time_s": float(self.time[part]),
-            **weighted_figures(stiffness, analysis.samples.weight[counted], analysis.force),
-            "weakest": describe_sample(analysis, int(counted[np.argmin(stiffness)])) if len(counted) else None,
+            **class_figures(analysis, rows),
             "min_margin": float(self.margin[nearest]) if known else None,
             "min_margin_limit": analysis.at.reach.describe(nearest) if known else None,
             "min_margin_line": int(analysis.samples.line[nearest]) if known else None,

@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 PLUNGE_ANGLE = rad_from_deg(5.0)  # rad between motion and tool axis; helical and ramping entries are well beyond it
+ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"
 BLOCK = 16_384  # samples at a time: nine numbers for each
 
 
@@ -71,5 +72,17 @@ def headline_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: Boo
     counted
         (n,) the samples of the statistics.
     """
-    across = counted & ~plunging_rows(load, tangent, abc, counted)
+    return headline_of(counted, plunging_rows(load, tangent, abc, counted))
+
+
+def headline_of(counted: BoolArray, plunging: BoolArray) -> BoolArray:
+    """(n,) the counted samples that do not plunge; all of them where every one does. Also of a part of a path."""
+    across = counted & ~plunging
     return np.asarray(across if across.any() else counted)
+
+
+def headline_words(load: Load, counted: BoolArray, plunging: BoolArray) -> str:
+    """What the headline figures of these samples (n,) are about: `ACROSS`, `PLUNGES_ONLY` or `ALL_CUTS`."""
+    if load.kind != "tangential" or not counted.any():
+        return ALL_CUTS
+    return PLUNGES_ONLY if plunging[counted].all() else ACROSS

@@ -98,14 +98,14 @@ def _stiffness(analysis: Analysis, model: StiffnessModel) -> FloatArray:
 
 
 def band_figures(analysis: Analysis) -> dict[str, Any] | None:
-    """The figures of `summary.json`: standard deviations and 95 % intervals in N/mm; None without a band."""
-    band, counted = analysis.parameter_band, analysis.counted
-    if band is None or not counted.any():
+    """The headline figures of `summary.json`: standard deviations and 95 % intervals in N/mm; None without a band."""
+    band, about = analysis.parameter_band, analysis.headline
+    if band is None or not about.any():
         return None
-    stiffness, weight = analysis.at.stiffness, np.where(counted, analysis.samples.weight, 0.0)
-    relative = np.where(counted, band.deviation / stiffness, 0.0)
-    mean, mean_sd = float(np.average(stiffness[counted], weights=weight[counted])), band.deviation_of_mean(weight)
-    row = int(np.argmin(np.where(counted, stiffness, np.inf)))
+    stiffness, weight = analysis.at.stiffness, np.where(about, analysis.samples.weight, 0.0)
+    relative = np.where(about, band.deviation / stiffness, 0.0)
+    mean, mean_sd = float(np.average(stiffness[about], weights=weight[about])), band.deviation_of_mean(weight)
+    row = int(np.argmin(np.where(about, stiffness, np.inf)))
     widest = int(np.argmax(relative))
     return {
         "parameters": list(band.names),

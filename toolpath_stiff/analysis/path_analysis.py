@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.analysis.cut_classes import headline_of, plunging_rows
 from toolpath_stiff.analysis.evaluate import PoseStiffness, Progress, evaluate
 from toolpath_stiff.analysis.loads import RULES, Load, parse_load
 from toolpath_stiff.analysis.parameter_band import ParameterBand, parameter_band
@@ -72,10 +73,25 @@ class Analysis:
         """The machine, geometry effects included."""
         return self.model.machine
 
-    @property
+    @cached_property
     def counted(self) -> BoolArray:
         """(n,) samples in the statistics: cutting, reachable, with a load in the asked direction."""
         return np.asarray(self.samples.cutting & self.at.reachable & (self.samples.weight > 0.0))
+
+    @cached_property
+    def plunging(self) -> BoolArray:
+        """(n,) counted samples of plunges along the tool axis; none where the load does not follow the motion."""
+        return plunging_rows(self.load, self.samples.tangent, self.samples.abc, self.counted)
+
+    @property
+    def headline(self) -> BoolArray:
+        """(n,) counted samples that mean, range and weakest place are about: those of `headline_rows`."""
+        return headline_of(self.counted, self.plunging)
+
+    @property
+    def set_aside(self) -> BoolArray:
+        """(n,) plunges beside the headline; none of a program that only plunges."""
+        return np.asarray(self.counted & ~self.headline)
 
     @property
     def deflection(self) -> FloatArray:

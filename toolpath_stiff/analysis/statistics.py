@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.breakdown import describe_sample, per_operation, per_tool, weighted_figures
+from toolpath_stiff.analysis.breakdown import class_figures, describe_sample, per_operation, per_tool, weighted_figures
 from toolpath_stiff.analysis.parameter_band import band_figures
 from toolpath_stiff.analysis.path_analysis import Analysis, assumptions
 from toolpath_stiff.nc.moves import RAPID
@@ -37,8 +37,8 @@ def path_length(samples: Samples, rapid: bool) -> float:
 
 
 def weakest_places(analysis: Analysis, count: int = 3) -> list[int]:
-    """Rows of the weakest counted samples, one a place: apart by at least a twentieth of the path, other lines."""
-    rows = np.flatnonzero(analysis.counted)
+    """Rows of the weakest headline samples, one a place: apart by at least a twentieth of the path, other lines."""
+    rows = np.flatnonzero(analysis.headline)
     if not len(rows):
         return []
     s, line = analysis.samples.s, analysis.samples.line
@@ -55,7 +55,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
     """The figures of `summary.json`, in the shop's units."""
     from toolpath_stiff import __version__
 
-    samples, counted = analysis.samples, analysis.counted
+    samples = analysis.samples
     places = weakest_places(analysis)
     cutting = samples.cutting & analysis.at.reachable
     x, y, z, a, b, c = analysis.origin
@@ -75,9 +75,8 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
         "cutting_length_mm": mm_from_m(path_length(samples, rapid=False)),
         "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
         "time_s": float(samples.t[-1]) if len(samples) else 0.0,
-        **stiffness_figures(analysis, counted),
+        **class_figures(analysis, np.arange(len(samples))),
         **({} if band is None else {"parameter_uncertainty": band}),
-        "weakest": describe_sample(analysis, places[0]) if places else None,
         "weakest_places": [describe_sample(analysis, row) for row in places],
         "per_tool": per_tool(analysis),
         "per_operation": per_operation(analysis),

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.analysis.cut_classes import along_tool_axis
 from toolpath_stiff.analysis.path_analysis import Analysis
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
+from toolpath_stiff.path.samples import Samples
 from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
@@ -25,6 +27,7 @@ COLUMNS: dict[str, int | None] = {
     "margin": 6,
     "margin_limit": None,
     "operation": None,
+    "cut": None,
 }
 
 
@@ -40,7 +43,14 @@ def sample_columns(analysis: Analysis, rows: slice = slice(None)) -> dict[str, N
         "margin": at.margin[rows],
         "margin_limit": names[at.limit[rows]],
         "operation": analysis.operations.of_move[analysis.samples.move[rows]] + 1,
+        "cut": _cut(analysis.samples.take(rows)),
     }
+
+
+def _cut(samples: Samples) -> NDArray[np.str_]:
+    """(n,) "across" or "plunge", whatever the load; "" on rapids and where the tip does not move."""
+    moving = samples.cutting & samples.tangent.any(axis=1)
+    return np.where(moving, np.where(along_tool_axis(samples.tangent, samples.abc), "plunge", "across"), "")
 
 
 def samples_frame(analysis: Analysis) -> pd.DataFrame:

@@ -101,7 +101,7 @@ def run_case_study(model: StiffnessModel, step: float = 1e-3) -> CaseStudy:
 
 
 def _figures(analysis: Analysis) -> dict[str, float]:
-    found = stiffness_figures(analysis, analysis.counted)
+    found = stiffness_figures(analysis, analysis.headline)
     return {
         key: round(float(found[key]), DECIMALS)
         for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")

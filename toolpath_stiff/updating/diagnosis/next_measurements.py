@@ -79,7 +79,7 @@ def choice_on_path(diagnosis: Diagnosis, program: Program, origin: Pose | None =
             analysis = analyse(model, program, origin=origin, step=PATH_STEP)
         except TpsError as error:
             return {"program": program.name, "reason": str(error)}
-        figures = stiffness_figures(analysis, analysis.counted)
+        figures = stiffness_figures(analysis, analysis.headline)
         found["explanations"][name] = {
             key: round(figures[key], 1) for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
         }
