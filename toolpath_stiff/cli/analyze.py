@@ -31,6 +31,11 @@ example:
   tps analyze programs/pocket.nc --origin 100,-50,800 --load normal --require 40000
   tps analyze programs more/part.nc --jobs 4    all programs of a folder and one more, four at a time
 
+plunges:
+  With the tangential load, cuts along the tool axis (within 5 degrees of it) are left out of mean, range, weakest
+  place, axes and colours: a few short plunges into a stiff direction would rule them all. Their own figures stand
+  beside, and --require holds for them as well.
+
 files written to --out:
   samples.csv   every sample: line, position, stiffness, strut lengths, margin to the nearest limit
   summary.json  the figures, those of each tool and operation too, what was assumed, what was not acted upon
@@ -80,6 +85,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format", choices=("csv", "parquet"), default="csv", help="format of the samples (default: csv)"
     )
     add_json_option(parser, "print summary.json to standard output and nothing else")
+    parser.add_argument(
+        "--show-plunges",
+        action="store_true",
+        help="let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch)",
+    )
     parser.add_argument("--no-plots", action="store_true", help="only the samples and the summary")
     parser.add_argument(
         "--partial",
@@ -159,7 +169,13 @@ def analyse_and_write(
         second = analyse(models.second, read_program_for(args, file, models.second.machine), **options)
     required = None if args.require is None else n_per_m_from_n_per_mm(args.require)
     files = write_analysis(
-        analysis, folder, plots=not args.no_plots, table=args.format, required=required, other=second
+        analysis,
+        folder,
+        plots=not args.no_plots,
+        table=args.format,
+        required=required,
+        other=second,
+        show_plunges=args.show_plunges,
     )
     return Report(
         program=program,

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from toolpath_stiff.report.wording import duration, number, plain, shortened
+from toolpath_stiff.report.wording import duration, number, only_plunges, plain, shortened
 
 WIDTH = 100  # columns of the terminal
 MOST_NAME = 36  # of them for the name
@@ -30,6 +30,11 @@ COLUMNS: Mapping[str, int | None] = {
     "max_N_per_mm": 4,
     "range_N_per_mm": 4,
     "mean_deflection_um": 4,
+    "headline": None,
+    "plunge_length_mm": 3,
+    "plunge_mean_N_per_mm": 4,
+    "plunge_min_N_per_mm": 4,
+    "plunge_max_N_per_mm": 4,
     "weakest_line": 0,
     "weakest_text": None,
     "weakest_x_mm": 4,
@@ -51,9 +56,10 @@ COLUMNS: Mapping[str, int | None] = {
     "compare_min_N_per_mm": 4,
     "compare_mean_difference_percent": 3,
 }
+PLUNGE_KEYS = ("length_mm", "mean_N_per_mm", "min_N_per_mm", "max_N_per_mm")
 SAME_NAME = (
     "machine", "load", "force_N", "samples", "cutting_length_mm", "rapid_length_mm", "time_s", "mean_N_per_mm",
-    "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um", "min_margin", "min_margin_line",
+    "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um", "headline", "min_margin", "min_margin_line",
     "out_of_reach_samples", "extrapolated_share",
 )  # fmt: skip
 
@@ -97,6 +103,9 @@ def figures_of(summary: Mapping[str, Any]) -> dict[str, Any]:
     if place is not None:
         keys = ("line", "text", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
         found |= {f"weakest_{key}": place[key] for key in keys}
+    plunges = summary["plunges"]
+    if plunges is not None:
+        found |= {f"plunge_{key}": plunges[key] for key in PLUNGE_KEYS}
     found |= {"warnings": len(summary["warnings"]), "not_acted_upon": len(summary["unsupported"])}
     if "required" in summary:
         found["required_N_per_mm"] = summary["required"]["required_N_per_mm"]
@@ -135,6 +144,9 @@ def terminal_summary(outcomes: Sequence[Outcome]) -> str:
     good = [one for one in outcomes if one.figures is not None]
     failed = [one for one in outcomes if one.figures is None]
     lines = _table(good) if good else []
+    plunging = [plain(one.name) for one in good if only_plunges(one.figures or {})]
+    if plunging:
+        lines.append(f"figures of plunges, nothing else is cut: {', '.join(plunging)}")
     partial = [one for one in good if one.status == "partial"]
     if partial:
         lines.append("cutting samples out of reach, left out:")

@@ -12,14 +12,12 @@ def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> d
     """The entry `compare` of `summary.json`.
 
     The other machine's figures, and `difference_percent`: how much higher each is than the first machine's
-    (None where a figure is missing, or the first machine's is zero).
+    (None where a figure is missing, or the first machine's is zero); the same for the mean of the plunges.
     """
-    difference = {}
-    for name in FIGURES:
-        first, second = summary.get(name), other.get(name)
-        difference[name.partition("_N_per")[0].removesuffix("_um")] = (
-            None if first is None or second is None or not first else (second - first) / first * 100.0
-        )
+    difference = {
+        name.partition("_N_per")[0].removesuffix("_um"): _higher(summary.get(name), other.get(name)) for name in FIGURES
+    }
+    plunges = [(one.get("plunges") or {}).get("mean_N_per_mm") for one in (summary, other)]
     return {
         "machine": other["machine"],
         **{name: other.get(name) for name in FIGURES},
@@ -27,4 +25,12 @@ def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> d
         "out_of_reach_samples": other.get("out_of_reach_samples"),
         "extrapolated_share": other.get("extrapolated_share"),
         "difference_percent": difference,
+        "headline": other.get("headline"),
+        "plunges": other.get("plunges"),
+        "plunges_difference_percent": _higher(*plunges),
     }
+
+
+def _higher(first: float | None, second: float | None) -> float | None:
+    """By how much the second is higher, in percent of the first; None where that cannot be said."""
+    return None if first is None or second is None or not first else (second - first) / first * 100.0

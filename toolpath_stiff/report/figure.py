@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpath_stiff.analysis.statistics import stiffness_figures
-from toolpath_stiff.report.wording import number, plain, shortened
+from toolpath_stiff.analysis.breakdown import class_figures
+from toolpath_stiff.report.wording import headline_text, plain, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 DPI = 100
 INK, MUTED, GRID = "#1f2933", "#616e7c", "#e4e7eb"
-RAPID_GREY, UNREACHABLE_RED, SECOND_ORANGE = "#9aa5b1", "#d64545", "#de6b12"
+PLUNGE_SLATE, RAPID_GREY, UNREACHABLE_RED, SECOND_ORANGE = "#52606d", "#9aa5b1", "#d64545", "#de6b12"
 COLOUR_MAP = "viridis"
 STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same glyphs on every machine
@@ -74,10 +74,9 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 def add_heading(figure: Figure, analysis: Analysis) -> None:
-    """Program, machine, load, mean and range above everything."""
+    """Program, machine, load, mean and range, and those of the plunges, above everything."""
     width, height = figure.get_size_inches()
-    figures = stiffness_figures(analysis, analysis.counted)
-    mean, low, high = (number(figures[name]) for name in ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm"))
+    figures = class_figures(analysis, np.arange(len(analysis.samples)))
     figure.text(
         0.35 / width,
         1.0 - 0.42 / height,
@@ -89,7 +88,7 @@ def add_heading(figure: Figure, analysis: Analysis) -> None:
         0.35 / width,
         1.0 - 0.70 / height,
         f"machine {shortened(plain(analysis.machine.name), 40)}   ·   load {analysis.load}   ·   "
-        f"mean {mean} N/mm   ({low} to {high})",
+        f"{headline_text(figures, '   ·   ')}",
         fontsize=10.5,
         color=MUTED,
     )

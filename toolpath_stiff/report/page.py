@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.report.page_data import page_data
 from toolpath_stiff.report.page_tables import page_tables
 from toolpath_stiff.report.sections import script_hash
-from toolpath_stiff.report.wording import number, plain
+from toolpath_stiff.report.wording import headline_text, number, plain
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
@@ -27,7 +27,12 @@ SCRIPTS = ("path_data.js", "path_view.js", "profile_view.js", "listing.js", "ope
 
 
 def page(
-    analysis: Analysis, summary: Mapping[str, Any], *, required: float | None = None, other: Analysis | None = None
+    analysis: Analysis,
+    summary: Mapping[str, Any],
+    *,
+    required: float | None = None,
+    other: Analysis | None = None,
+    show_plunges: bool = False,
 ) -> str:
     """The page as text.
 
@@ -41,6 +46,8 @@ def page(
         N/m: drawn in the profile.
     other
         The same program on another machine: a second curve.
+    show_plunges
+        How the switch stands that lets plunges set the axis and the colour scale.
     """
     data = page_data(analysis, required, other)
     script = '\n"use strict";\n(() => {\n' + "".join(_asset(name) for name in SCRIPTS) + "})();\n"
@@ -55,6 +62,7 @@ def page(
             "script": script,
             "script_hash": script_hash(script),
             "data": json_for_script(data),
+            "plunges_shown": " checked" if show_plunges else "",
             "warnings": "\n".join(f'<p class="warning">{html.escape(plain(w))}</p>' for w in summary["warnings"]),
             "note": _thinned_note(data["count"], len(analysis.samples)),
             "tables": page_tables(summary, data["weakest"]),
@@ -82,10 +90,9 @@ def _asset(name: str) -> str:
 
 
 def _heading(summary: Mapping[str, Any]) -> str:
-    low, high = number(summary["min_N_per_mm"]), number(summary["max_N_per_mm"])
     return (
         f"machine {plain(str(summary['machine']))} · load {summary['load']}, {summary['force_N']:g} N · "
-        f"mean {number(summary['mean_N_per_mm'])} N/mm ({low} to {high})"
+        f"{headline_text(summary, ' · ')}"
     )
 
 

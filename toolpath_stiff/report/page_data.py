@@ -24,7 +24,7 @@ IntArray = NDArray[np.int64]
 MOST_SAMPLES = 200_000  # on the page: some 5 MB; the tables are always of all samples
 OTHER_COLUMNS = 4000  # columns of pixels that the other machine's curve is thinned to
 NONE = 65535  # a value that does not exist
-OUT_OF_REACH = 8  # flag beside the motion
+OUT_OF_REACH, PLUNGE = 8, 16  # flags beside the motion
 
 
 def page_data(analysis: Analysis, required: float | None, other: Analysis | None) -> dict[str, Any]:
@@ -38,11 +38,9 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
     points = mm_from_m(samples.position)
     frame = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
     box = mm_from_m(analysis.samples.position[analysis.samples.cutting])
-    limits = scale_limits(analysis)
-    extend = legend_extend(analysis, limits)
     stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(at.stiffness[rows]))
     margin, margin_range = _fractions(at.margin[rows])
-    kind = samples.motion + OUT_OF_REACH * ~at.reachable[rows]
+    kind = samples.motion + OUT_OF_REACH * ~at.reachable[rows] + PLUNGE * analysis.set_aside[rows]
     tool_starts = np.flatnonzero(np.diff(samples.tool, prepend=-1) != 0)
     return {
         "machine": plain(analysis.machine.name),
@@ -64,14 +62,22 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "tools": [[int(i), int(samples.tool[i])] for i in tool_starts],
         "operations": _operations(analysis, samples.move),
         "weakest": [int(np.searchsorted(rows, row)) for row in weakest_places(analysis)],
-        "scale": limits,
-        "extend": {"low": extend in ("min", "both"), "high": extend in ("max", "both")},
+        "scale": _scale(analysis, False),
+        "scale_with_plunges": _scale(analysis, True) if analysis.set_aside.any() else None,
+        "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
         "colours": class_colours(0.0, 0.93),  # the lightest yellow does not show on white,
         "colours_dark": class_colours(0.22, 1.0),  # nor the darkest violet on black
-        "mean": stiffness_figures(analysis, analysis.counted)["mean_N_per_mm"],
+        "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
         "required": None if required is None else n_per_mm_from_n_per_m(required),
         "other": None if other is None else _other_curve(other),
     }
+
+
+def _scale(analysis: Analysis, show_plunges: bool) -> dict[str, Any]:
+    """Ends of the colour scale, N/mm, and whether values lie beyond them."""
+    limits = scale_limits(analysis, show_plunges)
+    extend = legend_extend(analysis, limits)
+    return {"ends": limits, "beyond_low": extend in ("min", "both"), "beyond_high": extend in ("max", "both")}
 
 
 def page_rows(analysis: Analysis) -> IntArray:
@@ -86,6 +92,9 @@ def page_rows(analysis: Analysis) -> IntArray:
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too
     firsts = np.searchsorted(analysis.samples.move, [row.first_move for row in analysis.operations.rows])
     wanted = np.array([0, *weakest_places(analysis)], dtype=np.int64)
+    # A stretch's extremes may be plunges: the headline's own are kept as well.
+    beside = np.where(analysis.set_aside, np.nan, stiffness)
+    extremes = np.union1d(extremes, extremes_by_column(np.arange(n, dtype=float), beside, MOST_SAMPLES // 12))
     return np.unique(np.concatenate([extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
 
 
@@ -103,6 +112,7 @@ def _other_curve(other: Analysis) -> dict[str, str]:
         "machine": plain(other.machine.name),
         "s": _base64(s[keep].astype("<f4")),
         "stiffness": _base64(stiffness[keep].astype("<f4")),
+        "plunge": _base64(other.set_aside[keep].astype("u1")),
     }
 
 

@@ -7,9 +7,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.report.comparison import FIGURES
-from toolpath_stiff.report.wording import READERS, duration, number, plain, shortened
+from toolpath_stiff.report.wording import (
+    ONLY_PLUNGES,
+    READERS,
+    duration,
+    number,
+    only_plunges,
+    plain,
+    plunges_beside,
+    shortened,
+    span_of,
+)
 
 TITLES = ("mean N/mm", "min N/mm", "max N/mm", "range N/mm", "mean deflection um")
+PLUNGES_TITLE = "plunges N/mm"
 MOST_ROWS = 200  # of lines below the required stiffness; all are in summary.json
 
 
@@ -57,6 +68,7 @@ def _figures(summary: Mapping[str, Any]) -> str:
         (title[0].upper() + title[1:], number(summary[name], 2 if name.endswith("_um") else 0))
         for title, name in zip(TITLES, FIGURES, strict=True)
     ]
+    rows += _plunges(summary)
     rows += [
         ("Cutting length mm", number(summary["cutting_length_mm"], 1)),
         ("Rapid length mm", number(summary["rapid_length_mm"], 1)),
@@ -71,6 +83,28 @@ def _figures(summary: Mapping[str, Any]) -> str:
         ("Nearest limit", f"line {summary['min_margin_line']}: {summary['min_margin_limit']}"),
     ]
     return _table((), [(_text(name), _text(value)) for name, value in rows], ())
+
+
+def _plunges(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the figures are about, and those of the plunges beside them."""
+    plunges = plunges_beside(summary)
+    if plunges is None:
+        return [("These are figures of", summary["headline"])]
+    place = plunges["weakest"]
+    return [
+        ("These are figures of", f"cuts {summary['headline']}"),
+        ("Plunges along the axis", f"{number(plunges['length_mm'], 1)} mm in {number(plunges['moves'])} moves"),
+        ("Plunges N/mm", f"mean {number(plunges['mean_N_per_mm'])}, {span_of(plunges)}"),
+        ("Weakest plunge", f"{number(place['stiffness_N_per_mm'])} N/mm in line {place['line']}: {place['text']}"),
+    ]
+
+
+def _beside(row: Mapping[str, Any]) -> str:
+    """Mean of the plunges of a tool or an operation."""
+    if only_plunges(row):
+        return ONLY_PLUNGES
+    plunges = plunges_beside(row)
+    return number(plunges["mean_N_per_mm"] if plunges else None)
 
 
 def _places(places: Sequence[Mapping[str, Any]], weakest: Sequence[int]) -> str:
@@ -96,11 +130,13 @@ def _tools(per_tool: Sequence[Mapping[str, Any]]) -> str:
             number(row["cutting_length_mm"], 1),
             duration(row["time_s"]),
             *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
+            _beside(row),
             _weakest(row["weakest"]),
         )
         for row in per_tool
     ]
-    return _table(("tool", "remark", "length mm", "cutting mm", "time", *TITLES, "weakest"), rows, range(2, 10))
+    head = ("tool", "remark", "length mm", "cutting mm", "time", *TITLES, PLUNGES_TITLE, "weakest")
+    return _table(head, rows, range(2, 11))
 
 
 def _weakest(place: Mapping[str, Any] | None) -> str:
@@ -121,13 +157,14 @@ def _operations(per_operation: Sequence[Mapping[str, Any]]) -> str:
                 number(row["cutting_length_mm"], 1),
                 duration(row["time_s"]),
                 *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
+                _beside(row),
                 _weakest(row["weakest"]),
                 "-" if row["min_margin"] is None else f"{row['min_margin']:.3f}",
             )
         )
     more = len(per_operation) - len(rows)
-    head = ("operation", "tool", "lines", "cutting mm", "time", *TITLES, "weakest", "margin")
-    return _table(head, rows, (*range(2, 10), 11)) + (
+    head = ("operation", "tool", "lines", "cutting mm", "time", *TITLES, PLUNGES_TITLE, "weakest", "margin")
+    return _table(head, rows, (*range(2, 11), 12)) + (
         f"<p>and {more} more operations in summary.json</p>" if more > 0 else ""
     )
 
@@ -151,6 +188,11 @@ def _comparison(summary: Mapping[str, Any]) -> str:
         digits = 2 if name.endswith("_um") else 0
         difference = "-" if change is None else f"{change:+.1f} %"
         rows.append((title, number(summary[name], digits), number(other[name], digits), difference))
+    plunges = [plunges_beside(one) for one in (summary, other)]
+    if any(plunges):
+        first, second = (number(one["mean_N_per_mm"] if one else None) for one in plunges)
+        change = other["plunges_difference_percent"]
+        rows.append((f"mean of the {PLUNGES_TITLE}", first, second, "-" if change is None else f"{change:+.1f} %"))
     return _table(("", _text(summary["machine"]), _text(other["machine"]), "difference"), rows, (1, 2, 3))
 
 

@@ -11,6 +11,7 @@ from toolpath_stiff.analysis.statistics import weakest_places
 from toolpath_stiff.report.figure import (
     COLOUR_MAP,
     MUTED,
+    PLUNGE_SLATE,
     RAPID_GREY,
     UNREACHABLE_RED,
     add_heading,
@@ -19,7 +20,7 @@ from toolpath_stiff.report.figure import (
     new_figure,
     png_bytes,
 )
-from toolpath_stiff.report.scale import CLASSES, UNREACHABLE, legend_extend, scale_limits, segment_classes
+from toolpath_stiff.report.scale import CLASSES, PLUNGE, UNREACHABLE, legend_extend, scale_limits, segment_classes
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
@@ -38,18 +39,19 @@ MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
 THINNEST = 0.38  # a view's shorter side, of the longest: a flat part still gets a readable side view
 
 
-def path_picture(analysis: Analysis) -> bytes:
+def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> bytes:
     """Three views of the path, as PNG.
 
     Top (XY), below it front (XZ), beside that the view from +X (YZ), all at one scale and aligned as on a drawing,
     in machine coordinates. The views frame the cutting moves; rapids may leave them. Stiffer segments are drawn
-    first: a weak one is never hidden beneath.
+    first: a weak one is never hidden beneath. Plunges beside the headline are grey and end in a dot, which is all
+    that is seen of them from above; with `show_plunges` they are on the colour scale like the rest.
     """
     with house_style():
         from matplotlib import colormaps
 
-        samples, limits = analysis.samples, scale_limits(analysis)
-        lines = _coloured_lines(analysis, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)))
+        samples, limits = analysis.samples, scale_limits(analysis, show_plunges)
+        lines = _coloured_lines(analysis, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)), show_plunges)
         middle, span = _frame(mm_from_m(samples.position[samples.cutting]))
         figure, views, corner = _lay_out(span)
         places = weakest_places(analysis)
@@ -62,12 +64,12 @@ def path_picture(analysis: Analysis) -> bytes:
             spots = [(float(x), float(y)) for x, y in mm_from_m(samples.position[places][:, [across, up]])]
             label_places(axes, spots, [f"line {samples.line[row]}" for row in places])
         add_heading(figure, analysis)
-        _legend(figure, corner, analysis, limits)
+        _legend(figure, corner, analysis, limits, show_plunges)
         return png_bytes(figure)
 
 
 def _coloured_lines(
-    analysis: Analysis, limits: tuple[float, float], colours: FloatArray
+    analysis: Analysis, limits: tuple[float, float], colours: FloatArray, show_plunges: bool
 ) -> list[tuple[FloatArray, dict[str, Any]]]:
     """Points and style of one line for each class of segments, in drawing order."""
     # A corner is two samples at one point: one of them is enough, and the line through it stays one line.
@@ -76,6 +78,8 @@ def _coloured_lines(
     points = mm_from_m(samples.position[np.append(moved, moved[-1] + 1 if len(moved) else 0)])
     rapid = ~samples.cutting[moved + 1]
     classes = segment_classes(n_per_mm_from_n_per_m(0.5 * (stiffness[moved] + stiffness[moved + 1])), limits)
+    if not show_plunges:
+        classes[analysis.set_aside[moved + 1]] = PLUNGE
     if len(points) > MOST_POINTS:
         points, rapid, classes = _merged(points, rapid, classes)
     found: list[tuple[FloatArray, dict[str, Any]]] = []
@@ -87,6 +91,13 @@ def _coloured_lines(
     add(rapid, color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), zorder=2)
     for which in range(CLASSES - 1, -1, -1):
         add(~rapid & (classes == which), color=colours[which], linewidth=1.5, zorder=3, solid_capstyle="round")
+    plunge = ~rapid & (classes == PLUNGE)
+    add(plunge, color=PLUNGE_SLATE, linewidth=1.5, zorder=2.5, solid_capstyle="round")
+    if plunge.any():
+        ends = points[1:][plunge & ~np.append(plunge[1:], False)]
+        found.append(
+            (ends, {"color": PLUNGE_SLATE, "linestyle": "none", "marker": ".", "markersize": 6, "zorder": 3.5})
+        )
     add(~rapid & (classes == UNREACHABLE), color=UNREACHABLE_RED, linewidth=2.2, zorder=4)
     return found
 
@@ -163,7 +174,11 @@ def _set_up(axes: Axes, across: int, up: int, title: str, middle: FloatArray, sp
 
 
 def _legend(
-    figure: Figure, corner: tuple[float, float, float, float], analysis: Analysis, limits: tuple[float, float]
+    figure: Figure,
+    corner: tuple[float, float, float, float],
+    analysis: Analysis,
+    limits: tuple[float, float],
+    show_plunges: bool,
 ) -> None:
     """Colour bar, and what the other lines mean, in the free corner."""
     from matplotlib import colormaps
@@ -189,6 +204,8 @@ def _legend(
     entries = []
     if not analysis.samples.cutting.all():
         entries.append(Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), label="rapid"))
+    if analysis.set_aside.any() and not show_plunges:
+        entries.append(Line2D([], [], color=PLUNGE_SLATE, linewidth=1.5, marker=".", markersize=6, label="plunge"))
     if analysis.out_of_reach.any():
         entries.append(Line2D([], [], color=UNREACHABLE_RED, linewidth=2.2, label="out of reach"))
     entries.append(

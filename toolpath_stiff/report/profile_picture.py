@@ -14,6 +14,7 @@ from toolpath_stiff.report.figure import (
     DPI,
     INK,
     MUTED,
+    PLUNGE_SLATE,
     SECOND_ORANGE,
     UNREACHABLE_RED,
     add_heading,
@@ -42,10 +43,13 @@ NAME_SIZE, DIGIT = 8.5, 5.0  # points; pixels that the narrowest number needs
 CURVE_BLUE = "#2b59c3"
 BAND_LABEL = "95 % of the fitted parameters"
 MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
+MOST_ARROWS = 200  # of plunges beyond the axis; more would be a row of arrowheads
 MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seven pixels
 
 
-def profile_picture(analysis: Analysis, *, other: Analysis | None = None, required: float | None = None) -> bytes:
+def profile_picture(
+    analysis: Analysis, *, other: Analysis | None = None, required: float | None = None, show_plunges: bool = False
+) -> bytes:
     """Stiffness against path length, as PNG.
 
     Parameters
@@ -56,28 +60,33 @@ def profile_picture(analysis: Analysis, *, other: Analysis | None = None, requir
         The same program on another machine: a second curve.
     required
         N/m: a line, and red below it.
+    show_plunges
+        The axis holds the plunges beside the headline, and they belong to the curve; else they are grey, and arrows
+        say where they leave the axis.
     """
     with house_style():
         strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
         figure = new_figure(WIDTH, HEIGHT)
         frame = HEIGHT - TOP - BOTTOM - strip
         axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
-        s, k = profile_curve(analysis)
-        band = profile_band(analysis)
-        _set_limits(axes, analysis, other, required, band)
+        s, k = profile_curve(analysis, show_plunges)
+        band = profile_band(analysis, show_plunges)
+        _set_limits(axes, analysis, other, required, band, show_plunges)
         _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
         _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
         columns = int(axes.get_window_extent().width)
         if other is not None:
-            s2, k2 = profile_curve(other)
+            s2, k2 = profile_curve(other, show_plunges)
             keep = extremes_by_column(s2, k2, columns)
             name = shortened(plain(other.machine.name), 30)
             axes.plot(s2[keep], k2[keep], color=SECOND_ORANGE, linewidth=1.3, label=name, zorder=3)
+            _draw_plunges(axes, other, columns, SECOND_ORANGE, show_plunges)
         if band is not None:
             _draw_band(axes, s, band, columns)
         keep = extremes_by_column(s, k, columns)
         name = shortened(plain(analysis.machine.name), 30)
         axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
+        _draw_plunges(axes, analysis, columns, PLUNGE_SLATE, show_plunges)
         _levels(axes, analysis, required)
         _tool_changes(axes, analysis)
         if strip:
@@ -91,18 +100,58 @@ def profile_picture(analysis: Analysis, *, other: Analysis | None = None, requir
         return png_bytes(figure)
 
 
-def profile_curve(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
-    """Path length in mm and stiffness in N/mm of every sample; nan on rapids and out of reach."""
+def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray]:
+    """Path length in mm and stiffness in N/mm of every sample; nan on rapids and out of reach.
+
+    Without `with_plunges` also nan on the plunges beside the headline.
+    """
     stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness)
-    return mm_from_m(analysis.samples.s), np.where(analysis.samples.cutting, stiffness, np.nan)
+    drawn = analysis.samples.cutting & (with_plunges | ~analysis.set_aside)
+    return mm_from_m(analysis.samples.s), np.where(drawn, stiffness, np.nan)
 
 
-def profile_band(analysis: Analysis) -> tuple[FloatArray, FloatArray] | None:
+def _draw_plunges(axes: Axes, analysis: Analysis, columns: int, colour: str, show_plunges: bool) -> None:
+    """The plunges that the curve leaves out: thin lines, and arrows at the edge of the axes that they leave."""
+    if show_plunges or not analysis.set_aside.any():
+        return
+    s = mm_from_m(analysis.samples.s)
+    k = np.where(analysis.set_aside, n_per_mm_from_n_per_m(analysis.at.stiffness), np.nan)
+    keep = extremes_by_column(s, k, columns)
+    label = f"plunges {number(float(np.nanmin(k)))} to {number(float(np.nanmax(k)))} N/mm"
+    line: dict[str, Any] = {"color": colour, "linewidth": 1.3, "linestyle": (0, (2, 1))}
+    axes.plot(s[keep], k[keep], **line, zorder=3.5)
+    low, high = axes.get_ylim()
+    ends = ((k > high, 1.0, -20.0, "^"), (k < low, 0.0, 20.0, "v"))
+    marker = next((marker for beyond, _, _, marker in ends if beyond.any()), "none")
+    axes.plot(
+        [], [], **(line if marker == "none" else {"color": colour, "linestyle": "none"}), marker=marker, label=label
+    )
+    for beyond, edge, tail, _ in ends:
+        start, stop = _runs(beyond)
+        for x in ((s[start] + s[stop]) / 2.0)[:MOST_ARROWS].tolist():
+            axes.annotate(
+                "",
+                (x, edge),
+                xycoords=axes.get_xaxis_transform(),
+                xytext=(0.0, tail),
+                textcoords="offset points",
+                arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.1, "shrinkA": 0.0, "shrinkB": 0.0},
+                zorder=6,
+            )
+
+
+def _runs(rows: BoolArray) -> tuple[IntArray, IntArray]:
+    """First and last row of every run in which `rows` holds."""
+    edges = np.diff(np.concatenate([[0], rows.astype(np.int8), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+
+
+def profile_band(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray] | None:
     """Lower and upper end of the 95 % band of every sample in N/mm, nan as in `profile_curve`; None without a band."""
     band = analysis.parameter_band
     if band is None:
         return None
-    _, k = profile_curve(analysis)
+    _, k = profile_curve(analysis, with_plunges)
     reach = NORMAL_95 * n_per_mm_from_n_per_m(band.deviation)
     return k - reach, k + reach
 
@@ -146,10 +195,11 @@ def _set_limits(
     other: Analysis | None,
     required: float | None,
     band: tuple[FloatArray, FloatArray] | None,
+    show_plunges: bool,
 ) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    curves = [*(profile_curve(a)[1] for a in (analysis, other) if a is not None), *(band or ())]
+    curves = [*(profile_curve(a, show_plunges)[1] for a in (analysis, other) if a is not None), *(band or ())]
     low, high = float(min(np.nanmin(k) for k in curves)), float(max(np.nanmax(k) for k in curves))
     if required is not None:
         level = n_per_mm_from_n_per_m(required)
@@ -169,8 +219,7 @@ def _set_limits(
 
 def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) -> None:
     """Shade the spans of path in which `rows` holds."""
-    edges = np.diff(np.concatenate([[0], rows.astype(np.int8), [0]]))
-    start, stop = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    start, stop = _runs(rows)
     if not len(start):
         return
     low, high = axes.get_ylim()
@@ -179,7 +228,7 @@ def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) 
 
 
 def _levels(axes: Axes, analysis: Analysis, required: float | None) -> None:
-    mean = stiffness_figures(analysis, analysis.counted)["mean_N_per_mm"]
+    mean = stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"]
     if mean is not None:
         axes.axhline(mean, color=INK, linewidth=1.0, linestyle=(0, (6, 3)), zorder=5, label=f"mean {number(mean)} N/mm")
     if required is None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.report.comparison import FIGURES, compare_summaries
-from toolpath_stiff.report.wording import READERS, duration, number, plain, shortened
+from toolpath_stiff.report.wording import READERS, duration, number, only_plunges, plain, plunges_beside, shortened
 
 WIDTH = 100
 LABEL = 14  # columns of the left-hand words
@@ -41,6 +41,7 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
         *_entry("samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
         *_entry("path", _path(summary)),
         *_entry("stiffness", _stiffness(summary)),
+        *_plunges(summary),
         *_band(summary),
         *_weakest(summary),
         *_entry("limits", _limits(summary)),
@@ -70,6 +71,7 @@ def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> st
         difference = "-" if change is None else f"{change:+.1f} %"
         rows.append([TITLES[name], number(summary[name], digits), number(other[name], digits), difference])
     places = [s["weakest"] for s in (summary, other)]
+    rows += _plunges_compared(summary, other)
     rows.append(["weakest line", *(str(place["line"]) if place else "-" for place in places), ""])
     rows.append(["extrapolated", *(f"{s['extrapolated_share']:.1%}" for s in (summary, other)), ""])
     if any(s["out_of_reach_samples"] for s in (summary, other)):
@@ -108,6 +110,29 @@ def _path(summary: Mapping[str, Any]) -> str:
 def _stiffness(summary: Mapping[str, Any]) -> str:
     mean, low, high, span = (number(summary[name]) for name in FIGURES[:4])
     return f"mean {mean} N/mm, min {low}, max {high}, range {span} N/mm"
+
+
+def _plunges(summary: Mapping[str, Any]) -> list[str]:
+    """The plunges beside the headline figures, or that these are of plunges."""
+    if only_plunges(summary):
+        return _entry("plunges", "this program only plunges: every figure is of cuts along the tool axis")
+    plunges = plunges_beside(summary)
+    if plunges is None:
+        return []
+    moves = f"{number(plunges['moves'])} move{'' if plunges['moves'] == 1 else 's'}"
+    text = f"{number(plunges['length_mm'], 1)} mm in {moves}: mean {number(plunges['mean_N_per_mm'])} N/mm, "
+    text += f"min {number(plunges['min_N_per_mm'])}, max {number(plunges['max_N_per_mm'])}"
+    return _entry("plunges", f"{text}; not counted above")
+
+
+def _plunges_compared(summary: Mapping[str, Any], other: Mapping[str, Any]) -> list[list[str]]:
+    """The row of the plunges' mean; none where no machine has plunges beside its headline."""
+    plunges = [plunges_beside(one) for one in (summary, other)]
+    if not any(plunges):
+        return []
+    change = compare_summaries(summary, other)["plunges_difference_percent"]
+    means = [number(one["mean_N_per_mm"] if one else None) for one in plunges]
+    return [["plunges N/mm", *means, "-" if change is None else f"{change:+.1f} %"]]
 
 
 def _band(summary: Mapping[str, Any]) -> list[str]:
@@ -156,7 +181,18 @@ def _tools(per_tool: Sequence[Mapping[str, Any]]) -> list[str]:
                 shortened(plain(row["remark"]), 30),
             ]
         )
-    return aligned(rows, left_last=True)
+    return aligned(rows, left_last=True) + _only_plunges(per_tool, [f"T{row['tool']}" for row in per_tool])
+
+
+def _only_plunges(parts: Sequence[Mapping[str, Any]], names: Sequence[str]) -> list[str]:
+    """A note on the parts whose figures are of plunges, where not all are."""
+    plunging = [name for part, name in zip(parts, names, strict=True) if only_plunges(part)]
+    if not plunging or len(plunging) == len(parts):
+        return []
+    text = (
+        f"{', '.join(plunging)}: {'figures' if len(plunging) == 1 else 'all figures'} of plunges, there is no other cut"
+    )
+    return textwrap.wrap(text, WIDTH)
 
 
 def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -176,7 +212,10 @@ def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
             ]
         )
     more = len(per_operation) - len(shown)
-    return aligned(first_column_fitted(rows)) + ([f"and {more} more operations in summary.json"] if more else [])
+    notes = _only_plunges(shown, [f"operation {row['operation']}" for row in shown])
+    return (
+        aligned(first_column_fitted(rows)) + notes + ([f"and {more} more operations in summary.json"] if more else [])
+    )
 
 
 def first_column_fitted(rows: list[list[str]], indent: int = 0) -> list[list[str]]:

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
+
+from toolpath_stiff.analysis.cut_classes import PLUNGES_ONLY
 
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
+
+
+ONLY_PLUNGES = "only plunges"  # beside a program, a tool or an operation
 
 
 def number(value: float | None, digits: int = 0) -> str:
@@ -14,6 +21,33 @@ def number(value: float | None, digits: int = 0) -> str:
         return "-"
     text = f"{value:,.{digits}f}".replace(",", " ")
     return text.replace("-", "", 1) if float(text.replace(" ", "")) == 0.0 else text
+
+
+def span_of(figures: Mapping[str, Any]) -> str:
+    """Lowest and highest stiffness of a block of figures: "122 988 to 123 770"."""
+    return f"{number(figures['min_N_per_mm'])} to {number(figures['max_N_per_mm'])}"
+
+
+def headline_text(figures: Mapping[str, Any], between: str) -> str:
+    """Mean and range for a heading, and what they are about where that is not every cut; `between` the parts."""
+    text = f"mean {number(figures['mean_N_per_mm'])} N/mm ({span_of(figures)})"
+    if only_plunges(figures):
+        return f"{text}, {ONLY_PLUNGES}"
+    plunges = plunges_beside(figures)
+    if plunges is None:
+        return text
+    return f"{text} across the tool axis{between}plunges {number(plunges['mean_N_per_mm'])} N/mm ({span_of(plunges)})"
+
+
+def plunges_beside(figures: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The plunges that the headline figures leave out; None where there are none, or where there is nothing else."""
+    found: Mapping[str, Any] | None = figures["plunges"]
+    return None if figures["headline"] == PLUNGES_ONLY else found
+
+
+def only_plunges(figures: Mapping[str, Any]) -> bool:
+    """Whether the figures of a program, a tool or an operation are those of plunges, for it does nothing else."""
+    return bool(figures.get("headline") == PLUNGES_ONLY)
 
 
 def duration(seconds: float) -> str:

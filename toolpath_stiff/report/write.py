@@ -32,6 +32,7 @@ def write_analysis(
     table: Literal["csv", "parquet"] = "csv",
     required: float | None = None,
     other: Analysis | None = None,
+    show_plunges: bool = False,
 ) -> list[Path]:
     """Write samples, summary, pictures and page of an analysis.
 
@@ -53,6 +54,8 @@ def write_analysis(
         Stiffness that every cutting move should have, N/m: drawn and listed.
     other
         The same program on another machine, for comparison.
+    show_plunges
+        The axes and colour scales of pictures and page hold the plunges beside the headline figures too.
 
     Returns
     -------
@@ -64,7 +67,7 @@ def write_analysis(
     InputError
         The folder cannot be written.
     """
-    return _all_or_nothing(Path(out_dir), _contents(analysis, plots, table, required, other), OWN_FILES)
+    return _all_or_nothing(Path(out_dir), _contents(analysis, plots, table, required, other, show_plunges), OWN_FILES)
 
 
 def write_folder(folder: str | Path, contents: Mapping[str, str | bytes], own: Iterable[str] = ()) -> list[Path]:
@@ -112,7 +115,7 @@ def summary_with_options(analysis: Analysis, required: float | None, other: Anal
 
 
 def _contents(
-    analysis: Analysis, plots: bool, table: str, required: float | None, other: Analysis | None
+    analysis: Analysis, plots: bool, table: str, required: float | None, other: Analysis | None, show_plunges: bool
 ) -> Iterable[tuple[str, str | bytes | Iterable[str | bytes]]]:
     """Names and contents of the files, one at a time."""
     from toolpath_stiff.analysis.tables import samples_csv, samples_parquet
@@ -128,9 +131,9 @@ def _contents(
         from toolpath_stiff.report.path_picture import path_picture
         from toolpath_stiff.report.profile_picture import profile_picture
 
-        yield "path.png", path_picture(analysis)
-        yield "profile.png", profile_picture(analysis, other=other, required=required)
-        yield "report.html", page(analysis, summary, required=required, other=other)
+        yield "path.png", path_picture(analysis, show_plunges=show_plunges)
+        yield "profile.png", profile_picture(analysis, other=other, required=required, show_plunges=show_plunges)
+        yield "report.html", page(analysis, summary, required=required, other=other, show_plunges=show_plunges)
 
 
 def _without_nan(value: Any) -> Any:

@@ -15,9 +15,8 @@ function drawListing() {
     row.dataset.line = i + 1;
     label.className = "n";
     label.textContent = i + 1;
-    const lowest = lowestOf.get(i + 1);
-    if (unreached.has(i + 1)) label.style.borderLeftColor = ink.bad;
-    else if (lowest !== undefined) label.style.borderLeftColor = colours[classOf(lowest)];
+    const colour = lineColour(i + 1);
+    if (colour) label.style.borderLeftColor = colour;
     row.append(label, document.createTextNode(source[i]));
     rows.push(row);
   }
@@ -68,10 +67,23 @@ for (const button of document.querySelectorAll("button.place")) button.addEventL
   point(Number(button.dataset.sample), view);
   document.getElementById("view-panel").scrollIntoView({ block: "nearest" });
 });
-document.getElementById("legend-low").textContent = (data.extend.low ? "\u2264 " : "") + group(LOW);
-document.getElementById("legend-high").textContent = (data.extend.high ? "\u2265 " : "") + group(HIGH);
-document.querySelector(".rapid-key").hidden = starts[RAPIDS] === starts[RAPIDS + 1];
-document.getElementById("out-key").hidden = starts[UNREACHED] === starts[UNREACHED + 1];
+function showLegend() {
+  const { ends: [low, high], beyond_low, beyond_high } = scaleNow();
+  document.getElementById("legend-low").textContent = (beyond_low ? "\u2264 " : "") + group(low);
+  document.getElementById("legend-high").textContent = (beyond_high ? "\u2265 " : "") + group(high);
+  document.querySelector(".rapid-key").hidden = starts[RAPIDS] === starts[RAPIDS + 1];
+  document.getElementById("plunge-key").hidden = starts[PLUNGES] === starts[PLUNGES + 1];
+  document.getElementById("out-key").hidden = starts[UNREACHED] === starts[UNREACHED + 1];
+  for (const entry of document.querySelectorAll("#profile-key .plunge-key")) entry.hidden = plungesBox.checked;
+}
+plungesBox.addEventListener("change", () => {
+  classify();
+  profile.split();
+  view.redraw();
+  profile.redraw();
+  drawListing();
+  showLegend();
+});
 const key = document.getElementById("profile-key");
 function addKey(kindOfLine, text) {
   const entry = document.createElement("span");
@@ -83,3 +95,5 @@ addKey("", data.machine);
 if (other) addKey("second-key", data.other.machine);
 if (data.mean !== null) addKey("mean-key", `mean ${group(data.mean)} N/mm`);
 if (data.required !== null) addKey("required-key", `required ${group(data.required)} N/mm`);
+if (data.scale_with_plunges) addKey("plunge-key", `plunges ${group(data.plunges[0])} to ${group(data.plunges[1])} N/mm`);
+showLegend();

@@ -1,7 +1,7 @@
 // ---------------------------------------------------------------- data
 const data = JSON.parse(document.getElementById("data").textContent);
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
-const NONE = 65535, RAPID = 0, OUT = 8;
+const NONE = 65535, RAPID = 0, OUT = 8, PLUNGE = 16;
 const n = data.count;
 const whole = new Uint16Array(bytes(data.position));
 const xyz = [0, 1, 2].map((axis) => {
@@ -19,8 +19,12 @@ const margin = unpack(data.margin, data.margin_range);
 const angles = data.angles && data.angles.map((text, axis) => unpack(text, data.angle_ranges[axis]));
 const line = new Uint32Array(bytes(data.line)), s = new Float32Array(bytes(data.s));
 const kind = new Uint8Array(bytes(data.kind));
-const other = data.other && { s: new Float32Array(bytes(data.other.s)), k: new Float32Array(bytes(data.other.stiffness)) };
+const other = data.other && { s: new Float32Array(bytes(data.other.s)), k: new Float32Array(bytes(data.other.stiffness)), plunge: new Uint8Array(bytes(data.other.plunge)) };
 const cutting = (i) => (kind[i] & 7) !== RAPID;
+// Plunges along the tool axis: unless the switch is on they set neither the colours nor the axis of the profile.
+const plungesBox = document.getElementById("plunges");
+document.getElementById("plunges-label").hidden = data.scale_with_plunges === null;
+const setAside = (i) => !plungesBox.checked && (kind[i] & PLUNGE) !== 0;
 const MOTIONS = data.motions;
 
 // Operations: each is a stretch of samples, [first, end).
@@ -42,7 +46,8 @@ function group(v, digits = 0) {
 }
 
 // ---------------------------------------------------------------- colours
-const CLASSES = data.colours.length, [LOW, HIGH] = data.scale;
+const CLASSES = data.colours.length;
+const scaleNow = () => plungesBox.checked && data.scale_with_plunges || data.scale;
 const darkQuery = matchMedia("(prefers-color-scheme: dark)");
 const root = document.documentElement;
 let colours, ink = {};
@@ -50,34 +55,51 @@ function readTheme() {
   const dark = darkQuery.matches && !root.classList.contains("printing");
   colours = dark ? data.colours_dark : data.colours;
   const style = getComputedStyle(root);
-  for (const name of ["panel", "ink", "muted", "line", "soft", "accent", "curve", "second", "bad", "bad-soft", "rapid"])
+  for (const name of ["panel", "ink", "muted", "line", "soft", "accent", "curve", "second", "bad", "bad-soft", "rapid", "plunge"])
     ink[name] = style.getPropertyValue("--" + name).trim();
   document.getElementById("legend-ramp").style.background = `linear-gradient(to right, ${colours.join(",")})`;
 }
-const classOf = (k) => Math.max(0, Math.min(CLASSES - 1, Math.floor((k - LOW) / (HIGH - LOW) * CLASSES)));
-
-// Segments (i - 1, i) sorted by class: each class is one path to stroke. 0..CLASSES-1, then rapid, then out of reach.
-const RAPIDS = CLASSES, UNREACHED = CLASSES + 1;
-const segmentClass = new Uint8Array(n).fill(255), starts = new Int32Array(CLASSES + 3);
-for (let i = 1; i < n; i++) {
-  if (xyz[0][i] === xyz[0][i - 1] && xyz[1][i] === xyz[1][i - 1] && xyz[2][i] === xyz[2][i - 1]) continue;
-  const mean = (stiffness[i] + stiffness[i - 1]) / 2;
-  segmentClass[i] = !cutting(i) ? RAPIDS : Number.isNaN(mean) ? UNREACHED : classOf(mean);
-  starts[segmentClass[i] + 1]++;
+function classOf(k) {
+  const [low, high] = scaleNow().ends;
+  return Math.max(0, Math.min(CLASSES - 1, Math.floor((k - low) / (high - low) * CLASSES)));
 }
-for (let c = 0; c < CLASSES + 2; c++) starts[c + 1] += starts[c];
-const segments = new Int32Array(starts[CLASSES + 2]);
-{
+
+// Segments (i - 1, i) sorted by class: each class is one path to stroke. 0..CLASSES-1, then rapids, plunges beside the
+// scale, out of reach.
+const RAPIDS = CLASSES, PLUNGES = CLASSES + 1, UNREACHED = CLASSES + 2;
+const segmentClass = new Uint8Array(n), starts = new Int32Array(CLASSES + 4);
+let segments;
+function classify() {
+  segmentClass.fill(255);
+  starts.fill(0);
+  for (let i = 1; i < n; i++) {
+    if (xyz[0][i] === xyz[0][i - 1] && xyz[1][i] === xyz[1][i - 1] && xyz[2][i] === xyz[2][i - 1]) continue;
+    const mean = (stiffness[i] + stiffness[i - 1]) / 2;
+    segmentClass[i] = !cutting(i) ? RAPIDS : Number.isNaN(mean) ? UNREACHED : setAside(i) ? PLUNGES : classOf(mean);
+    starts[segmentClass[i] + 1]++;
+  }
+  for (let c = 0; c < CLASSES + 3; c++) starts[c + 1] += starts[c];
+  segments = new Int32Array(starts[CLASSES + 3]);
   const next = starts.slice();
   for (let i = 1; i < n; i++) if (segmentClass[i] !== 255) segments[next[segmentClass[i]]++] = i;
 }
+classify();
 
-// First sample and lowest stiffness of every program line; the lines that leave the machine's reach.
-const firstOf = new Map(), lowestOf = new Map(), unreached = new Set();
+// First sample of every program line, lowest stiffness of its cuts and of its plunges; the lines that leave the
+// machine's reach.
+const firstOf = new Map(), lowestOf = new Map(), lowestPlungeOf = new Map(), unreached = new Set();
 for (let i = 0; i < n; i++) {
   if (!firstOf.has(line[i])) firstOf.set(line[i], i);
-  if (cutting(i) && !Number.isNaN(stiffness[i])) lowestOf.set(line[i], Math.min(stiffness[i], lowestOf.get(line[i]) ?? Infinity));
+  const lowest = kind[i] & PLUNGE ? lowestPlungeOf : lowestOf;
+  if (cutting(i) && !Number.isNaN(stiffness[i])) lowest.set(line[i], Math.min(stiffness[i], lowest.get(line[i]) ?? Infinity));
   if (cutting(i) && kind[i] & OUT) unreached.add(line[i]);
+}
+// Colour of a line's bar; undefined where nothing is cut.
+function lineColour(number) {
+  if (unreached.has(number)) return ink.bad;
+  if (lowestOf.has(number)) return colours[classOf(lowestOf.get(number))];
+  if (!lowestPlungeOf.has(number)) return undefined;
+  return plungesBox.checked ? colours[classOf(lowestPlungeOf.get(number))] : ink.plunge;
 }
 
 // ---------------------------------------------------------------- what is pointed at
@@ -89,7 +111,7 @@ function describe(i) {
   const tool = data.tools.reduce((found, [start, number]) => start <= i ? number : found, 0);
   const k = kind[i] & OUT ? "out of reach" : `${group(stiffness[i])} N/mm`;
   return [`line ${line[i]} · ${k}`, `X${x} Y${y} Z${z}${turned} mm${angles ? ", deg" : ""}`,
-    `margin ${margin[i].toFixed(3)} · T${tool} · ${MOTIONS[kind[i] & 7]} · ${group(s[i], 1)} mm along`,
+    `margin ${margin[i].toFixed(3)} · T${tool} · ${MOTIONS[kind[i] & 7]}${kind[i] & PLUNGE ? ", plunge" : ""} · ${group(s[i], 1)} mm along`,
     ...(operations.length > 1 ? [`operation ${operationName(operationOf(i))}`] : [])];
 }
 function point(i, stage) {

@@ -78,6 +78,7 @@ class View extends Stage {
       g.setLineDash([]);
     }
     for (let c = CLASSES - 1; c >= 0; c--) this.stroke(g, c, colours[c], this.coarse ? 1 : 1.7, first, end);
+    this.stroke(g, PLUNGES, ink.plunge, 1.7, first, end);
     this.stroke(g, UNREACHED, ink.bad, 2.4, first, end);
   }
   stroke(g, which, colour, width, first, end) {

@@ -25,15 +25,28 @@ class Profile extends Stage {
   constructor() {
     super("profile");
     this.k = new Float32Array(n);
-    for (let i = 0; i < n; i++) this.k[i] = cutting(i) ? stiffness[i] : NaN;
+    this.plunges = new Float32Array(n);
+    if (other) other.curve = new Float32Array(other.k.length);
+    this.split();
     this.all();
     this.listen();
+  }
+  // The curve, and beside it the plunges that neither belong to it nor set the axis.
+  split() {
+    for (let i = 0; i < n; i++) {
+      this.k[i] = cutting(i) && !setAside(i) ? stiffness[i] : NaN;
+      this.plunges[i] = setAside(i) ? stiffness[i] : NaN;
+    }
+    if (other) other.curve.set(other.k.map((k, i) => other.plunge[i] && !plungesBox.checked ? NaN : k));
   }
   all() { this.show(s[0], s[n - 1]); }
   show(from, to) { this.from = from; this.to = to > from ? to : from + 1; }
   x(value) { return PAD.left + (value - this.from) / (this.to - this.from) * (this.width - PAD.left - PAD.right); }
   y(value) { return this.height - PAD.bottom - (value - this.low) / (this.high - this.low) * (this.height - PAD.top - PAD.bottom); }
-  at(i) { return [this.x(s[i]), Number.isNaN(this.k[i]) ? this.height - PAD.bottom : this.y(this.k[i])]; }
+  at(i) {
+    const k = setAside(i) ? this.plunges[i] : this.k[i], bottom = this.height - PAD.bottom;
+    return [this.x(s[i]), Number.isNaN(k) ? bottom : Math.max(PAD.top, Math.min(bottom, this.y(k)))];
+  }
   draw() {
     const g = this.clear(this.base);
     this.setHeights();
@@ -52,7 +65,11 @@ class Profile extends Stage {
     g.clip();
     if (data.mean !== null) this.level(g, data.mean, ink.ink, [6, 4]);
     if (data.required !== null) this.level(g, data.required, ink.bad, []);
-    if (other) this.curve(g, other.s, other.k, ink.second);
+    if (other) this.curve(g, other.s, other.curve, ink.second);
+    g.setLineDash([2, 2]);
+    this.curve(g, s, this.plunges, ink.plunge);
+    g.setLineDash([]);
+    this.drawBeyond(g, left, right, top, bottom);
     this.curve(g, s, this.k, ink.curve);
     for (const i of data.weakest) { ring(g, ...this.at(i), 5, ink.panel, 4); ring(g, ...this.at(i), 5, ink.ink, 1.6); }
     g.restore();
@@ -68,12 +85,29 @@ class Profile extends Stage {
       }
     };
     see(s, this.k);
-    if (other) see(other.s, other.k);
-    if (low > high) [low, high] = data.scale;
+    if (other) see(other.s, other.curve);
+    if (low > high) see(s, this.plunges);  // nothing else is in sight
+    if (low > high) [low, high] = data.scale.ends;
     if (data.required !== null) { low = Math.min(low, data.required); high = Math.max(high, data.required); }
     const pad = Math.max((high - low) * 0.1, high * 0.002);
     this.low = low - pad;
     this.high = high + pad;
+  }
+  // Arrows where plunges leave the axis, a few pixels apart at least.
+  drawBeyond(g, left, right, top, bottom) {
+    g.fillStyle = ink.plunge;
+    let last = -Infinity;
+    for (let i = rowAt(s, this.from); i < n && s[i] <= this.to; i++) {
+      const k = this.plunges[i], x = this.x(s[i]);
+      if (Number.isNaN(k) || (k <= this.high && k >= this.low) || x - last < 7) continue;
+      last = x;
+      const [tip, tail] = k > this.high ? [top + 1, top + 9] : [bottom - 1, bottom - 9];
+      g.beginPath();
+      g.moveTo(x, tip);
+      g.lineTo(x - 4, tail);
+      g.lineTo(x + 4, tail);
+      g.fill();
+    }
   }
   shade(g, holds, colour, top, bottom) {
     g.fillStyle = colour;
