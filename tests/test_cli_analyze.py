@@ -15,7 +15,7 @@ from toolpath_stiff.cli.main import main
 PART = "(square)\nG21 G90 F1000\nG0 X-100 Y-100 Z0\nG1 X100\nY100\nX-100\nM8\nY-100\nM2\n"
 COLUMNS = (
     "line,motion,tool,s_mm,t_s,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,feed_mm_per_min,stiffness_N_per_mm,deflection_um,"
-    "strut1_mm,strut2_mm,strut3_mm,strut4_mm,strut5_mm,strut6_mm,margin,margin_limit,operation"
+    "strut1_mm,strut2_mm,strut3_mm,strut4_mm,strut5_mm,strut6_mm,margin,margin_limit,operation,cut"
 )
 
 
@@ -89,6 +89,26 @@ def test_partial_exits_1_and_out_of_reach_2(part, capsys):
     assert main(["analyze", "part.nc", "--partial", "--out", "o"]) == 1
     rows = list(csv.DictReader((part.parent / "o/samples.csv").open()))
     assert rows[-1]["stiffness_N_per_mm"] == "" and float(rows[-1]["margin"]) < 0
+
+
+def test_a_weak_plunge_is_below_the_required_stiffness(part, capsys):
+    (part.parent / "down.nc").write_text("G1 Z-4 F100\nG1 X40\n")
+    assert main(["analyze", "down.nc", "--json", "--no-plots"]) == 0
+    plunges = json.loads(capsys.readouterr().out)["plunges"]
+    level = plunges["weakest"]["stiffness_N_per_mm"] + 1.0
+    assert main(["analyze", "down.nc", "--no-plots", "--require", str(level)]) == 3
+    assert "  line 1: " in capsys.readouterr().out
+
+
+def test_plunges_can_be_put_on_the_axes_of_the_pictures(part):
+    (part.parent / "down.nc").write_text("G1 Z-4 F100\nG1 X40\n")
+    pictures = []
+    for options in ([], ["--show-plunges"]):
+        assert main(["analyze", "down.nc", "--out", "o", *options]) == 0
+        pictures.append(
+            [(part.parent / "o" / name).read_bytes() for name in ("path.png", "profile.png", "report.html")]
+        )
+    assert all(one != other for one, other in zip(*pictures, strict=True))
 
 
 def test_compare_with_another_machine(part, capsys):

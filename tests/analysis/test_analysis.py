@@ -59,11 +59,14 @@ def test_turning_by_120_degrees_changes_nothing():
 
 def test_mean_is_weighted_by_length_not_by_samples():
     # A long and a short cut: halving the step must not move the mean, and each cut weighs by its length.
-    text = "F100\nG0 X-50\nG1 X50\nG1 Z3\n"
+    text = "F100\nG0 X-50\nG1 X50\nG1 Y3 Z1\n"
     coarse, fine = (analyse_text(text, step=step).summary()["mean_N_per_mm"] for step in (1e-3, 1e-4))
     assert coarse == pytest.approx(fine, rel=1e-5)
-    parts = [analyse_text(t).summary()["mean_N_per_mm"] for t in ("F100\nG0 X-50\nG1 X50\n", "F100\nG0 X50\nG1 Z3\n")]
-    assert fine == pytest.approx((100 * parts[0] + 3 * parts[1]) / 103, rel=1e-5)
+    parts = [
+        analyse_text(t).summary()["mean_N_per_mm"] for t in ("F100\nG0 X-50\nG1 X50\n", "F100\nG0 X50\nG1 Y3 Z1\n")
+    ]
+    slope = np.sqrt(10.0)
+    assert fine == pytest.approx((100 * parts[0] + slope * parts[1]) / (100 + slope), rel=1e-5)
 
 
 def test_rapids_are_kept_and_do_not_count():

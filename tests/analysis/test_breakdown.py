@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from tests.report.factory import make_analysis, spiral
 from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.breakdown import FIGURES, weighted_figures
+from toolpath_stiff.analysis.cut_classes import PLUNGES_ONLY
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
@@ -55,7 +58,7 @@ def test_operations_by_hand() -> None:
 
 
 def check_parts(analysis: Analysis, key: str) -> None:
-    """Lengths, times and samples of the parts make the whole; mean, min and max too.
+    """Lengths, times and samples of the parts make the whole; mean, min and max of each class of cuts too.
 
     A tool that never cuts has no row: its rapids and their time are in none.
     """
@@ -64,16 +67,33 @@ def check_parts(analysis: Analysis, key: str) -> None:
     whole = ("rapid_length_mm", "time_s") if key == "per_operation" else ()
     for name in ("cutting_length_mm", "out_of_reach_samples", *whole):
         assert sum(row[name] for row in rows) == pytest.approx(summary[name], abs=1e-9)
-    cutting = [row for row in rows if row["mean_N_per_mm"] is not None]
+    cutting = [row for row in rows if row["mean_N_per_mm"] is not None and row["headline"] == summary["headline"]]
     assert min(row["min_N_per_mm"] for row in cutting) == summary["min_N_per_mm"]
     assert max(row["max_N_per_mm"] for row in cutting) == summary["max_N_per_mm"]
     assert min(row["weakest"]["stiffness_N_per_mm"] for row in cutting) == summary["min_N_per_mm"]
-    assert min(row["min_margin"] for row in cutting) == summary["min_margin"]
+    assert min(row["min_margin"] for row in rows if row["min_margin"] is not None) == summary["min_margin"]
+    check_plunges([row["plunges"] for row in rows if row["plunges"]], summary["plunges"])
     if summary["out_of_reach_samples"] == 0:
-        length = [row["cutting_length_mm"] for row in cutting]
+        beside = [row["plunges"]["length_mm"] if row["plunges"] else 0.0 for row in cutting]
+        aside = np.array(beside) * (summary["headline"] != PLUNGES_ONLY)
+        length = np.array([row["cutting_length_mm"] for row in cutting]) - aside
         for name in ("mean_N_per_mm", "mean_deflection_um"):
             # Rounding: a mean of means over some hundred samples.
             assert np.average([row[name] for row in cutting], weights=length) == pytest.approx(summary[name], rel=1e-12)
+
+
+def check_plunges(parts: list[dict[str, Any]], whole: dict[str, Any] | None) -> None:
+    if whole is None:
+        assert parts == []
+        return
+    for name in ("samples", "moves", "length_mm"):
+        assert sum(part[name] for part in parts) == pytest.approx(whole[name])
+    assert min(part["min_N_per_mm"] for part in parts) == whole["min_N_per_mm"]
+    assert max(part["max_N_per_mm"] for part in parts) == whole["max_N_per_mm"]
+    length = [part["length_mm"] for part in parts]
+    assert np.average([part["mean_N_per_mm"] for part in parts], weights=length) == pytest.approx(
+        whole["mean_N_per_mm"]
+    )
 
 
 def test_the_parts_make_the_whole() -> None:
@@ -84,7 +104,19 @@ def test_the_parts_make_the_whole() -> None:
 
 LINES = st.lists(
     st.sampled_from(
-        ["G0 X1", "G0 X20 Z5", "G1 X30 F100", "G1 Y4 F50", "G1 A3 F200", "G4 P1", "T1 M6", "T2 M6", "(ROUGH)", "(WALL)"]
+        [
+            "G0 X1",
+            "G0 X20 Z5",
+            "G1 X30 F100",
+            "G1 Y4 F50",
+            "G1 Z-3 F50",
+            "G1 A3 F200",
+            "G4 P1",
+            "T1 M6",
+            "T2 M6",
+            "(ROUGH)",
+            "(WALL)",
+        ]
     ),
     max_size=20,
 )

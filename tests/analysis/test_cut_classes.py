@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from toolpath_stiff.analysis import LOADS, parse_load
+from tests.report.factory import make_analysis
+from toolpath_stiff.analysis import LOADS, analyse, parse_load
+from toolpath_stiff.analysis.breakdown import FIGURES
 from toolpath_stiff.analysis.cut_classes import along_tool_axis, headline_rows, plunging_rows
+from toolpath_stiff.analysis.path_analysis import required_stiffness_missed
+from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.placement.case_study import case_study_program, wavy_program
 
 TANGENTIAL = parse_load("tangential")
 
@@ -73,3 +82,103 @@ def test_classes_are_disjoint_and_cover_what_counts(rows, load):
     np.testing.assert_array_equal(headline | plunging, counted)
     assert not (headline & plunging).any() or np.array_equal(headline, plunging)
     assert headline.any() == counted.any()
+
+
+PROGRAMS = Path(__file__).parents[2] / "programs"
+NIST = load_machine("nist")
+
+
+def analysed(text, **options):
+    return analyse(NIST, parse_program(text, "part.nc"), **options)
+
+
+def alone(text, **options):
+    """Figures of a program of one class alone."""
+    return analysed(text, **options).summary()
+
+
+def test_plunges_no_longer_rule_the_range_of_the_readmes_example():
+    summary = analyse(NIST, read_program(str(PROGRAMS / "pocket.nc"))).summary()
+    # Three feeds down in the program's text: lines 13, 39 and 65, 5 + 3 + 12 mm.
+    assert (summary["plunges"]["moves"], summary["plunges"]["length_mm"]) == (3, pytest.approx(20.0))
+    assert summary["headline"] == "across the tool axis"
+    assert summary["range_N_per_mm"] < 4_000 and summary["max_N_per_mm"] < 60_000  # 70 853 and 123 770 with plunges
+    assert summary["weakest"]["stiffness_N_per_mm"] == summary["min_N_per_mm"]
+    assert 120_000 < summary["plunges"]["min_N_per_mm"] == summary["plunges"]["weakest"]["stiffness_N_per_mm"]
+
+
+def test_a_program_that_only_plunges_says_so():
+    summary = analyse(NIST, read_program(str(PROGRAMS / "drilling.nc"))).summary()
+    assert summary["headline"] == "plunges only"
+    assert all(summary[name] == summary["plunges"][name] for name in FIGURES)
+    assert {row["headline"] for row in (*summary["per_tool"], *summary["per_operation"])} == {"plunges only"}
+
+
+def test_the_headline_is_what_a_program_without_its_plunges_has():
+    cut, plunge = "G1 X40 F500\nY30\n", "G1 Z-4 F100\n"
+    both, across = alone(f"G0 Z0\n{plunge}{cut}"), alone(f"G0 Z-4\n{cut}")
+    along = alone(f"G0 Z0\n{plunge}")
+    assert along["headline"] == "plunges only"
+    for name in FIGURES:
+        assert both[name] == pytest.approx(across[name], rel=1e-12)
+        assert both["plunges"][name] == pytest.approx(along[name], rel=1e-12)
+    assert both["weakest"]["line"] == across["weakest"]["line"] + 1
+
+
+def test_a_plunge_of_a_leaning_tool():
+    # Roll by 20 degrees leans the axis to (0, -sin 20, cos 20): 10 mm along it are a plunge, 10 mm along Z a cut.
+    lean = np.radians(20.0)
+    down = -0.01 * np.array([0.0, -np.sin(lean), np.cos(lean)])
+    pose = (lean, 0.0, 0.0)
+    moves = [{"start": (0, 0, 0, *pose), "end": (*down, *pose)}, {"end": (*down[:2], down[2] + 0.01, *pose)}]
+    analysis = make_analysis(moves)
+    assert analysis.samples.move[analysis.plunging].tolist() == [0] * int((analysis.samples.move == 0).sum())
+    assert analysis.summary()["plunges"]["length_mm"] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("load", ["normal", "axial", "softest", "z"])
+def test_other_loads_count_every_cut(load):
+    summary = alone("G1 Z-4 F100\nX40\n", load=load)
+    assert summary["headline"] == "all cuts" and summary["plunges"] is None
+
+
+def test_require_catches_a_weak_plunge():
+    analysis = analysed("G1 Z-4 F100\nG1 X40\n")
+    level = analysis.summary()["plunges"]["max_N_per_mm"] * 1e3 + 1.0
+    assert {line for line, _ in required_stiffness_missed(analysis, level)} == {1, 2}
+    assert weakest_places(analysis) and not analysis.plunging[weakest_places(analysis)].any()
+
+
+STEPS = st.lists(st.sampled_from(["G1 X{}", "G1 Y{}", "G1 Z-{}", "G1 X{0} Z-{0}", "G0 Z{}", "G1 B{}"]), max_size=6)
+
+
+@settings(deadline=None, max_examples=30)
+@given(STEPS, st.integers(1, 9))
+def test_the_classes_together_are_the_old_figures(steps, size):
+    lines = [step.format(size + i) for i, step in enumerate(steps)]
+    analysis = analysed("\n".join(["F500", *lines, "G1 X20 Y20", ""]))
+    counted, plunging = analysis.counted, analysis.plunging
+    assert not (analysis.headline & analysis.set_aside).any()
+    np.testing.assert_array_equal(analysis.headline | analysis.set_aside, counted)
+    whole, summary = stiffness_figures(analysis, counted), analysis.summary()
+    blocks = [summary, *([summary["plunges"]] if plunging.any() else [])]
+    length = [float(analysis.samples.weight[rows].sum()) for rows in (counted & ~plunging, plunging)]
+    assert min(block["min_N_per_mm"] for block in blocks) == whole["min_N_per_mm"]
+    assert max(block["max_N_per_mm"] for block in blocks) == whole["max_N_per_mm"]
+    for name in ("mean_N_per_mm", "mean_deflection_um"):
+        mean = np.average([block[name] for block in blocks], weights=length[: len(blocks)])
+        assert mean == pytest.approx(whole[name], rel=1e-12)
+
+
+def test_the_papers_path_has_no_plunges():
+    for program in (case_study_program(), wavy_program(40.0)):
+        analysis = analyse(NIST, program, origin=(0.15, 0.1, 0.4, 0.0, 0.0, 0.0))
+        assert not analysis.plunging.any() and analysis.headline.tolist() == analysis.counted.tolist()
+
+
+def test_the_table_of_samples_says_the_class_whatever_the_load():
+    text = "G0 Z5\nG1 Z-4 F100\nX40\nA3\n"
+    for load in ("tangential", "x"):
+        frame = analysed(text, load=load).to_frame()
+        found = frame.groupby("line")["cut"].agg(lambda cut: "".join(sorted(set(cut))))
+        assert found.to_dict() == {1: "", 2: "plunge", 3: "across", 4: ""}, load

@@ -44,6 +44,39 @@ def test_bars_stand_on_one_scale():
     assert low_1 >= 0 and high_2 <= 100
 
 
+PLUNGING = {"headline": "plunges only", "plunge_mean_N_per_mm": 215e3, "plunge_min_N_per_mm": 210e3,
+            "plunge_max_N_per_mm": 220e3}  # fmt: skip
+
+
+def test_a_program_that_only_plunges_does_not_set_the_scale_unless_the_switch_is_on():
+    drill = outcome("drill.nc", 210e3, 215e3, 220e3, **PLUNGING)
+    text = batch_page([SOFT, drill, STIFF])
+    without = "".join(re.findall(r'<div class="without">.*?</div>', text))
+    assert bars(without) == bars(batch_page([SOFT, STIFF]))
+    assert "210 000 to 220 000 →" in without and "only plunges" in text
+    ((low, high), (left, right), _) = bars("".join(re.findall(r'<div class="with">.*?</div>', text)))
+    # One straight scale holds them all: 150 kN/mm from the one's lower end to the other's, 40 of it the first bar.
+    assert (left - low) / (high - low) == pytest.approx((210 - 20) / 40, rel=1e-3) and right <= 100
+    assert 'id="with-plunges"' in text
+
+
+def test_programs_that_only_plunge_set_the_scale_among_themselves():
+    text = batch_page([outcome("drill.nc", 210e3, 215e3, 220e3, **PLUNGING)])
+    ((left, right),) = bars(text)
+    assert 0 <= left < right <= 100 and 'id="with-plunges"' not in text and "only plunges" in text
+
+
+def test_plunges_beside_have_a_column_and_a_bar_of_their_own():
+    more = {**PLUNGING, "headline": "across the tool axis", "plunge_length_mm": 12.0}
+    one = outcome("a.nc", 20e3, 30e3, 60e3, **more)
+    text = batch_page([one])
+    assert "215 000" in text and len(bars("".join(re.findall(r'<div class="without">.*?</div>', text)))) == 1
+    assert len(bars("".join(re.findall(r'<div class="with">.*?</div>', text)))) == 2
+    (row,) = csv.DictReader(summary_csv([one]).splitlines())
+    assert (row["headline"], float(row["plunge_min_N_per_mm"])) == ("across the tool axis", 210e3)
+    assert "nothing else is cut: drill.nc" in terminal_summary([one, outcome("drill.nc", 1.0, 1.0, 1.0, **PLUNGING)])
+
+
 def test_the_required_level_is_on_the_scale_and_marks_what_is_below():
     low = outcome("low.nc", 20e3, 30e3, 60e3, required_N_per_mm=150e3, lines_below_required=4)
     text = batch_page([low])

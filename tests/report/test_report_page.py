@@ -15,7 +15,7 @@ from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.nc.moves import ToolUse, Unsupported
 from toolpath_stiff.report import page_data as page_data_module
 from toolpath_stiff.report.page import json_for_script, page
-from toolpath_stiff.report.page_data import NONE, OUT_OF_REACH, page_rows
+from toolpath_stiff.report.page_data import NONE, OUT_OF_REACH, PLUNGE, page_rows
 from toolpath_stiff.report.wording import number
 from toolpath_stiff.report.write import summary_with_options
 
@@ -253,7 +253,56 @@ def test_a_browser_draws_the_page_without_complaint(make, tmp_path):
     rows = [attrs for _, attrs in dom.elements if "data-line" in attrs and attrs.get("class") == "row"]
     assert 1 <= len(rows) <= len(analysis.program.source)
     assert analysis.program.source[0] in done.stdout.replace("&lt;", "<").replace("&gt;", ">")
-    assert "≥" in done.stdout or make is not spiral  # the legend is filled by the script
+    assert "plunges 1" in done.stdout or make is not spiral  # the legend is filled by the script
+
+
+def test_the_page_knows_which_samples_are_set_aside_and_both_scales(analysis, parsed):
+    data = parsed.data
+    assert np.array_equal((column(data["kind"], "u1") & PLUNGE) > 0, analysis.set_aside) and analysis.set_aside.any()
+    headline, every = (analysis.at.stiffness[rows] / 1e3 for rows in (analysis.headline, analysis.counted))
+    assert data["scale"]["ends"] == pytest.approx([headline.min(), headline.max()])
+    assert data["scale_with_plunges"]["ends"] == pytest.approx([every.min(), every.max()])
+    assert Page(render(short())).data["scale_with_plunges"] is None
+    (switch,) = [attrs for _, attrs in parsed.elements if attrs.get("id") == "plunges"]
+    assert "checked" not in switch
+    shown = page(analysis, summary_with_options(analysis, None, None), show_plunges=True)
+    (switch,) = [attrs for _, attrs in Page(shown).elements if attrs.get("id") == "plunges"]
+    assert "checked" in switch
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+def test_the_switch_puts_the_plunges_on_the_scale(tmp_path):
+    analysis = spiral()
+    legends = []
+    for click in ("", "document.getElementById('plunges').click()"):
+        text = re.sub("<meta http-equiv[^>]*>", "", render(analysis))
+        file = tmp_path / "report.html"
+        file.write_text(text.replace("</body>", f"<script>{click}</script></body>"), encoding="utf-8")
+        options = [
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=3000",
+        ]
+        done = subprocess.run(
+            [BROWSER, *options, f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", file.as_uri()],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=True,
+        )
+        assert "CONSOLE" not in done.stderr
+        dom = Page(done.stdout)
+        legends.append(
+            next(
+                text
+                for (_, attrs), text in zip(dom.elements, dom.texts, strict=True)
+                if attrs.get("id") == "legend-high"
+            )
+        )
+    ends = [float(analysis.at.stiffness[rows].max()) / 1e3 for rows in (analysis.headline, analysis.counted)]
+    assert [float(re.sub(r"\D", "", legend)) for legend in legends] == pytest.approx(ends, abs=0.5)
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium here")

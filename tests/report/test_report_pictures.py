@@ -14,8 +14,9 @@ from matplotlib.image import imread
 
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.report import path_picture as path_picture_module
+from toolpath_stiff.report.figure import PLUNGE_SLATE, new_figure
 from toolpath_stiff.report.path_picture import path_picture
-from toolpath_stiff.report.profile_picture import MOST_OPERATIONS, extremes_by_column, profile_picture
+from toolpath_stiff.report.profile_picture import MOST_OPERATIONS, _set_limits, extremes_by_column, profile_picture
 from toolpath_stiff.report.scale import CLASSES, UNREACHABLE, scale_limits, segment_classes
 
 
@@ -137,6 +138,31 @@ def test_few_far_out_values_do_not_take_the_contrast_but_ordinary_ends_stay_on_t
     ordinary = analysis.at.stiffness[analysis.counted & ~plunges] / 1e3
     low, high = scale_limits(analysis)
     assert (low, high) == (ordinary.min(), ordinary.max())
+
+
+def test_plunges_are_on_the_scale_when_asked_for(analysis):
+    stiffness = analysis.at.stiffness[analysis.counted] / 1e3
+    assert scale_limits(analysis, show_plunges=True) == (stiffness.min(), stiffness.max())
+
+
+def test_plunges_are_grey_unless_asked_for(analysis):
+    slate = tuple(int(PLUNGE_SLATE[i : i + 2], 16) for i in (1, 3, 5))
+    for picture in (path_picture, profile_picture):
+        hidden, shown = (count_colour(picture(analysis, show_plunges=show), slate) for show in (False, True))
+        assert hidden > 20 > shown, picture.__name__
+
+
+def test_the_axis_of_the_profile_is_that_of_the_headline(analysis):
+    (low, high), (_, all_high) = (axis_of(analysis, show) for show in (False, True))
+    headline, plunges = (analysis.at.stiffness[rows] / 1e3 for rows in (analysis.headline, analysis.set_aside))
+    assert low <= headline.min() and headline.max() <= high < plunges.min() < all_high
+
+
+def axis_of(analysis, show_plunges):
+    """Ends of the axis of stiffness that the profile gets."""
+    axes = new_figure(5.0, 3.0).add_subplot()
+    _set_limits(axes, analysis, None, None, None, show_plunges)
+    return axes.get_ylim()
 
 
 def test_classes_cover_the_scale_in_order():

@@ -89,3 +89,28 @@ def test_numbers(value, text):
 @pytest.mark.parametrize(("seconds", "text"), [(59.94, "59.9 s"), (61.0, "0:01:01"), (7384.6, "2:03:05")])
 def test_durations(seconds, text):
     assert duration(seconds) == text
+
+
+def test_plunges_stand_beside_the_headline(summary):
+    (line,) = [line for line in terminal_table(summary).splitlines() if line.startswith("plunges ")]
+    plunges = summary["plunges"]
+    assert f"{number(plunges['length_mm'], 1)} mm in {plunges['moves']} move" in line
+    assert f"mean {number(plunges['mean_N_per_mm'])} N/mm, min {number(plunges['min_N_per_mm'])}" in line
+    assert "plunges " not in terminal_table(short().summary())
+
+
+def test_what_only_plunges_is_said_to(summary):
+    down = make_analysis([{"end": (0.0, 0.0, -0.05)}]).summary()
+    assert "this program only plunges" in " ".join(terminal_table(down).split())
+    first, second = summary["per_operation"]
+    text = terminal_table({**summary, "per_operation": [first, {**second, "headline": "plunges only"}]})
+    assert "operation 2: figures of plunges, there is no other cut" in text
+
+
+def test_two_machines_are_compared_by_their_plunges_too(summary):
+    half = {**summary, "plunges": {**summary["plunges"], "mean_N_per_mm": summary["plunges"]["mean_N_per_mm"] / 2.0}}
+    compared = compare_summaries(summary, half)
+    assert compared["plunges_difference_percent"] == -50.0 and set(compared["difference_percent"].values()) == {0.0}
+    (row,) = [line for line in comparison_table(summary, half).splitlines() if line.startswith("plunges N/mm")]
+    assert row.endswith("-50.0 %")
+    assert "plunges N/mm" not in comparison_table(short().summary(), short().summary())

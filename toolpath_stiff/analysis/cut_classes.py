@@ -1,7 +1,7 @@
 """Cuts across the tool axis and cuts along it: two classes of their own where the load follows the motion.
 
 A load along the motion points along the tool axis while the tool plunges. There a hexapod is twice as stiff as across
-(Clinton, Zhang, Wavering 1997, Figures 8 and 9: Z against X and Y), so three plunges of a few millimetres would rule
+(Clinton, Zhang, Wavering 1997, Table 1: Z against X and Y), so three plunges of a few millimetres would rule
 the range of a whole program. The headline figures are therefore those of the cuts across the axis; plunges have theirs
 beside them.
 

@@ -16,12 +16,19 @@ from urllib.parse import quote
 from toolpath_stiff import __version__
 from toolpath_stiff.report.batch import PAGE_MARK, Outcome
 from toolpath_stiff.report.sections import escaped, figures, page, section
-from toolpath_stiff.report.wording import duration, number, plain, shortened
+from toolpath_stiff.report.wording import ONLY_PLUNGES, duration, number, only_plunges, plain, shortened
 
 TEXT = 40  # characters of a program's line that are shown
 TICKS = 5  # of the scale, about
 MOST_LABELS = 4  # on the scale, or they would touch on a narrow page
 DRAWN = ("min_N_per_mm", "max_N_per_mm", "required_N_per_mm", "compare_mean_N_per_mm")
+PLUNGES = ("plunge_min_N_per_mm", "plunge_max_N_per_mm")
+SWITCH = (  # a style switches the drawings: no script
+    '<input type="checkbox" id="with-plunges"> '
+    '<label for="with-plunges">plunges along the tool axis on the scale</label>'
+)
+PLUNGES_ASIDE = "Plunges along the tool axis have a column of their own; bars and scale are of all other cuts."
+PLUNGES_HINT = "mean of the cuts along the tool axis, which the other figures leave out unless nothing else is cut"
 OTHER_MEAN, CHANGE = "mean on the other machine, N/mm", "how much higher the mean is on the other machine"
 
 HOW_TO_READ = (
@@ -117,12 +124,20 @@ class Scale:
         return f"{100.0 * (value - self.low) / (self.high - self.low):.2f}%"
 
 
-def _scale(good: Sequence[Outcome]) -> Scale | None:
-    """A scale that holds all bars and the required level; None where there is no bar."""
-    ends = [_figure(one, name) for one in good for name in DRAWN]
-    values = [float(end) for end in ends if end is not None]
+Scales = tuple[Scale, Scale | None]  # without and with the plunges; None where nothing plunges
+
+
+def _scale(good: Sequence[Outcome], with_plunges: bool = False) -> Scale | None:
+    """A scale that holds the bars and the required level; None where there is no bar.
+
+    Programs that only plunge set it if there are no others, or `with_plunges`, as the plunges of all then do.
+    """
     if not any(_figure(one, "min_N_per_mm") is not None for one in good):
         return None
+    across = [one for one in good if not _only_plunges(one) and _figure(one, "min_N_per_mm") is not None]
+    names = (*DRAWN, *PLUNGES) if with_plunges else DRAWN
+    ends = [_figure(one, name) for one in (good if with_plunges or not across else across) for name in names]
+    values = [float(end) for end in ends if end is not None]
     low, high = min(values), max(values)
     if high - low < 1e-6 * high:
         low, high = 0.9 * low, 1.1 * high
@@ -144,20 +159,30 @@ def _axis(scale: Scale) -> str:
     return f'<svg height="18" aria-hidden="true">{texts}</svg>'
 
 
-def _bar(one: Outcome, scale: Scale) -> str:
+def _bar(one: Outcome, scale: Scale, with_plunges: bool = False) -> str:
     low, mean, high = (_figure(one, f"{name}_N_per_mm") for name in ("min", "mean", "max"))
     lines = "".join(_line(scale, tick, "tick") for tick in scale.ticks)
-    if low is not None:
-        kind = "span below" if _figure(one, "lines_below_required") else "span"
-        left, right = scale.at(low), scale.at(high)
-        width = f"{max(float(right[:-1]) - float(left[:-1]), 0.4):.2f}%"
-        lines += f'<rect class="{kind}" x="{left}" width="{width}" y="6" height="10" rx="2"/>'
+    if low is not None and (low > scale.high or high < scale.low):  # only plunges, and these are not on the scale
+        words = f"{number(low)} to {number(high)}"
+        end, text = ("end", f"{words} →") if low > scale.high else ("start", f"← {words}")
+        lines += f'<text class="beyond {end}" x="{"100%" if end == "end" else "0"}" y="15">{text}</text>'
+    elif low is not None:
+        kind = "span plunge" if _only_plunges(one) else "span"
+        lines += _span(scale, low, high, f"{kind} below" if _figure(one, "lines_below_required") else kind)
         lines += _line(scale, mean, "mean", (3, 19))
+    if with_plunges and not _only_plunges(one) and (first := _figure(one, PLUNGES[0])) is not None:
+        lines += _span(scale, first, _figure(one, PLUNGES[1]), "span plunge")
     if (other := _figure(one, "compare_mean_N_per_mm")) is not None:
         lines += _line(scale, other, "other", (3, 19))
     if scale.required is not None:
         lines += _line(scale, scale.required, "required")
     return f'<svg height="22" aria-hidden="true">{lines}</svg>'
+
+
+def _span(scale: Scale, low: float, high: float, kind: str) -> str:
+    left, right = scale.at(low), scale.at(high)
+    width = f"{max(float(right[:-1]) - float(left[:-1]), 0.4):.2f}%"
+    return f'<rect class="{kind}" x="{left}" width="{width}" y="6" height="10" rx="2"/>'
 
 
 def _line(scale: Scale, value: float, kind: str, ends: tuple[int, int] = (0, 22)) -> str:
@@ -179,6 +204,9 @@ def _table(good: Sequence[Outcome]) -> str:
     if scale is None:
         return ""
     compared = _figure(good[0], "compare_machine") is not None
+    plunging = any(_figure(one, "plunge_mean_N_per_mm") is not None for one in good)
+    beside = plunging and not all(_only_plunges(one) for one in good)
+    scales = (scale, _scale(good, with_plunges=True) if beside else None)
     columns = [
         Column("program", ""),
         Column("", "bar"),
@@ -186,6 +214,7 @@ def _table(good: Sequence[Outcome]) -> str:
         Column("mean\nN/mm", "num", "by cutting length"),
         Column("max\nN/mm", "num"),
         Column("range\nN/mm", "num"),
+        *((Column("plunges\nN/mm", "num", PLUNGES_HINT),) if plunging else ()),
         *((Column("lines\nbelow", "num", "lines below the required stiffness"),) if scale.required is not None else ()),
         *((Column("other\nmean", "num", OTHER_MEAN), Column("change\n%", "num", CHANGE)) if compared else ()),
         Column("weakest line", "num text"),
@@ -194,11 +223,12 @@ def _table(good: Sequence[Outcome]) -> str:
         Column("out of\nreach", "num", "cutting samples that were left out"),
         Column("warn-\nings", "num", "in the program's own report"),
     ]
-    head = "".join(_heading(column, scale) for column in columns)
-    rows = "".join(_row(one, columns, scale, compared) for one in good)
-    key = _key(scale, _figure(good[0], "compare_machine"))
+    head = "".join(_heading(column, scales) for column in columns)
+    rows = "".join(_row(one, columns, scales, compared, plunging) for one in good)
+    key = _key(scale, _figure(good[0], "compare_machine"), beside)
+    how, switch = (f"{HOW_TO_READ} {PLUNGES_ASIDE}", SWITCH) if beside else (HOW_TO_READ, "")
     body = (
-        f'<p class="muted">{escaped(HOW_TO_READ)}</p><p class="muted">{key}</p>'
+        f'<p class="muted">{escaped(how)}</p><p class="muted">{key}</p>{switch}'
         # A box that scrolls by itself keeps the headings in sight; with a tabindex the keyboard can scroll it.
         '<div class="scroll" role="region" aria-label="Table of programs" tabindex="0">'
         f'<table id="programs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
@@ -206,7 +236,7 @@ def _table(good: Sequence[Outcome]) -> str:
     return section("Stiffness of each program", body)
 
 
-def _key(scale: Scale, other: str | None) -> str:
+def _key(scale: Scale, other: str | None, plunging: bool) -> str:
     bar = '<rect class="span" x="0" width="34" y="2" height="10" rx="2"/>'
     mean = '<line class="mean" x1="17" x2="17" y1="0" y2="14"/>'
     entries = [(bar, "lowest to highest, N/mm"), (mean, "mean")]
@@ -215,14 +245,25 @@ def _key(scale: Scale, other: str | None) -> str:
     if scale.required is not None:
         entries.append(('<line class="required" x1="17" x2="17" y1="0" y2="14"/>', "required"))
         entries.append((bar.replace('"span"', '"span below"'), "below it somewhere"))
+    if plunging:
+        entries.append((bar.replace('"span"', '"span plunge"'), "plunges along the tool axis"))
     return "".join(
         f'<span class="key"><svg aria-hidden="true">{drawing}</svg>{escaped(text)}</span>' for drawing, text in entries
     )
 
 
-def _heading(column: Column, scale: Scale) -> str:
+def _both(without: str, with_plunges: str) -> str:
+    """Two drawings of which the page shows one: without plunges on the scale, and with them."""
+    if not with_plunges:
+        return without
+    return f'<div class="without">{without}</div><div class="with">{with_plunges}</div>'
+
+
+def _heading(column: Column, scales: Scales) -> str:
     if column.kind == "bar":
-        return f'<th class="bar"><span class="unseen">drawing</span>{_axis(scale)}</th>'
+        first, second = scales
+        drawings = _both(_axis(first), _axis(second) if second else "")
+        return f'<th class="bar"><span class="unseen">drawing</span>{drawings}</th>'
     title = "<br>".join(map(escaped, column.title.split("\n")))
     hint = f' title="{escaped(column.hint)}"' if column.hint else ""
     button = f'<button type="button"{hint}>{title}</button>'
@@ -230,11 +271,13 @@ def _heading(column: Column, scale: Scale) -> str:
     return f'<th scope="col"{kind}>{button}</th>'
 
 
-def _row(one: Outcome, columns: Sequence[Column], scale: Scale, compared: bool) -> str:
+def _row(one: Outcome, columns: Sequence[Column], scales: Scales, compared: bool, plunging: bool) -> str:
+    scale, second = scales
     cells = [
         (one.name, f'<a href="{_link(one.opens)}" title="{escaped(one.file)}">{escaped(one.name)}</a>'),
-        ("", _bar(one, scale)),
+        ("", _both(_bar(one, scale), _bar(one, second, with_plunges=True) if second else "")),
         *(_number(one, f"{name}_N_per_mm") for name in ("min", "mean", "max", "range")),
+        *((_plunges(one),) if plunging else ()),
         *((_flagged(one, "lines_below_required"),) if scale.required is not None else ()),
         *(
             (_number(one, "compare_mean_N_per_mm"), _number(one, "compare_mean_difference_percent", 1))
@@ -248,6 +291,16 @@ def _row(one: Outcome, columns: Sequence[Column], scale: Scale, compared: bool) 
         _flagged(one, "warnings"),
     ]
     return "<tr>" + "".join(_cell(column, *cell) for column, cell in zip(columns, cells, strict=True)) + "</tr>\n"
+
+
+def _plunges(one: Outcome) -> tuple[str, str]:
+    """Their mean; of a program that only plunges all other figures are theirs already."""
+    value, shown = _number(one, "plunge_mean_N_per_mm")
+    return value, ONLY_PLUNGES if _only_plunges(one) else shown
+
+
+def _only_plunges(one: Outcome) -> bool:
+    return only_plunges(one.figures or {})
 
 
 def _place(one: Outcome) -> str:

@@ -69,7 +69,7 @@ class Profile extends Stage {
     g.setLineDash([2, 2]);
     this.curve(g, s, this.plunges, ink.plunge);
     g.setLineDash([]);
-    this.drawBeyond(g, left, right, top, bottom);
+    this.drawBeyond(g, top, bottom);
     this.curve(g, s, this.k, ink.curve);
     for (const i of data.weakest) { ring(g, ...this.at(i), 5, ink.panel, 4); ring(g, ...this.at(i), 5, ink.ink, 1.6); }
     g.restore();
@@ -93,15 +93,16 @@ class Profile extends Stage {
     this.low = low - pad;
     this.high = high + pad;
   }
-  // Arrows where plunges leave the axis, a few pixels apart at least.
-  drawBeyond(g, left, right, top, bottom) {
+  // An arrow wherever plunges leave the axis.
+  drawBeyond(g, top, bottom) {
     g.fillStyle = ink.plunge;
-    let last = -Infinity;
+    const side = (i) => i < n && s[i] <= this.to ? (this.plunges[i] > this.high) - (this.plunges[i] < this.low) : 0;
     for (let i = rowAt(s, this.from); i < n && s[i] <= this.to; i++) {
-      const k = this.plunges[i], x = this.x(s[i]);
-      if (Number.isNaN(k) || (k <= this.high && k >= this.low) || x - last < 7) continue;
-      last = x;
-      const [tip, tail] = k > this.high ? [top + 1, top + 9] : [bottom - 1, bottom - 9];
+      const which = side(i), start = i;
+      if (which === 0) continue;
+      while (side(i + 1) === which) i++;
+      const x = (this.x(s[start]) + this.x(s[i])) / 2;
+      const [tip, tail] = which > 0 ? [top + 1, top + 9] : [bottom - 1, bottom - 9];
       g.beginPath();
       g.moveTo(x, tip);
       g.lineTo(x - 4, tail);
