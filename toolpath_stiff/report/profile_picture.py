@@ -80,13 +80,13 @@ def profile_picture(
             keep = extremes_by_column(s2, k2, columns)
             name = shortened(plain(other.machine.name), 30)
             axes.plot(s2[keep], k2[keep], color=SECOND_ORANGE, linewidth=1.3, label=name, zorder=3)
-            _draw_plunges(axes, other, columns, SECOND_ORANGE, show_plunges)
+            _draw_plunges(axes, other, columns, SECOND_ORANGE, show_plunges, "_")
         if band is not None:
             _draw_band(axes, s, band, columns)
         keep = extremes_by_column(s, k, columns)
         name = shortened(plain(analysis.machine.name), 30)
         axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
-        _draw_plunges(axes, analysis, columns, PLUNGE_SLATE, show_plunges)
+        _draw_plunges(axes, analysis, columns, PLUNGE_SLATE, show_plunges, "plunges")
         _levels(axes, analysis, required)
         _tool_changes(axes, analysis)
         if strip:
@@ -110,23 +110,22 @@ def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatA
     return mm_from_m(analysis.samples.s), np.where(drawn, stiffness, np.nan)
 
 
-def _draw_plunges(axes: Axes, analysis: Analysis, columns: int, colour: str, show_plunges: bool) -> None:
-    """The plunges that the curve leaves out: thin lines, and arrows at the edge of the axes that they leave."""
+def _draw_plunges(axes: Axes, analysis: Analysis, columns: int, colour: str, show_plunges: bool, label: str) -> None:
+    """The plunges that the curve leaves out: thin lines, and arrows at the edge of the axes that they leave.
+
+    A `label` that begins with "_" does not enter the legend (matplotlib's rule).
+    """
     if show_plunges or not analysis.set_aside.any():
         return
     s = mm_from_m(analysis.samples.s)
     k = np.where(analysis.set_aside, n_per_mm_from_n_per_m(analysis.at.stiffness), np.nan)
     keep = extremes_by_column(s, k, columns)
-    label = f"plunges {number(float(np.nanmin(k)))} to {number(float(np.nanmax(k)))} N/mm"
-    line: dict[str, Any] = {"color": colour, "linewidth": 1.3, "linestyle": (0, (2, 1))}
-    axes.plot(s[keep], k[keep], **line, zorder=3.5)
     low, high = axes.get_ylim()
-    ends = ((k > high, 1.0, -20.0, "^"), (k < low, 0.0, 20.0, "v"))
-    marker = next((marker for beyond, _, _, marker in ends if beyond.any()), "none")
-    axes.plot(
-        [], [], **(line if marker == "none" else {"color": colour, "linestyle": "none"}), marker=marker, label=label
-    )
-    for beyond, edge, tail, _ in ends:
+    above, below = k > high, k < low
+    marker = "^" if above.any() else "v" if below.any() else "none"  # in the legend: of what is seen of them
+    axes.plot(s[keep], k[keep], color=colour, linewidth=1.3, linestyle=(0, (2, 1)), zorder=3.5)
+    axes.plot([], [], color=colour, linewidth=1.3, linestyle=(0, (2, 1)), marker=marker, markersize=5, label=label)
+    for beyond, edge, tail in ((above, 1.0, -20.0), (below, 0.0, 20.0)):
         start, stop = _runs(beyond)
         for x in ((s[start] + s[stop]) / 2.0)[:MOST_ARROWS].tolist():
             axes.annotate(
