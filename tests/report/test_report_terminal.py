@@ -99,6 +99,12 @@ def test_plunges_stand_beside_the_headline(summary):
     assert "plunges " not in terminal_table(short().summary())
 
 
+def test_a_plunge_weaker_than_all_other_cuts_is_named(summary):
+    weak = {**summary, "plunges": {**summary["plunges"], "min_N_per_mm": summary["min_N_per_mm"] - 1.0}}
+    words = [" ".join(terminal_table(one).split()) for one in (summary, weak)]
+    assert ["weaker than all other cuts" in text for text in words] == [False, True]
+
+
 def test_what_only_plunges_is_said_to(summary):
     down = make_analysis([{"end": (0.0, 0.0, -0.05)}]).summary()
     assert "this program only plunges" in " ".join(terminal_table(down).split())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -146,7 +147,7 @@ def terminal_summary(outcomes: Sequence[Outcome]) -> str:
     lines = _table(good) if good else []
     plunging = [plain(one.name) for one in good if only_plunges(one.figures or {})]
     if plunging:
-        lines.append(f"figures of plunges, nothing else is cut: {', '.join(plunging)}")
+        lines += textwrap.wrap(f"figures of plunges, nothing else is cut: {', '.join(plunging)}", WIDTH)
     partial = [one for one in good if one.status == "partial"]
     if partial:
         lines.append("cutting samples out of reach, left out:")

@@ -122,7 +122,8 @@ def _plunges(summary: Mapping[str, Any]) -> list[str]:
     moves = f"{number(plunges['moves'])} move{'' if plunges['moves'] == 1 else 's'}"
     text = f"{number(plunges['length_mm'], 1)} mm in {moves}: mean {number(plunges['mean_N_per_mm'])} N/mm, "
     text += f"min {number(plunges['min_N_per_mm'])}, max {number(plunges['max_N_per_mm'])}"
-    return _entry("plunges", f"{text}; not counted above")
+    weaker = plunges["min_N_per_mm"] < summary["min_N_per_mm"]
+    return _entry("plunges", f"{text}; not counted above{', though weaker than all other cuts' if weaker else ''}")
 
 
 def _plunges_compared(summary: Mapping[str, Any], other: Mapping[str, Any]) -> list[list[str]]:
@@ -189,10 +190,7 @@ def _only_plunges(parts: Sequence[Mapping[str, Any]], names: Sequence[str]) -> l
     plunging = [name for part, name in zip(parts, names, strict=True) if only_plunges(part)]
     if not plunging or len(plunging) == len(parts):
         return []
-    text = (
-        f"{', '.join(plunging)}: {'figures' if len(plunging) == 1 else 'all figures'} of plunges, there is no other cut"
-    )
-    return textwrap.wrap(text, WIDTH)
+    return textwrap.wrap(f"{', '.join(plunging)}: figures of plunges, there is no other cut", WIDTH)
 
 
 def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
