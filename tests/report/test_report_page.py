@@ -190,6 +190,8 @@ def test_very_many_samples_are_thinned_aloud_and_keep_the_extremes(analysis, mon
     stiffness, counted = analysis.at.stiffness, analysis.counted
     assert stiffness[rows][counted[rows]].min() == stiffness[counted].min()
     assert stiffness[rows][counted[rows]].max() == stiffness[counted].max()
+    headline = analysis.headline
+    assert stiffness[rows][headline[rows]].max() == stiffness[headline].max()
     text = render(analysis)
     assert f"{number(len(rows))} of the {number(len(analysis.samples))} samples" in text
     weakest = Page(text).data["weakest"]

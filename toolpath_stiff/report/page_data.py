@@ -88,14 +88,14 @@ def page_rows(analysis: Analysis) -> IntArray:
     change = np.flatnonzero(np.diff(analysis.samples.motion) != 0)
     ends = np.concatenate([change, change + 1]) if 2 * len(change) < MOST_SAMPLES // 4 else change[:0]
     stiffness = np.where(analysis.samples.cutting, analysis.at.stiffness, np.nan)
-    extremes = extremes_by_column(np.arange(n, dtype=float), stiffness, MOST_SAMPLES // 6)
+    curves = [(stiffness, 6)]  # and the share of the page's samples that a curve gets a column of pixels for
+    if analysis.set_aside.any():  # a column's extremes may be plunges: the headline has its own
+        curves = [(np.where(analysis.set_aside, np.nan, stiffness), 8), (stiffness, 24)]
+    extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too
     firsts = np.searchsorted(analysis.samples.move, [row.first_move for row in analysis.operations.rows])
     wanted = np.array([0, *weakest_places(analysis)], dtype=np.int64)
-    # A stretch's extremes may be plunges: the headline's own are kept as well.
-    beside = np.where(analysis.set_aside, np.nan, stiffness)
-    extremes = np.union1d(extremes, extremes_by_column(np.arange(n, dtype=float), beside, MOST_SAMPLES // 12))
-    return np.unique(np.concatenate([extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
+    return np.unique(np.concatenate([*extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
 
 
 def _operations(analysis: Analysis, move: IntArray) -> list[list[Any]]:

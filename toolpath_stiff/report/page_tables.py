@@ -11,6 +11,7 @@ from toolpath_stiff.report.wording import (
     ONLY_PLUNGES,
     READERS,
     duration,
+    length_in_moves,
     number,
     only_plunges,
     plain,
@@ -93,7 +94,7 @@ def _plunges(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     place = plunges["weakest"]
     return [
         ("These are figures of", f"cuts {summary['headline']}"),
-        ("Plunges along the axis", f"{number(plunges['length_mm'], 1)} mm in {number(plunges['moves'])} moves"),
+        ("Plunges along the axis", length_in_moves(plunges)),
         ("Plunges N/mm", f"mean {number(plunges['mean_N_per_mm'])}, {span_of(plunges)}"),
         ("Weakest plunge", f"{number(place['stiffness_N_per_mm'])} N/mm in line {place['line']}: {place['text']}"),
     ]

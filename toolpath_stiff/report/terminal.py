@@ -7,7 +7,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.report.comparison import FIGURES, compare_summaries
-from toolpath_stiff.report.wording import READERS, duration, number, only_plunges, plain, plunges_beside, shortened
+from toolpath_stiff.report.wording import (
+    READERS,
+    duration,
+    length_in_moves,
+    number,
+    only_plunges,
+    plain,
+    plunges_beside,
+    shortened,
+)
 
 WIDTH = 100
 LABEL = 14  # columns of the left-hand words
@@ -119,8 +128,7 @@ def _plunges(summary: Mapping[str, Any]) -> list[str]:
     plunges = plunges_beside(summary)
     if plunges is None:
         return []
-    moves = f"{number(plunges['moves'])} move{'' if plunges['moves'] == 1 else 's'}"
-    text = f"{number(plunges['length_mm'], 1)} mm in {moves}: mean {number(plunges['mean_N_per_mm'])} N/mm, "
+    text = f"{length_in_moves(plunges)}: mean {number(plunges['mean_N_per_mm'])} N/mm, "
     text += f"min {number(plunges['min_N_per_mm'])}, max {number(plunges['max_N_per_mm'])}"
     weaker = plunges["min_N_per_mm"] < summary["min_N_per_mm"]
     return _entry("plunges", f"{text}; not counted above{', though weaker than all other cuts' if weaker else ''}")

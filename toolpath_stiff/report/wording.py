@@ -45,6 +45,11 @@ def plunges_beside(figures: Mapping[str, Any]) -> Mapping[str, Any] | None:
     return None if figures["headline"] == PLUNGES_ONLY else found
 
 
+def length_in_moves(plunges: Mapping[str, Any]) -> str:
+    """How much is plunged: "20.0 mm in 3 moves"."""
+    return f"{number(plunges['length_mm'], 1)} mm in {number(plunges['moves'])} move{'s' * (plunges['moves'] != 1)}"
+
+
 def only_plunges(figures: Mapping[str, Any]) -> bool:
     """Whether the figures of a program, a tool or an operation are those of plunges, for it does nothing else."""
     return bool(figures.get("headline") == PLUNGES_ONLY)
