@@ -130,7 +130,8 @@ def _plunges(summary: Mapping[str, Any]) -> list[str]:
         return []
     text = f"{length_in_moves(plunges)}: mean {number(plunges['mean_N_per_mm'])} N/mm, "
     text += f"min {number(plunges['min_N_per_mm'])}, max {number(plunges['max_N_per_mm'])}"
-    weaker = plunges["min_N_per_mm"] < summary["min_N_per_mm"]
+    lowest = summary["min_N_per_mm"]
+    weaker = lowest is not None and plunges["min_N_per_mm"] < lowest
     return _entry("plunges", f"{text}; not counted above{', though weaker than all other cuts' if weaker else ''}")
 
 
