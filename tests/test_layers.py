@@ -18,6 +18,7 @@ PACKAGE = Path(toolpath_stiff.__file__).parent
 RANK = {
     "units": 0,
     "errors": 0,
+    "hints": 0,
     "files": 1,
     "column_files": 1,
     "nc": 2,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -69,3 +70,42 @@ def read_text(path: str | Path, what: str) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         return content.decode("latin-1")
+
+
+def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], replace: bool = False) -> list[Path]:
+    """The outputs that are an input as well: the same file, by another name or through a link.
+
+    Raises `InputError` for the first of them unless `replace`.
+    """
+    given = [Path(file) for file in inputs if Path(file).is_file()]
+    found = [Path(out) for out in outputs if any(_is_same(Path(out), file) for file in given)]
+    if found and not replace:
+        raise InputError(
+            f"{str(found[0])!r} is read here and would be written over",
+            hint="write somewhere else, or say --replace: the old file is then kept beside the new one",
+        )
+    return found
+
+
+def _is_same(out: Path, file: Path) -> bool:
+    try:
+        return out.samefile(file)
+    except OSError:  # one of them is not there
+        return False
+
+
+def keep_old(file: str | Path) -> Path | None:
+    """Copy a file to a free name beside it, `NAME.old` or `NAME.old2` and so on; None where there is no file.
+
+    Raises `InputError` where that cannot be done.
+    """
+    path = Path(file)
+    if not path.is_file():
+        return None
+    numbers = itertools.chain([""], itertools.count(2))
+    names = (path.with_name(f"{path.name}.old{number}") for number in numbers)
+    kept = next(name for name in names if not name.exists() and not name.is_symlink())
+    try:
+        return write_atomically(kept, path.read_bytes())
+    except OSError as error:
+        raise InputError(f"cannot read {str(path)!r}: {error.strerror}") from None

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.acting import idle_effects
 from toolpath_stiff.stiffness.model import StiffnessModel, with_parameter_moved
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
@@ -62,11 +63,12 @@ def parameter_band(analysis: Analysis) -> ParameterBand | None:
     uncertainty = given.uncertainty if given is not None else None
     if uncertainty is None:
         return None
-    instruments = {active.effect.name for active in analysis.model.instruments}
+    idle = {active.effect.name for active in analysis.model.instruments}
+    idle |= {one.effect for one in idle_effects(analysis.model)}
     kept = [
         i
         for i, (name, sd) in enumerate(zip(uncertainty.names, uncertainty.sd, strict=True))
-        if sd > 0.0 and name.partition(".")[0] not in instruments
+        if sd > 0.0 and name.partition(".")[0] not in idle
     ]
     if not kept:
         return None

@@ -19,6 +19,7 @@ from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
 from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path import place, sample_moves
 from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.stiffness.acting import acting_effects, condition_warnings, conditions_stated
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
@@ -185,6 +186,7 @@ def analyse(
         force,
         progress,
     )
+    tool_given = not np.isnan(samples.tool_length[samples.cutting]).any()
     analysis = Analysis(
         program=program,
         model=model,
@@ -195,7 +197,11 @@ def analyse(
         step=step,
         samples=samples,
         at=at,
-        warnings=(*program.warnings, *instruments_set_aside(model), *_warnings(samples, at)),
+        warnings=(
+            *program.warnings,
+            *condition_warnings(model, tool_given),
+            *_warnings(samples, at),
+        ),
     )
     _check_reach(analysis, partial)
     return analysis
@@ -216,12 +222,6 @@ def _effective_origin(machine: Machine, program: Program, origin: Pose | None) -
             file=program.name,
         )
     return chosen, source
-
-
-def instruments_set_aside(model: StiffnessModel) -> list[str]:
-    """That the machine file's instruments change readings and are left out here; nothing if there are none."""
-    names = ", ".join(active.effect.name for active in model.instruments)
-    return [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
 
 
 def _warnings(samples: Samples, at: PoseStiffness) -> list[str]:
@@ -309,7 +309,10 @@ def assumptions(analysis: Analysis) -> list[str]:
     feed = mm_per_min_from_m_per_s(machine.rapid_feed)
     found.append(f"rapid moves take {feed:g} mm/min (time only)")
     found.append(f"load {analysis.load}: {RULES[analysis.load.kind]}")
-    secant = "; the stiffness is the secant one at this load" if analysis.model.load_dependent else ""
+    found += conditions_stated(analysis.model)
+    acting = acting_effects(analysis.model)
+    load_dependent = any(active.effect.load_dependent for active in acting)
+    secant = "; the stiffness is the secant one at this load" if load_dependent else ""
     found.append(f"a force of {analysis.force:g} N for deflections{secant}")
     law = machine.strut_law
     found.append(
@@ -321,7 +324,7 @@ def assumptions(analysis: Analysis) -> list[str]:
             "the band of the stiffness holds the uncertainty of the fitted parameters alone, propagated linearly: "
             f"{', '.join(analysis.parameter_band.names)}"
         )
-    if not analysis.model.effects:
+    if not acting:
         found.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
     return found
 

@@ -11,6 +11,7 @@ from toolpath_stiff.analysis.breakdown import class_figures, describe_sample, pe
 from toolpath_stiff.analysis.parameter_band import band_figures
 from toolpath_stiff.analysis.path_analysis import Analysis, assumptions
 from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.stiffness.acting import effects_stated
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
         "min_margin_line": int(samples.line[nearest]),
         "out_of_reach_samples": int(analysis.out_of_reach.sum()),
         "extrapolated_share": share(analysis.at.extrapolated, cutting),
-        "effects": [active.effect.name for active in analysis.model.effects],
+        **effects_stated(analysis.model),
         "unsupported": [
             {"line": u.line, "column": u.column, "word": u.word, "reason": u.reason}
             for u in analysis.program.unsupported

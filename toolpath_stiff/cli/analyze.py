@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +15,11 @@ from toolpath_stiff.cli.arguments import (
     add_load_options,
     add_machine_options,
     add_program_options,
+    models_for,
     positive_number,
     read_program_for,
 )
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
@@ -84,6 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="format of the samples (default: csv)"
     )
+    add_replace_option(parser, force=False)
     add_json_option(parser, "print summary.json to standard output and nothing else")
     parser.add_argument(
         "--show-plunges",
@@ -138,17 +142,19 @@ class Report:
     files: list[Path]
 
 
-def models_for(args: argparse.Namespace) -> Models:
-    """Load the machines. Raises `InputError` for a machine or an effect that does not exist."""
-    from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.stiffness.model import build_model
-
-    first = build_model(load_machine(args.machine), args.effects)
-    return Models(first, build_model(load_machine(args.compare), args.effects) if args.compare else None)
+def load_models(args: argparse.Namespace) -> Models:
+    """Load the machines. Raises as `arguments.models_for`."""
+    found = models_for(args, *(name for name in (args.machine, args.compare) if name))
+    return Models(found[0], found[1] if args.compare else None)
 
 
 def analyse_and_write(
-    args: argparse.Namespace, file: str, folder: Path, models: Models, progress: Progress | None = None
+    args: argparse.Namespace,
+    file: str,
+    folder: Path,
+    models: Models,
+    progress: Progress | None = None,
+    replaced: Sequence[Path] = (),
 ) -> Report:
     """Analyse a program and write its report folder. Raises `TpsError`, with nothing written."""
     from toolpath_stiff.analysis.path_analysis import analyse, required_stiffness_missed
@@ -168,6 +174,7 @@ def analyse_and_write(
     if models.second is not None:
         second = analyse(models.second, read_program_for(args, file, models.second.machine), **options)
     required = None if args.require is None else n_per_m_from_n_per_mm(args.require)
+    keep(replaced, quiet=args.json)
     files = write_analysis(
         analysis,
         folder,
@@ -189,10 +196,12 @@ def analyse_and_write(
 def _run_single(args: argparse.Namespace, file: str) -> int:
     """Analyse, write, print; the exit code."""
     from toolpath_stiff.cli.progress import progress_bar
+    from toolpath_stiff.report.write import OWN_FILES
 
     folder = Path(args.out) if args.out else Path("reports") / Path(file).stem
+    replaced = check_written(args, (folder / name for name in OWN_FILES))
     with progress_bar(f"{Path(file).name}: samples", quiet=args.json) as progress:
-        report = analyse_and_write(args, file, folder, models_for(args), progress)
+        report = analyse_and_write(args, file, folder, load_models(args), progress, replaced)
     if args.json:
         json.dump(report.summary, sys.stdout, indent=2)
         sys.stdout.write("\n")

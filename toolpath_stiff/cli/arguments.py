@@ -10,12 +10,15 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import MACHINE
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
     from toolpath_stiff.nc import Program
     from toolpath_stiff.nc.controller import Controller
+    from toolpath_stiff.stiffness.effects.contract import Conditions
+    from toolpath_stiff.stiffness.model import StiffnessModel
 
 Pose = tuple[float, float, float, float, float, float]
 
@@ -173,7 +176,7 @@ def add_machine_options(parser: argparse.ArgumentParser) -> None:
     """Options about the machine and its physics."""
     group = parser.add_argument_group("machine")
     group.add_argument(
-        "--machine", default="nist", metavar="NAME|FILE", help="machine name or machine file (default: nist)"
+        "--machine", default=MACHINE, metavar="NAME|FILE", help=f"machine name or machine file (default: {MACHINE})"
     )
     group.add_argument(
         "--effects", action="append", default=[], metavar="FILE.py", help="file with your own physical effects"
@@ -185,6 +188,82 @@ def add_machine_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="load at the tool tip, for deflections and load-dependent effects (default: 1000)",
     )
+    add_condition_options(group)
+
+
+def add_condition_options(group: argparse._ActionsContainer) -> None:
+    """Under what a program runs, which measurements say reading by reading."""
+    group.add_argument(
+        "--setup",
+        type=_setup_name,
+        metavar="NAME",
+        help="set-up that is on the machine, for effects that belong to one; none: none that has a name "
+        "(default: the controller file's, else the machine file's)",
+    )
+    group.add_argument(
+        "--temperature",
+        type=_temperature,
+        metavar="C",
+        help="degrees C, for effects that need it (default: the machine file's)",
+    )
+
+
+def _setup_name(text: str) -> str:
+    if not text.strip():
+        raise argparse.ArgumentTypeError("an empty name: expected a set-up, or none")
+    return text.strip()
+
+
+def _temperature(text: str) -> float:
+    value = finite_number(text)
+    if not -50.0 <= value <= 200.0:
+        raise argparse.ArgumentTypeError(f"{text} degrees C: expected -50 to 200")
+    return value
+
+
+def models_for(args: argparse.Namespace, *machines: str) -> list[StiffnessModel]:
+    """The models of machines (names or files), as the options of `add_machine_options` describe them.
+
+    Raises `InputError` for a machine or an effect that does not exist, and for a set-up that none of them knows.
+    """
+    from dataclasses import replace
+
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.stiffness.acting import check_setup
+    from toolpath_stiff.stiffness.model import build_model
+
+    models = [build_model(load_machine(name), args.effects) for name in machines or (args.machine,)]
+    for model in models:
+        check_setup(model.conditions.setup or "", f"machine {model.machine.name}, [setup] name", model)
+    asked, said_by = _asked_setup(args)
+    check_setup(asked or "", said_by, *models)
+    return [replace(model, conditions=conditions_for(args, model)) for model in models]
+
+
+def conditions_for(args: argparse.Namespace, model: StiffnessModel) -> Conditions:
+    """Under what programs run: what the options say, then the controller file, then the machine file."""
+    from toolpath_stiff.stiffness.effects.contract import Conditions
+
+    machine, asked = model.conditions, _asked_setup(args)[0]
+    return Conditions(
+        machine.setup if asked is None else asked,
+        machine.temperature if args.temperature is None else args.temperature,
+    )
+
+
+def _asked_setup(args: argparse.Namespace) -> tuple[str | None, str]:
+    """The set-up that an option or the controller file names ("" for none of them), and who says so."""
+    from toolpath_stiff.stiffness.acting import NO_SETUP
+
+    asked, said_by = args.setup, f"--setup {args.setup}"
+    if asked is None and getattr(args, "controller", None):
+        asked, said_by = controller_for(args).setup, str(args.controller)
+    return ("" if asked == NO_SETUP else asked), said_by
+
+
+def model_for(args: argparse.Namespace) -> StiffnessModel:
+    """The model of --machine; raises as `models_for`."""
+    return models_for(args)[0]
 
 
 def add_load_options(parser: argparse.ArgumentParser) -> None:

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from toolpath_stiff.cli.analyze import BELOW_REQUIRED, Models, analyse_and_write, models_for
+from toolpath_stiff.cli.analyze import BELOW_REQUIRED, Models, analyse_and_write, load_models
 from toolpath_stiff.cli.arguments import controller_for
+from toolpath_stiff.cli.outputs import check_written, keep
 from toolpath_stiff.cli.programs import RESERVED, FolderCount, Found, Listed, report_folders
 from toolpath_stiff.cli.progress import say
 from toolpath_stiff.cli.workers import answers, one_thread
@@ -45,12 +46,14 @@ def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
     """
     one_thread()
     programs, setting = report_folders(found), Setting(args, Path(args.out or "reports"))
+    replaced = check_written(args, (setting.out / name for name in RESERVED))
     _check(setting)
     if not args.json:
         for count in counts:
             print(plain(str(count)), flush=True)
     with _folders_for(setting.out, programs):
         outcomes = _outcomes(programs, setting, jobs)
+        keep(replaced, quiet=args.json)
         files = _write_overview(setting.out, outcomes)
     if args.json:
         _print_json(setting.out, programs, outcomes)
@@ -66,7 +69,7 @@ def _check(setting: Setting) -> None:
     """Read everything that all programs share once, so that a mistake in it is one error. Raises `InputError`."""
     from toolpath_stiff.nc.linuxcnc.runner import find_rs274
 
-    models_for(setting.args)
+    load_models(setting.args)
     controller_for(setting.args)
     if setting.args.interpreter == "linuxcnc":
         find_rs274(setting.args.rs274)
@@ -150,7 +153,7 @@ def _sweep(folder: Path, process: int) -> None:
 
 def start_worker(setting: Setting) -> Callable[[Listed], Outcome]:
     """What a process does with each program; the machines are loaded once."""
-    models = models_for(setting.args)
+    models = load_models(setting.args)
 
     def work(program: Listed) -> Outcome:
         return _analyse(setting, program, models)

@@ -7,12 +7,15 @@ import json
 import sys
 from pathlib import Path
 
-from toolpath_stiff.cli.arguments import add_json_option, add_machine_options
+from toolpath_stiff.cli.arguments import add_json_option, add_machine_options, model_for
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 
 EPILOG = """\
 Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
 displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
 """
+
+OWN_FILES = ("case_study.csv", "case_study.json", "case_study.md", "regions.png", "heights.png")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", default="reports/case_study", metavar="DIR", help="folder (default: reports/case_study)"
     )
+    add_replace_option(parser, force=False)
     parser.add_argument("--no-plots", action="store_true", help="no pictures")
     add_machine_options(parser)
     add_json_option(parser, "print case_study.json to standard output and nothing else")
@@ -30,11 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Analyse the regions and write the files."""
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.machine import load_machine
     from toolpath_stiff.placement.case_study import region_rows, run_case_study, study_text
-    from toolpath_stiff.stiffness.model import build_model
 
-    study = run_case_study(build_model(load_machine(args.machine), args.effects))
+    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
+    study = run_case_study(model_for(args))
     text = json.dumps(study.summary, indent=2) + "\n"
     out = Path(args.out)
     contents: dict[str, str | bytes] = {
@@ -46,6 +49,7 @@ def run(args: argparse.Namespace) -> int:
         from toolpath_stiff.report.case_study_picture import heights_picture, regions_picture
 
         contents |= {"regions.png": regions_picture(study), "heights.png": heights_picture(study)}
+    keep(replaced, quiet=args.json)
     files = [write_atomically(out / name, content) for name, content in contents.items()]
     if args.json:
         sys.stdout.write(text)

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 
 from toolpath_stiff.cli.arguments import limit_threads
 from toolpath_stiff.cli.measurement_arguments import (
     add_data_arguments,
     add_noise_arguments,
     add_output_arguments,
+    asked,
     check_seed,
 )
+from toolpath_stiff.cli.outputs import check_written, keep
+from toolpath_stiff.hints import hint
 
 EPILOG = """\
 examples:
@@ -43,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare, write, say where the model fails."""
     check_seed(args.seed)
+    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.report.compare_text import residuals_csv, terminal_text
@@ -55,6 +60,7 @@ def run(args: argparse.Namespace) -> int:
         machine, read_measurements(args.data, machine), noise=args.noise, strut_spread=args.strut_spread,
         effect_files=args.effects, seed=args.seed, jobs=args.jobs,
     )  # fmt: skip
+    found.document["next"] = [hint("which effect would explain it", asked(args).command("diagnose"))]
     contents: dict[str, str | bytes] = {
         "compare.json": json.dumps(found.document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "residuals.csv": residuals_csv(found),
@@ -64,10 +70,12 @@ def run(args: argparse.Namespace) -> int:
 
         pictures = compare_pictures(found)
         contents |= {**pictures, "report.html": compare_html(found, pictures)}
+    keep(replaced, quiet=args.json)
     written = write_folder(args.out, contents, OWN_FILES)
     if args.json:
         print(contents["compare.json"], end="")
     else:
         print(terminal_text(found.document))
+        print("\n".join(found.document["next"]))
         print("\n".join(["written:", *(f"  {file}" for file in written)]))
     return 0

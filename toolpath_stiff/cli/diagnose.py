@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.cli.arguments import add_program_options, limit_threads, read_program_for
+from toolpath_stiff.cli.arguments import (
+    add_condition_options,
+    add_program_options,
+    conditions_for,
+    limit_threads,
+    read_program_for,
+)
 from toolpath_stiff.cli.measurement_arguments import (
     add_data_arguments,
     add_noise_arguments,
     add_output_arguments,
+    asked,
     check_seed,
 )
+from toolpath_stiff.cli.outputs import check_written, keep
 from toolpath_stiff.cli.progress import say
 
 if TYPE_CHECKING:
@@ -47,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--program", metavar="PROGRAM", help="NC program to try it on (default: the packaged case study)"
     )
+    add_condition_options(group)
     add_program_options(parser, sampled=False)
     add_output_arguments(parser, "diagnose", kept="diagnose.json and residuals.csv")
 
@@ -54,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write, say what was found. Any verdict is success."""
     check_seed(args.seed)
+    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.report.write import write_folder
@@ -67,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         machine, data, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed,
         files=args.data, progress=say,
     )  # fmt: skip
-    found = document(diagnosis, " ".join(["tps", *sys.argv[1:]]))
+    found = document(diagnosis, args.command_line, asked(args))
     _complete(found, diagnosis, args)
     contents: dict[str, str | bytes] = {
         "diagnose.json": json.dumps(found, indent=2, ensure_ascii=False) + "\n",
@@ -77,6 +87,7 @@ def run(args: argparse.Namespace) -> int:
         say("drawing")
         contents |= _pictures(found, diagnosis)
     say("")
+    keep(replaced, quiet=args.json)
     written = write_folder(args.out, contents, OWN_FILES)
     if args.json:
         print(contents["diagnose.json"], end="")
@@ -103,7 +114,8 @@ def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namesp
         program = case_study_program()
     else:
         program = read_program_for(args, args.program, diagnosis.machine)
-    found["path"] = choice_on_path(diagnosis, program, args.origin)
+    conditions = conditions_for(args, diagnosis.predictor.base)
+    found["path"] = choice_on_path(diagnosis, program, args.origin, conditions)
 
 
 def _residuals(diagnosis: Diagnosis) -> str:

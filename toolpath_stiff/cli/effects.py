@@ -5,9 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import add_json_option
+from toolpath_stiff.cli.outputs import add_replace_option, check_new, keep
+from toolpath_stiff.hints import command_line, hint, options
 
 if TYPE_CHECKING:
     from toolpath_stiff.stiffness.effects import Effect, Parameter
@@ -37,13 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         )
         add_json_option(sub, "print JSON")
     writing = actions.add_parser("new", help="write a commented, working example of an effect")
-    writing.add_argument("file", metavar="FILE.py", help="file to write; must not exist yet")
+    writing.add_argument("file", metavar="FILE.py", help="file to write")
+    add_replace_option(writing)
 
 
 def run(args: argparse.Namespace) -> int:
     """List, show or write."""
     if args.action == "new":
-        return write_template(args.file)
+        return write_template(args.file, check_new(args, args.file))
     from toolpath_stiff.stiffness.effects import find_effect, known_effects
     from toolpath_stiff.stiffness.effects.registry import installed_effects
 
@@ -130,10 +135,9 @@ def details(effect: Effect) -> str:
     return "\n".join(lines)
 
 
-def write_template(file: str) -> int:
-    """Write the example effect, named after its file."""
+def write_template(file: str, replaced: Sequence[Path] = ()) -> int:
+    """Write the example effect, named after its file; `replaced` is kept."""
     from importlib import resources
-    from pathlib import Path
 
     from toolpath_stiff.errors import InputError
     from toolpath_stiff.files import write_atomically
@@ -142,11 +146,10 @@ def write_template(file: str) -> int:
     name = target.stem
     if target.suffix != ".py" or not name.isidentifier():
         raise InputError(f"{file!r} cannot hold an effect", expected="a name such as my_screw.py")
-    if target.exists():
-        raise InputError(f"{file!r} exists already", hint="choose another name or remove it")
     text = (resources.files("toolpath_stiff") / "data" / "templates" / "effect.py.txt").read_text("utf-8")
+    keep(replaced)
     write_atomically(target, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", target.name))
-    print(f"wrote {file}; `tps effects show {name} --effects {file}` reads it back")
+    print(f"wrote {file}\n{hint('read it back', command_line('effects', 'show', name, *options(effects=file)))}")
     return 0
 
 

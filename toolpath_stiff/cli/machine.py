@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import pose_argument
+from toolpath_stiff.cli.outputs import add_replace_option, check_new, check_written, keep
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import command_line, hint
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
@@ -38,14 +40,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show.add_argument("machine", metavar="NAME|FILE", nargs="?", default="nist")
     show.add_argument("--pose", type=pose_argument, metavar="X,Y,Z[,A,B,C]", help="pose of the picture, mm and degrees")
     show.add_argument("--out", metavar="FILE.png", help="the picture (default: reports/<name>.png)")
+    add_replace_option(show)
     show.add_argument("--json", action="store_true", help="print JSON, draw nothing unless --out is given")
     check = actions.add_parser("check", help="check a machine file")
     check.add_argument("file", metavar="FILE")
     new = actions.add_parser("new", help="write a commented template")
     new.add_argument("file", metavar="FILE")
+    add_replace_option(new)
     hal = actions.add_parser("from-linuxcnc", help="read the genhexkins pins of a LinuxCNC HAL file")
     hal.add_argument("file", metavar="FILE.hal")
     hal.add_argument("-o", "--out", metavar="FILE", help="machine file to write (default: standard output)")
+    add_replace_option(hal)
     hal.add_argument(
         "--units", choices=("mm", "inch"), help="unit of the pins (default: LINEAR_UNITS of the ini beside)"
     )
@@ -117,6 +122,7 @@ def _show(args: argparse.Namespace) -> int:
         from toolpath_stiff.report.machine_picture import machine_picture
 
         target = args.out or f"reports/{machine.name}.png"
+        keep(check_written(args, [target]), quiet=args.json)
         write_atomically(target, machine_picture(machine, pose, struts))
         if not args.json:
             print(f"written:\n  {target}")
@@ -180,15 +186,17 @@ def _check(args: argparse.Namespace) -> int:
 
     from toolpath_stiff.analysis.poses import evaluate_poses
     from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.stiffness.acting import acting_names, condition_warnings
     from toolpath_stiff.stiffness.model import build_model
 
     if not Path(args.file).is_file():
-        raise InputError(f"cannot read machine file {args.file!r}", hint="`tps machine new FILE` writes a template")
+        new = command_line("machine", "new", args.file)
+        raise InputError(f"cannot read machine file {args.file!r}", hint=f"`{new}` writes a template")
     machine = load_machine(Path(args.file))
     model = build_model(machine)
     origin = np.array([machine.default_origin])
     found = evaluate_poses(model, origin[:, :3], origin[:, 3:])
-    effects = ", ".join(active.effect.name for active in (*model.effects, *model.instruments)) or "none"
+    effects = ", ".join([*acting_names(model), *(active.effect.name for active in model.instruments)]) or "none"
     if not found.reach.reachable[0]:
         raise InputError(
             f"the default origin is out of reach: {found.reach.describe(0)}",
@@ -196,6 +204,8 @@ def _check(args: argparse.Namespace) -> int:
             file=args.file,
         )
     print(f"{args.file}: {machine.title}: the file is good\n  effects: {effects}")
+    for warning in condition_warnings(model):
+        print(f"  warning: {warning}")
     kx, ky, kz = found.along_axes[0] / 1e3
     print(f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; {found.reach.describe(0)}")
     return 0
@@ -205,9 +215,7 @@ def _new(args: argparse.Namespace) -> int:
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine, machine_toml
 
-    target = Path(args.file)
-    if target.exists():
-        raise InputError(f"{args.file!r} exists already", hint="choose another name; nothing was written")
+    target, replaced = Path(args.file), check_new(args, args.file)
     preamble = (
         "A machine file for tps. Every section names the origin of its figures:\n"
         "published, recovered (from published figures) or assumed. The figures below are those of the packaged\n"
@@ -216,8 +224,9 @@ def _new(args: argparse.Namespace) -> int:
     machine = load_machine("nist").with_changes(
         name=target.stem, title=f"my hexapod ({target.stem})", source="say where the figures come from"
     )
+    keep(replaced)
     write_atomically(target, machine_toml(machine, preamble))
-    print(f"written:\n  {target}\nedit it, then: tps machine check {target}")
+    print(f"written:\n  {target}\n{hint('edit it, then', command_line('machine', 'check', target))}")
     return 0
 
 
@@ -231,6 +240,7 @@ def _from_linuxcnc(args: argparse.Namespace) -> int:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise InputError(f"cannot read {args.file!r}: {error.strerror}") from None
+    replaced = check_written(args, [args.out])
     units = args.units or units_of(path)
     if units is None:
         raise InputError(
@@ -241,8 +251,9 @@ def _from_linuxcnc(args: argparse.Namespace) -> int:
     machine, notes = machine_from_hal(text, units, path.name)
     content = machine_toml(machine, f"Made from {path.name}, pins in {units}.\n" + "\n".join(notes))
     if args.out:
+        keep(replaced)
         write_atomically(args.out, content)
-        print(f"written:\n  {args.out}")
+        print(f"written:\n  {args.out}\n{hint('next', command_line('machine', 'check', args.out))}")
     else:
         sys.stdout.write(content)
     for note in notes:

@@ -14,8 +14,10 @@ from toolpath_stiff.cli.arguments import (
     add_machine_options,
     finite_number,
     load_argument,
+    model_for,
     range_argument,
 )
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ examples:
 
 files written to --out: map.csv (x_mm,y_mm,z_mm,stiffness_N_per_mm,reachable), map.json, map.png, map.html (3-D)
 """
+OWN_FILES = ("map.csv", "map.json", "map.png", "map.html")
 FARTHEST_MM = 1e5
 OUT_OF_REACH = 1
 
@@ -56,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tilt", type=_angles, default=(0.0, 0.0, 0.0), metavar="A,B,C", help="roll, pitch, yaw, degrees"
     )
     parser.add_argument("--out", default="reports/map", metavar="DIR", help="folder (default: reports/map)")
+    add_replace_option(parser, force=False)
     parser.add_argument("--no-plots", action="store_true", help="only map.csv and map.json")
     add_machine_options(parser)
     add_json_option(parser, "print map.json to standard output and nothing else")
@@ -81,16 +85,15 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.analysis.stiffness_map import map_stiffness
     from toolpath_stiff.cli.progress import progress_bar
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.stiffness.model import build_model
     from toolpath_stiff.units import m_from_mm, rad_from_deg
 
     if not 2 <= args.points <= 2001:
         raise InputError(f"--points {args.points}", expected="2 to 2001")
+    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
     heights = args.slices or [args.z]
     if max(abs(v) for v in (*args.x, *args.y, *heights)) > FARTHEST_MM:
         raise InputError("a map beyond 100 m", expected="mm")
-    model = build_model(load_machine(args.machine), args.effects)
+    model = model_for(args)
     a, b, c = (rad_from_deg(v) for v in args.tilt)
     x, y = ((m_from_mm(lo), m_from_mm(hi)) for lo, hi in (args.x, args.y))
     with progress_bar("map: poses", quiet=args.json) as progress:
@@ -107,14 +110,18 @@ def run(args: argparse.Namespace) -> int:
         )
     summary = map_summary(model, found)
     out = Path(args.out)
+    keep(replaced, quiet=args.json)
     files = [write_atomically(out / "map.csv", map_csv(found))]
     files.append(write_atomically(out / "map.json", json.dumps(summary, indent=2) + "\n"))
     if not args.no_plots:
         from toolpath_stiff.report.map_page import map_page
         from toolpath_stiff.report.map_picture import map_picture
+        from toolpath_stiff.report.wording import machine_text
 
-        files.append(write_atomically(out / "map.png", map_picture(model.machine, found)))
-        files.append(write_atomically(out / "map.html", map_page(model.machine, found)))
+        title = machine_text({**summary, "machine": model.machine.title})
+        headed = model.machine.with_changes(title=title)
+        files.append(write_atomically(out / "map.png", map_picture(headed, found)))
+        files.append(write_atomically(out / "map.html", map_page(headed, found, summary["warnings"])))
     if args.json:
         json.dump(summary, sys.stdout, indent=2)
         print()
@@ -129,6 +136,7 @@ def map_summary(model: StiffnessModel, found: StiffnessMap) -> dict[str, Any]:
     import numpy as np
 
     from toolpath_stiff.analysis.stiffness_map import turning_points
+    from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated
     from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
     slices = []
@@ -157,8 +165,8 @@ def map_summary(model: StiffnessModel, found: StiffnessMap) -> dict[str, Any]:
         "abc_deg": [deg_from_rad(v) for v in found.abc],
         "points": int(found.stiffness.size),
         "slices": slices,
-        "effects": [active.effect.name for active in model.effects],
-        "instruments_set_aside": [active.effect.name for active in model.instruments],
+        **effects_stated(model),
+        "warnings": condition_warnings(model),
     }
 
 
@@ -184,9 +192,11 @@ def map_csv(found: StiffnessMap) -> Iterator[str]:
 
 
 def _print(summary: dict[str, Any]) -> None:
-    print(f"machine {summary['machine']}, load {summary['load']}, {summary['points']} points")
-    if summary["instruments_set_aside"]:
-        print(f"instruments set aside: {', '.join(summary['instruments_set_aside'])}")
+    from toolpath_stiff.report.wording import machine_text, plain
+
+    print(f"machine {machine_text(summary)}, load {summary['load']}, {summary['points']} points")
+    for warning in summary["warnings"]:
+        print(f"warning: {plain(warning)}")
     for row in summary["slices"]:
         print(f"z = {row['z_mm']:g} mm: {100 * row['reachable_share']:.0f} % within reach")
         for name in ("softest", "stiffest"):

@@ -5,13 +5,17 @@ from __future__ import annotations
 import argparse
 
 from toolpath_stiff.cli.arguments import add_json_option, finite_number
+from toolpath_stiff.cli.outputs import add_replace_option
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import MACHINE, STRUT_SPREAD, Asked
 
 
 def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherwise: str = "") -> None:
     """DATA, --machine and --effects."""
     parser.add_argument("data", nargs=nargs, metavar="DATA", help="measurement files, or nist-table1" + otherwise)
-    parser.add_argument("--machine", default="nist", metavar="NAME|FILE", help="machine name or file (default: nist)")
+    parser.add_argument(
+        "--machine", default=MACHINE, metavar="NAME|FILE", help=f"machine name or file (default: {MACHINE})"
+    )
     parser.add_argument(
         "--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects; they take part"
     )
@@ -26,19 +30,25 @@ def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and
         f"(default: from repeats, else from sd_N_per_mm, else {guess})",
     )  # fmt: skip
     group.add_argument(
-        "--strut-spread", type=spread_argument, default=0.01, metavar="PERCENT",
+        "--strut-spread", type=spread_argument, default=STRUT_SPREAD, metavar="PERCENT",
         help="of the struts' stiffness (default: 1)",
     )  # fmt: skip
 
 
-def add_output_arguments(parser: argparse.ArgumentParser, command: str, kept: str) -> None:
-    """--seed, --jobs, --out, --no-plots and --json; `kept` is what --no-plots writes still."""
+def add_output_arguments(parser: argparse.ArgumentParser, command: str, kept: str, *, force: bool = True) -> None:
+    """--seed, --jobs, --out, --replace (--force), --no-plots, --json; `kept` is what --no-plots writes still."""
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
     folder = f"reports/{command}"
     parser.add_argument("--out", default=folder, metavar="DIR", help=f"folder (default: {folder})")
+    add_replace_option(parser, force=force)
     parser.add_argument("--no-plots", action="store_true", help=f"only {kept}")
     add_json_option(parser, f"print {command}.json to standard output and nothing else")
+
+
+def asked(args: argparse.Namespace) -> Asked:
+    """What the next command on these data has to carry on."""
+    return Asked(tuple(args.data), args.machine, tuple(args.effects), args.noise, args.strut_spread)
 
 
 def check_seed(seed: int) -> None:

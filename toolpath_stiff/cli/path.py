@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import add_program_options, read_program_for
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 
 if TYPE_CHECKING:
     from toolpath_stiff.path import Samples
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     target = parser.add_mutually_exclusive_group()
     target.add_argument("--csv", action="store_true", help="write CSV to standard output (the default)")
     target.add_argument("--out", metavar="FILE", help="write CSV to a file")
+    add_replace_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -39,10 +41,12 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.path import place, sample_moves
 
+    replaced = check_written(args, [args.out])
     program = read_program_for(args, args.program, None)
     origin = args.origin or program.origin
     samples = sample_moves(place(program.moves, origin), step=args.step, origin=origin)
     if args.out:
+        keep(replaced)
         write_atomically(args.out, path_csv(samples))
     else:
         for piece in path_csv(samples):

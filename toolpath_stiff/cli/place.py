@@ -16,10 +16,12 @@ from toolpath_stiff.cli.arguments import (
     controller_for,
     finite_number,
     length_m,
+    model_for,
     range_argument,
     read_program_for,
 )
 from toolpath_stiff.cli.measurement_arguments import check_seed
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,6 +45,9 @@ report.html (click a placement of the front, see the path there).
 """
 FARTHEST_MM = 1e5
 FARTHEST_TURN = 720.0
+OWN_FILES = (
+    "placements.csv", "placement.json", "report.html", "front.png", "profiles.png", "map.png", "setup.pdf",
+)  # fmt: skip
 OBJECTIVES = ("balanced", "mean", "range", "min")
 
 
@@ -79,6 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the search (default: 1)")
     parser.add_argument("--out", metavar="DIR", help="folder (default: reports/<program>-place)")
     _add_write_options(parser)
+    add_replace_option(parser, force=False)
     parser.add_argument("--no-plots", action="store_true", help="only placements.csv and placement.json")
     add_json_option(parser, "print placement.json to standard output and nothing else")
     add_program_options(parser)
@@ -121,18 +127,17 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.analysis.path_analysis import analyse
     from toolpath_stiff.cli.progress import progress_bar
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.machine import load_machine
     from toolpath_stiff.placement.batch import work_path
     from toolpath_stiff.placement.report_data import analyse_before, front_rows, placement_summary, pose_of
     from toolpath_stiff.placement.rewrite import check_rewritable
     from toolpath_stiff.placement.search import search_placements
-    from toolpath_stiff.stiffness.model import build_model
 
     if not 2 <= args.points <= 1000:
         raise InputError(f"--points {args.points}", expected="2 to 1000")
     check_seed(args.seed)
     _check_write(args)
-    model = build_model(load_machine(args.machine), args.effects)
+    replaced = check_written(args, [args.write, *(_folder(args) / name for name in OWN_FILES)])
+    model = model_for(args)
     program = read_program_for(args, args.program, model.machine)
     if args.write:
         check_rewritable(program)
@@ -165,8 +170,8 @@ def run(args: argparse.Namespace) -> int:
     front = front_rows(model, again, found, args.step, args.force)
     summary = placement_summary(program, found, best, before, reason, front, args.objective, args.seed)
     rewritten, summary["written"] = _rewrite(args, again, best, origin)
-    out = Path(args.out) if args.out else Path("reports") / f"{Path(args.program).stem}-place"
-    files = _write(args, out, summary, best, before, program)
+    keep(replaced, quiet=args.json)
+    files = _write(args, _folder(args), summary, best, before, program)
     if rewritten is not None:
         files.append(write_atomically(args.write, rewritten))
     if args.json:
@@ -176,6 +181,10 @@ def run(args: argparse.Namespace) -> int:
         print(_table(summary))
         print("\n".join(["written:", *(f"  {file}" for file in files)]))
     return 0
+
+
+def _folder(args: argparse.Namespace) -> Path:
+    return Path(args.out) if args.out else Path("reports") / f"{Path(args.program).stem}-place"
 
 
 def _check_write(args: argparse.Namespace) -> None:
@@ -188,9 +197,6 @@ def _check_write(args: argparse.Namespace) -> None:
                 raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
         return
     check_decimals(args.decimals)
-    target = Path(args.write)
-    if target.exists() and target.samefile(args.program):
-        raise InputError(f"--write {args.write} would replace the program itself", hint="give another file")
 
 
 def _rewrite(

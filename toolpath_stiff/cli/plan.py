@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from toolpath_stiff.cli.measurement_arguments import (
     add_output_arguments,
     check_seed,
 )
+from toolpath_stiff.cli.outputs import check_written, keep
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
@@ -34,6 +34,7 @@ examples:
 
 Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png.
 """
+OWN_FILES = ("plan.csv", "plan.json", "plan.png")
 COSTS = ("reading", "pose", "tool", "setup")
 PLAN_POSES, CAMPAIGN_POSES = 6, 24
 CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
@@ -94,6 +95,7 @@ def _cost(text: str) -> tuple[str, float]:
 def run(args: argparse.Namespace) -> int:
     """Plan, write the files, say what the plan promises."""
     check_seed(args.seed)
+    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.stiffness.effects.registry import known_effects
@@ -111,9 +113,10 @@ def run(args: argparse.Namespace) -> int:
         "data": list(args.data),
         "seed": args.seed,
         "costs_minutes": {name: getattr(costs, name) for name in COSTS},
-        "command": " ".join(["tps", *sys.argv[1:]]),
+        "command": args.command_line,
     }
     text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    keep(replaced, quiet=args.json)
     written = _write(Path(args.out), {"plan.csv": contents["plan.csv"], "plan.json": text, **contents})
     if args.json:
         print(text, end="")

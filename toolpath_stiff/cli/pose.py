@@ -8,8 +8,9 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.cli.arguments import add_json_option, add_machine_options, finite_number
+from toolpath_stiff.cli.arguments import add_json_option, add_machine_options, finite_number, model_for
 from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.hints import command_line
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,10 +54,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.csv is None and len(args.pose) not in (3, 6):
         raise InputError(f"a pose of {len(args.pose)} numbers", expected="X Y Z or X Y Z A B C")
-    from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.stiffness.model import build_model
-
-    model = build_model(load_machine(args.machine), args.effects)
+    model = model_for(args)
     if args.csv is not None:
         return _csv(model, args)
     return _single(model, args)
@@ -104,12 +102,15 @@ def _decimals(name: str) -> int | None:
 
 def _csv(model: StiffnessModel, args: argparse.Namespace) -> int:
     from toolpath_stiff.column_files import csv_rows
+    from toolpath_stiff.stiffness.acting import condition_warnings
 
     poses = _read_poses(args.csv)
     found = _evaluate(model, poses, args.force)
     columns = _columns(poses, found)
     sys.stdout.write(",".join(columns) + "\n")
     sys.stdout.write(csv_rows(columns, {name: _decimals(name) for name in columns}))
+    for warning in condition_warnings(model):
+        print(f"tps: warning: {warning}", file=sys.stderr)
     unreachable = (~found.reach.reachable).nonzero()[0]
     for i in unreachable[:10]:
         print(f"tps: warning: row {i + 1}: out of reach: {found.reach.describe(i)}", file=sys.stderr)
@@ -173,6 +174,7 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
     import numpy as np
 
     from toolpath_stiff.errors import UnreachableError
+    from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated
 
     poses = np.array([[*args.pose, 0.0, 0.0, 0.0][:6]])
     if np.abs(poses).max() > 1e5:
@@ -181,13 +183,14 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
     if not found.reach.reachable[0]:
         raise UnreachableError(
             f"the pose is out of reach on machine {model.machine.name}: {found.reach.describe(0)}",
-            hint=f"`tps machine show {args.machine}` lists the limits",
+            hint=f"`{command_line('machine', 'show', args.machine)}` lists the limits",
         )
     values = {name: column[0] for name, column in _columns(poses, found).items()}
     if args.json:
         plain = {n: v.item() if hasattr(v, "item") else v for n, v in values.items()}
         plain["extrapolated"] = bool(plain["extrapolated"])
-        json.dump({"machine": model.machine.name, **plain}, sys.stdout, indent=2)
+        about = {"machine": model.machine.name, **effects_stated(model), "warnings": condition_warnings(model)}
+        json.dump({**about, **plain}, sys.stdout, indent=2)
         sys.stdout.write("\n")
         return 0
     _print_pose(model, values, found)
@@ -196,7 +199,11 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
 
 def _print_pose(model: StiffnessModel, values: dict[str, Any], found: PoseReport) -> None:
     x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
-    print(f"{model.machine.title}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n")
+    from toolpath_stiff.report.wording import machine_text
+    from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated
+
+    named = machine_text({"machine": model.machine.title, **effects_stated(model)})
+    print(f"{named}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n")
     for axis in "xyz":
         print(f"  stiffness along {axis.upper()}   {values[f'k{axis}_N_per_mm']:10.0f} N/mm")
     for which in ("softest", "stiffest"):
@@ -207,3 +214,5 @@ def _print_pose(model: StiffnessModel, values: dict[str, Any], found: PoseReport
     print(f"  nearest limit        {found.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
     if values["extrapolated"]:
         print("  the strut law is extrapolated at this pose")
+    for warning in condition_warnings(model):
+        print(f"  warning              {warning}")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import add_json_option
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.readings.raw_records import Loop, LoopFigures
@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="FILE", help="measurement file to write (default: <name>_measurements.csv); loops go beside it"
     )
+    add_replace_option(parser)
     parser.add_argument("--no-plots", action="store_true", help="do not draw the loops")
     add_json_option(parser, "print the figures as JSON")
 
@@ -46,14 +47,14 @@ def run(args: argparse.Namespace) -> int:
     loops = read_raw(read_text(args.raw, "raw records"), args.raw)
     figures = reduce_loops(loops, args.raw)
     out = Path(args.out or f"{Path(args.raw).stem}_measurements.csv")
-    if out.exists() and out.samefile(args.raw):
-        raise InputError(f"--out {str(out)!r} is the raw file itself", hint="name another file")
     picture = None if args.no_plots else out.with_name(f"{out.stem}_loops.png")
+    replaced = check_written(args, [out, picture])
     png = b""
     if picture is not None:
         from toolpath_stiff.report.loops_picture import loops_png
 
         png = loops_png(loops, figures, Path(args.raw).name)
+    keep(replaced, quiet=args.json)
     write_atomically(out, measurement_csv(loops, figures))
     if picture is not None:
         write_atomically(picture, png)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 from typing import Any
 
 from toolpath_stiff.cli.arguments import add_json_option
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
+from toolpath_stiff.hints import Asked, hint
 
 EPILOG = """\
 examples:
@@ -17,6 +20,8 @@ examples:
 
 The rig shares no stiffness code with the model that it tests. The seal is a blindfold, not cryptography.
 """
+
+FILES = ("measurements.csv", "machine.toml", "sealed.bin")  # of an exercise
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,11 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--hidden", metavar="WHAT", help="none, one, two, outside, or NAME[,NAME]; default: drawn blindly from the seed"
     )
     new.add_argument("--noise", type=float, default=2.0, metavar="PERCENT", help="repeat noise of a reading; default 2")
+    add_replace_option(new)
     new.add_argument("--machine", default="nist", metavar="NAME|FILE", help="nominal machine (default: nist)")
     measuring = actions.add_parser("measure", help="measure the same hidden machine again")
     measuring.add_argument("folder", metavar="DIR", help="folder that `tps rig new` wrote")
     measuring.add_argument("--at", required=True, metavar="PLAN.csv", help="measurement file with the stiffness empty")
     measuring.add_argument("--out", required=True, metavar="FILE.csv", help="file to write")
+    add_replace_option(measuring)
     measuring.add_argument(
         "--visit", type=int, default=1, metavar="N", help="another number draws clamping and noise anew (default 1)"
     )
@@ -60,20 +67,31 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff import rig
 
     if args.action == "new":
+        replaced = check_written(args, (Path(args.out) / name for name in FILES))
+        keep(replaced)
         count = rig.new_exercise(
             args.out, args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at
         )
         print(f"{args.out}: {count} measurements, the nominal machine and the sealed truth")
-        folder = args.out.rstrip("/")
-        print(f"next: tps diagnose {folder}/measurements.csv --machine {folder}/machine.toml")
+        print(hint("next", _diagnose(args.out)))
         return 0
     if args.action == "measure":
+        replaced = check_written(args, [args.out], (Path(args.folder) / name for name in FILES))
+        keep(replaced)
         count = rig.measure_again(args.folder, args.at, args.out, args.visit)
         print(f"{args.out}: {count} measurements")
+        print(hint("next", _diagnose(args.folder, args.out)))
         return 0
     found = rig.reveal(args.folder, args.claim)
     print(json.dumps(found, indent=2, ensure_ascii=False) if args.json else _wording(found))
     return 0
+
+
+def _diagnose(folder: str, *more: str) -> str:
+    """The diagnosis of an exercise, all measurements together."""
+    place = Path(folder)
+    files = dict.fromkeys((str(place / "measurements.csv"), *more))
+    return Asked(tuple(files), str(place / "machine.toml")).command("diagnose")
 
 
 def _wording(found: dict[str, Any]) -> str:

@@ -12,10 +12,13 @@ from toolpath_stiff.cli.measurement_arguments import (
     add_data_arguments,
     add_noise_arguments,
     add_output_arguments,
+    asked,
     check_seed,
 )
+from toolpath_stiff.cli.outputs import check_written, keep
 from toolpath_stiff.cli.progress import say
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import command_line, hint, options
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine.model import Machine
@@ -54,19 +57,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--auto", action="store_true", help="add effects as long as the error at left-out points falls and data bear it"
     )
-    parser.add_argument("--force", action="store_true", help="write what the data do not bear as well")
+    parser.add_argument(
+        "--force", action="store_true", help="write what the data do not bear as well; and as --replace"
+    )
     parser.add_argument(
         "--objective", choices=("likelihood", "mean-error"), default="likelihood",
         help="mean-error: the strut law alone, as the paper fitted it (default: likelihood)",
     )  # fmt: skip
     parser.add_argument("-o", "--output", metavar="MACHINE.toml", help="the new machine file (default: in --out)")
     add_noise_arguments(parser, guess="a high guess")
-    add_output_arguments(parser, "update", kept="update.json, residuals.csv and the machine file")
+    add_output_arguments(parser, "update", kept="update.json, residuals.csv and the machine file", force=False)
 
 
 def run(args: argparse.Namespace) -> int:
     """Fit, judge, write. Refusal is success as well."""
     _check(args)
+    args.replace |= args.force
+    replaced = check_written(args, [args.output, *(Path(args.out) / name for name in OWN_FILES)])
     limit_threads(args.jobs)
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine, machine_toml
@@ -84,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
         update, updated, files=args.data, machine_file=machine_file if updated is not None else None,
         provenance=provenance, seed=args.seed,
     )  # fmt: skip
+    found["next"] = _next(args, updated, machine_file)
     if search is not None:
         found["search"] = _search(search)
     contents: dict[str, str | bytes] = {
@@ -98,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
         say("drawing")
         contents |= _pictures(found, update, contents.get("figure3.png"))
     say("")
+    keep(replaced, quiet=args.json)
     written = []
     if updated is not None and args.output is not None:  # first: update.json names it
         written.append(write_atomically(Path(args.output), machine_toml(updated, _preamble(found))))
@@ -109,7 +118,23 @@ def run(args: argparse.Namespace) -> int:
 
         print(terminal_text(found))
         print("\n".join(["written:", *(f"  {file}" for file in written)]))
+        print("\n".join(["", *found["next"]]) if found["next"] else "", end="\n" if found["next"] else "")
     return 0
+
+
+def _next(args: argparse.Namespace, updated: Machine | None, machine_file: str) -> list[str]:
+    """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
+    if updated is None:
+        return []
+    from toolpath_stiff.stiffness.acting import setup_of
+    from toolpath_stiff.stiffness.model import build_model
+
+    model = build_model(updated, args.effects)
+    setups = [name for active in model.effects if (name := setup_of(active))]
+    found = [hint("what is left", asked(args).command("compare", machine=machine_file))]
+    shown = options(machine=machine_file, effects=args.effects, setup=setups[0] if setups else None)
+    also = " (analyze, place and pose take the same options)"
+    return [*found, hint(f"the stiffness over the workspace{also}", command_line("map", *shown))]
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -159,18 +184,10 @@ def _provenance(args: argparse.Namespace, update: Update) -> dict[str, Any]:
 
 def _command(args: argparse.Namespace) -> str:
     """The command that repeats the fit; where its results go does not matter."""
-    words = ["tps", "update", *args.data]
-    words += ["--machine", args.machine] if args.machine != "nist" else []
-    words += [word for one in args.add for word in ("--add", one)]
-    words += [f"--{name}" for name in ("strut-law", "auto", "force") if getattr(args, name.replace("-", "_"))]
-    words += ["--objective", args.objective] if args.objective != "likelihood" else []
-    words += [word for one in args.effects for word in ("--effects", one)]
-    if args.noise is not None:
-        both = args.noise if isinstance(args.noise, tuple) else (args.noise,)
-        words += ["--noise", ",".join(f"{100.0 * part:.10g}" for part in both)]
-    words += ["--strut-spread", f"{100.0 * args.strut_spread:.10g}"] if args.strut_spread != 0.01 else []
-    words += ["--seed", str(args.seed)] if args.seed else []
-    return " ".join(words)
+    flags = {name: getattr(args, name) for name in ("strut_law", "auto", "force")}
+    objective = args.objective if args.objective != "likelihood" else None
+    own = options(add=args.add, **flags, objective=objective, seed=args.seed or None)
+    return asked(args).command("update", *own)
 
 
 def _preamble(found: dict[str, Any]) -> str:

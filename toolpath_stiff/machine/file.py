@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, Pose, StrutLaw
 from toolpath_stiff.machine.uncertainty import read_uncertainty
@@ -35,7 +36,8 @@ SINGULAR = 1e-6
 class Key:
     """What a key of a machine file may hold.
 
-    `shape` () for a number, (3,) or (6, 3) for lists; a tuple of two lengths in `lengths` admits either.
+    `shape` () for a number or a text, (3,) or (6, 3) for lists of numbers, (0,) for texts, each once; `also_length`
+    admits another length.
     Bounds are inclusive unless `open_low`.
     """
 
@@ -81,6 +83,9 @@ SECTIONS: dict[str, dict[str, Key]] = {
     "setup": {
         "default_origin_mm": Key(unit="mm[, deg]", shape=(3,), also_length=6),
         "rapid_mm_per_min": Key(unit="mm/min", low=0.0, high=1e6, open_low=True),
+        "name": Key(text=True, required=False),
+        "names": Key(text=True, shape=(0,), required=False),
+        "temperature_C": Key(unit="degrees C", low=-50.0, high=200.0, required=False),
     },
 }
 OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "setup")
@@ -111,10 +116,11 @@ def load_machine(name_or_file: str | Path = DEFAULT_MACHINE) -> Machine:
         return parse_machine(path.read_text(encoding="utf-8"), file=f"{name_or_file}.toml")
     path = Path(name_or_file)
     if not path.is_file():
+        template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
         raise InputError(
             f"machine {str(name_or_file)!r} is neither a packaged machine nor a file",
             expected=f"one of {', '.join(known)}, or a machine file",
-            hint="`tps machine list` lists the machines, `tps machine new FILE` writes a commented template",
+            hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
         )
     try:
         text = path.read_text(encoding="utf-8")
@@ -167,7 +173,7 @@ class _Reader:
     def machine(self, table: dict[str, Any]) -> Machine:
         sections = self.sections(table)
         values = {name: self.section(name, content) for name, content in sections.items()}
-        top = values[""]
+        top, setup = values[""], values.get("setup", {})
         effects, instruments = self.entries(table, "effect"), self.entries(table, "instrument")
         machine = Machine(
             name=top["name"],
@@ -179,8 +185,11 @@ class _Reader:
             strut_law=self.strut_law(values["strut_law"]),
             platform_bar_stiffness=values.get("platform", {}).get("bar_stiffness_N_per_m", INFINITY),
             limits=self.limits(values),
-            default_origin=_pose(values.get("setup", {}).get("default_origin_mm", np.zeros(3))),
-            rapid_feed=m_per_s_from_mm_per_min(values.get("setup", {}).get("rapid_mm_per_min", 10000.0)),
+            default_origin=_pose(setup.get("default_origin_mm", np.zeros(3))),
+            rapid_feed=m_per_s_from_mm_per_min(setup.get("rapid_mm_per_min", 10000.0)),
+            setup=setup.get("name"),
+            temperature=setup.get("temperature_C"),
+            setups=setup.get("names", ()),
             origins={name: v["origin"] for name, v in values.items() if name and "origin" in v},
             remarks={name: v["remark"] for name, v in values.items() if name and "remark" in v},
             effects=effects,
@@ -244,7 +253,7 @@ class _Reader:
             if name not in found and name not in OPTIONAL_SECTIONS:
                 raise InputError(
                     f"section [{name}] is missing",
-                    hint="`tps machine new FILE` writes a template with every section",
+                    hint="`tps machine new template.toml` writes a template with every section",
                     file=self.file,
                 )
         return found
@@ -283,8 +292,12 @@ class _Reader:
 
     def value(self, section: str, key: str, raw: Any, rule: Key) -> Any:
         shown = _shorten(raw)
+        if rule.text and rule.shape:
+            if not isinstance(raw, list) or not all(map(_is_text, raw)) or len(set(raw)) < len(raw):
+                raise self.fail(section, key, f" = {shown}", expected="a list of names, each once")
+            return tuple(raw)
         if rule.text:
-            if not isinstance(raw, str) or not raw.strip():
+            if not _is_text(raw):
                 raise self.fail(section, key, f" = {shown}", expected="a text that is not empty")
             return raw
         array = _as_array(raw)
@@ -373,6 +386,10 @@ class _Reader:
             parameters = {k: v for k, v in row.items() if k not in ("name", "provenance")}
             entries.append(EffectEntry(name, parameters, provenance))
         return tuple(entries)
+
+
+def _is_text(raw: Any) -> bool:
+    return isinstance(raw, str) and bool(raw.strip())
 
 
 def _as_array(raw: Any) -> FloatArray | None:

@@ -117,6 +117,10 @@ class Machine:
         Where program zero sits unless the user or the program says otherwise: m and rad.
     rapid_feed
         m/s, for the time of rapid moves.
+    setup, temperature
+        Clamping arrangement that is on the machine and degrees C, unless the user says so; None: nobody says.
+    setups
+        Clamping arrangements that are known by name.
     origins
         Quantity -> one of `ORIGINS`.
     remarks
@@ -138,6 +142,9 @@ class Machine:
     limits: Limits = field(default_factory=Limits)
     default_origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     rapid_feed: float = 10.0 / 60.0
+    setup: str | None = None
+    temperature: float | None = None
+    setups: tuple[str, ...] = ()
     origins: Mapping[str, str] = field(default_factory=dict)
     remarks: Mapping[str, str] = field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()

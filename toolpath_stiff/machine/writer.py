@@ -63,6 +63,7 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
         "setup": {
             "default_origin_mm": _list(_pose(machine.default_origin)),
             "rapid_mm_per_min": _number(mm_per_min_from_m_per_s(machine.rapid_feed)),
+            **_conditions(machine),
         },
     }
     if np.isfinite(limits.workspace).all():
@@ -81,6 +82,12 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
     if machine.uncertainty is not None:
         lines += ["", f"# {HEADINGS['uncertainty']}", *_uncertainty(machine.uncertainty)]
     return "\n".join([*lines, ""])
+
+
+def _conditions(machine: Machine) -> dict[str, str]:
+    """What the machine file says of set-ups and temperature, if anything."""
+    given = {"name": machine.setup, "names": machine.setups or None, "temperature_C": machine.temperature}
+    return {key: _value(value) for key, value in given.items() if value is not None}
 
 
 def _entry(kind: str, entry: EffectEntry) -> list[str]:

@@ -1,7 +1,8 @@
 """The controller file: what belongs to the control and not to the machine. TOML; mm and degrees.
 
 Its keys are `dialect`, `block_delete`, `arc_centers`, `inch_metric`, `offsets` (a table, or a file), `tools` (a list of
-tables, or a file), `kinematics` (a table, see `posted`: the machine that programs were posted for). LinuxCNC's own
+tables, or a file), `kinematics` (a table, see `posted`: the machine that programs were posted for), `setup` (the name
+of the clamping arrangement, for effects of the machine that belong to one). LinuxCNC's own
 parameter file (.var) and tool table (.tbl) are read as controller files too.
 """
 
@@ -31,7 +32,7 @@ from toolpath_stiff.nc.tables import (
 
 ALL_SWITCHES = frozenset(range(1, 10))
 TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")
-KEYS = ("dialect", "block_delete", "arc_centers", "inch_metric", "offsets", "tools", "kinematics")
+KEYS = ("dialect", "block_delete", "arc_centers", "inch_metric", "offsets", "tools", "kinematics", "setup")
 G70_UNITS, G20_UNITS = "G70 G71", "G20 G21"
 
 
@@ -49,6 +50,8 @@ class Controller:
         Work offsets and tool table; None where the file has none.
     kinematics
         The machine that programs were posted for; None: A, B, C are roll, pitch, yaw of the platform.
+    setup
+        Name of the clamping arrangement; None where the file has none.
     """
 
     dialect: Dialect = GENERIC
@@ -56,6 +59,7 @@ class Controller:
     offsets: Offsets | None = None
     tools: dict[int, ToolEntry] | None = None
     kinematics: PostedKinematics | None = None
+    setup: str | None = None
 
     @property
     def plain(self) -> bool:
@@ -135,7 +139,9 @@ class _Reader:
         for key in self.data:
             if key not in KEYS:
                 raise self.fail(f"{key!r} is not known", ", ".join(KEYS))
-        return Controller(self._dialect(), self._switches(), self._offsets(), self._tools(), self._kinematics())
+        return Controller(
+            self._dialect(), self._switches(), self._offsets(), self._tools(), self._kinematics(), self._setup()
+        )
 
     def _dialect(self) -> Dialect:
         name = self._choice("dialect", tuple(DIALECTS), "generic")
@@ -156,6 +162,12 @@ class _Reader:
     def _kinematics(self) -> PostedKinematics | None:
         given = self.data.get("kinematics")
         return None if given is None else read_kinematics(given, self.fail)
+
+    def _setup(self) -> str | None:
+        value = self.data.get("setup")
+        if value is not None and (not isinstance(value, str) or not value.strip()):
+            raise self.fail(f"setup = {value!r}", "the name of a set-up")
+        return value
 
     def _switches(self) -> frozenset[int]:
         value = self.data.get("block_delete", False)

@@ -16,6 +16,7 @@ from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc import Program, parse_program
+from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated, machine_words
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
@@ -87,6 +88,8 @@ def run_case_study(model: StiffnessModel, step: float = 1e-3) -> CaseStudy:
         "program": PROGRAM,
         "machine": model.machine.name,
         "step_mm": round(mm_from_m(step), 6),
+        **effects_stated(model),
+        "warnings": condition_warnings(model),
         "note": "the paper does not print its path; path and regions are ours",
         "regions": [
             {"region": name, "x_mm": at[0], "y_mm": at[1], "z_mm": at[2], "rotation_deg": at[3], **figures[name]}
@@ -187,8 +190,9 @@ def study_text(study: CaseStudy) -> str:
     """The case study in words and numbers, Markdown."""
     summary = study.summary
     lines = [
-        f"# Case study on {summary['machine']}",
+        f"# Case study on {machine_words(summary)}",
         "",
+        *(line for text in summary["warnings"] for line in (f"Warning: {text}.", "")),
         f"One path ({summary['program']}, {summary['note']}) in four regions, as the paper's Figure 10: mean stiffness",
         "under a load along the motion, and in parentheses its range, N/mm.",
         "",

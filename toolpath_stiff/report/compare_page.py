@@ -12,6 +12,7 @@ from toolpath_stiff.report.compare_machine import machine_png
 from toolpath_stiff.report.compare_pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare_variables import load_path_png, variables_png
 from toolpath_stiff.report.sections import bullets, escaped, figures, page, picture, section, text_table
+from toolpath_stiff.report.wording import machine_text
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.comparison.compare import Comparison
@@ -89,7 +90,7 @@ def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
         verdict="Where does the model fail?",
         headline=_headline(document),
         text=document["text"],
-        about=[f"{document['readings']} readings", files, f"machine {document['machine']}"],
+        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
         figures=_figures(document),
         warnings=document["warnings"],
         sections=sections,

@@ -20,6 +20,7 @@ def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> d
     plunges = [(one.get("plunges") or {}).get("mean_N_per_mm") for one in (summary, other)]
     return {
         "machine": other["machine"],
+        "effects": list(other.get("effects") or ()),
         **{name: other.get(name) for name in FIGURES},
         "weakest": other.get("weakest"),
         "out_of_reach_samples": other.get("out_of_reach_samples"),

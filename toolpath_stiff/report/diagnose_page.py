@@ -28,8 +28,8 @@ from toolpath_stiff.report.diagnose_words import (
     remark_text,
     significant,
 )
-from toolpath_stiff.report.sections import bullets, escaped, figures, page, picture, section, table
-from toolpath_stiff.report.wording import number
+from toolpath_stiff.report.sections import bullets, escaped, figures, hint_list, page, picture, section, table
+from toolpath_stiff.report.wording import machine_text, number
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
@@ -72,7 +72,7 @@ def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) ->
     verdict = str(document.get("verdict") or "-")
     files = ", ".join(str(name) for name in entries(document, "data"))
     readings = figure_of(document, "readings")
-    about = [f"{readings:.0f} readings" if readings is not None else "", files, f"machine {document.get('machine')}"]
+    about = [f"{readings:.0f} readings" if readings is not None else "", files, f"machine {machine_text(document)}"]
     sections = [
         section("Why", bullets(entries(document, "why"))),
         picture("ladder.png", pictures, QUESTIONS),
@@ -148,7 +148,7 @@ def _candidates(document: Mapping[str, Any]) -> str:
 def _next(document: Mapping[str, Any]) -> str:
     """What to do, and the readings that tell most."""
     readings = [entry for entry in entries(document, "next_measurements") if isinstance(entry, Mapping)]
-    body = bullets(entries(document, "next"))
+    body = hint_list(entries(document, "next"))
     if readings:
         keys = list(dict.fromkeys(key for entry in readings for key in entry if key != "why"))
         keys = [key for key in keys if any(entry.get(key) not in ("", None) for entry in readings)]

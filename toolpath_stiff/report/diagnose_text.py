@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from toolpath_stiff.hints import parted
 from toolpath_stiff.report.diagnose_words import (
     NONE,
     best_explanation,
@@ -24,7 +25,7 @@ from toolpath_stiff.report.diagnose_words import (
     probability_text,
     size_text,
 )
-from toolpath_stiff.report.wording import plain, shortened
+from toolpath_stiff.report.wording import machine_text, plain, shortened
 
 WIDTH = 100
 LABEL = 12  # columns of the left-hand words
@@ -57,7 +58,7 @@ def terminal_text(document: Mapping[str, Any]) -> str:
         *_listed("cannot test", ["; ".join(missing_text(e) for e in entries(document, "cannot_test"))]),
         *_listed("would show", [_detectable(document)]),
         *_listed("path", [path_text(document)]),
-        *_listed("next", [*entries(document, "next"), *_next_readings(document)]),
+        *_hints("next", [*entries(document, "next"), *_next_readings(document)]),
         *_entry("assumptions", f"{len(entries(document, 'assumptions'))}, listed in diagnose.json"),
         *_listed("warning", entries(document, "warnings")),
     ]
@@ -80,11 +81,21 @@ def _listed(label: str, sentences: Sequence[object]) -> list[str]:
     return [line for place, text in enumerate(said) for line in _entry("" if place else label, text)]
 
 
+def _hints(label: str, hints: Sequence[object]) -> list[str]:
+    """As `_listed`; a command stands on a line of its own, never wrapped, so that it can be pasted."""
+    lines: list[str] = []
+    for text in filter(None, map(str, hints)):
+        sentence, line = parted(text)
+        lines += _entry("" if lines else label, sentence)
+        lines += [" " * (LABEL + 2) + plain(line)] if line else []
+    return lines
+
+
 def _data(document: Mapping[str, Any]) -> str:
     files = ", ".join(str(name) for name in entries(document, "data")) or "-"
     readings = figure_of(document, "readings")
     count = f"{readings:.0f} readings of " if readings is not None else ""
-    return f"{count}{files}, machine {document.get('machine') or '-'}"
+    return f"{count}{files}, machine {machine_text(document)}"
 
 
 def _error(document: Mapping[str, Any]) -> str:

@@ -200,6 +200,7 @@ def path_text(document: Mapping[str, Any]) -> str:
     """How far apart the plausible explanations are on a tool path, in one sentence; "" where it was not tried."""
     path = document.get("path") or {}
     program = plain(str(path.get("program") or "the program"))
+    program += plain(f" in set-up {path['setup']}") if path.get("setup") else ""
     if path.get("reason"):
         return plain(f"not tried on {program}: {path['reason']}")
     means = {name: figure_of(one, "mean_N_per_mm") for name, one in (path.get("explanations") or {}).items()}

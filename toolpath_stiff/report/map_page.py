@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import resources
 
 import numpy as np
@@ -14,13 +15,14 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 MOST_CELLS = 120  # along a side; a finer grid is thinned for the page, the CSV file has all of it
 
 
-def map_page(machine: Machine, found: StiffnessMap) -> str:
+def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()) -> str:
     """The page's text."""
     step = max(1, -(-max(len(found.x), len(found.y)) // MOST_CELLS))
     stiffness = n_per_mm_from_n_per_m(found.stiffness[:, ::step, ::step])
     data = {
         "title": f"Stiffness map, load {found.load}",
         "machine": machine.title,
+        "warnings": list(warnings),
         "x": np.round(mm_from_m(found.x[::step]), 3).tolist(),
         "y": np.round(mm_from_m(found.y[::step]), 3).tolist(),
         "z": np.round(mm_from_m(found.z), 3).tolist(),

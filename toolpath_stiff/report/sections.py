@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 
+from toolpath_stiff.hints import parted
 from toolpath_stiff.report.wording import plain
 
 Row = tuple[str, Sequence[str]]  # class of the row, its cells
@@ -36,6 +37,14 @@ def section(title: str, body: str) -> str:
 def bullets(sentences: Sequence[object]) -> str:
     """A list; nothing without sentences."""
     return "<ul>" + "".join(f"<li>{escaped(sentence)}</li>" for sentence in sentences) + "</ul>" if sentences else ""
+
+
+def hint_list(hints: Sequence[object]) -> str:
+    """As `bullets`, a hint's command set as one, to be copied."""
+    rows = []
+    for sentence, line in (parted(str(text)) for text in hints):
+        rows.append(f"<li>{escaped(sentence)}" + (f"<pre><code>{escaped(line)}</code></pre>" if line else "") + "</li>")
+    return f"<ul>{''.join(rows)}</ul>" if rows else ""
 
 
 def picture(name: str, pictures: Mapping[str, bytes | str], questions: Mapping[str, tuple[str, str]]) -> str:

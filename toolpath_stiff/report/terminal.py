@@ -11,6 +11,7 @@ from toolpath_stiff.report.wording import (
     READERS,
     duration,
     length_in_moves,
+    machine_text,
     number,
     only_plunges,
     plain,
@@ -44,7 +45,7 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
         *_entry("program", summary["program"]),
         *(_entry("read by", READERS[summary["interpreter"]]) if summary["interpreter"] != "builtin" else ()),
         *(_entry("posted for", f"{summary['kinematics']}, recovered") if summary["kinematics"] else ()),
-        *_entry("machine", _machine(summary)),
+        *_entry("machine", machine_text(summary)),
         *_entry("load", f"{summary['load']}, {summary['force_N']:g} N"),
         *_entry("program zero", _origin(summary)),
         *_entry("samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
@@ -74,7 +75,7 @@ def terminal_table(summary: Mapping[str, Any]) -> str:
 def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> str:
     """Two machines side by side, the difference in percent of the first."""
     compared = compare_summaries(summary, other)
-    rows = [["", *(shortened(plain(_machine(one)), 32) for one in (summary, other)), "difference"]]
+    rows = [["", *(shortened(machine_text(one), 32) for one in (summary, other)), "difference"]]
     for name, change in zip(FIGURES, compared["difference_percent"].values(), strict=True):
         digits = 2 if name.endswith("_um") else 0
         difference = "-" if change is None else f"{change:+.1f} %"
@@ -97,11 +98,6 @@ def _entry(label: str, text: str) -> list[str]:
         subsequent_indent=" " * (LABEL + 2),
         break_on_hyphens=False,
     ) or [label]
-
-
-def _machine(summary: Mapping[str, Any]) -> str:
-    effects = summary["effects"]
-    return f"{summary['machine']} with {', '.join(effects)}" if effects else str(summary["machine"])
 
 
 def _origin(summary: Mapping[str, Any]) -> str:

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from toolpath_stiff.report.sections import bullets, figures, page, picture, section, text_table
-from toolpath_stiff.report.wording import number
+from toolpath_stiff.report.sections import bullets, figures, hint_list, page, picture, section, text_table
+from toolpath_stiff.report.wording import machine_text, number
 
 VERDICTS = {
     "updated": "The machine is updated",
@@ -58,6 +58,7 @@ def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]
         section("Errors by direction", _by_direction(document)),
         section("What was fitted", _fitted(document)),
         section("Does the data bear it?", _support(document)),
+        section("What to do next", hint_list(document.get("next") or [])),
         section("Where it comes from", bullets(record)),
         section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
     ]
@@ -66,7 +67,7 @@ def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]
         verdict=VERDICTS[document["verdict"]],
         headline=_headline(document),
         text=document["text"],
-        about=[f"{document['readings']} readings", files, f"machine {document['machine']}"],
+        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
         figures=_figures(document),
         warnings=document["warnings"],
         sections=sections,

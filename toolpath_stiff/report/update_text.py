@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from textwrap import fill
 from typing import Any
 
-from toolpath_stiff.report.wording import plain
+from toolpath_stiff.report.wording import machine_text, plain
 
 WIDTH = 110
 
@@ -15,7 +15,7 @@ def terminal_text(document: Mapping[str, Any]) -> str:
     """Ladder, errors by direction before and after, parameters, what was turned down."""
     lines = [
         f"data     {document['readings']} readings of {', '.join(plain(name) for name in document['data'])}, "
-        f"machine {plain(document['machine'])}",
+        f"machine {machine_text(document)}",
         fill(f"result   {document['verdict'].upper()}. {plain(document['text'])}", WIDTH, subsequent_indent=" " * 9),
         "",
         *_ladder(document),

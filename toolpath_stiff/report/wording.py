@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from toolpath_stiff.analysis.cut_classes import PLUNGES_ONLY
+from toolpath_stiff.stiffness.acting import machine_words
 
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
@@ -71,3 +72,8 @@ def plain(text: str) -> str:
 def shortened(text: str, width: int) -> str:
     """At most `width` characters, the cut marked by three dots."""
     return text if len(text) <= width else text[: max(width - 3, 0)] + "..."
+
+
+def machine_text(document: Mapping[str, Any]) -> str:
+    """The machine of a result for headings, with the effects that act on it and the set-up."""
+    return plain(machine_words(document))

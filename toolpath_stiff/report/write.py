@@ -109,9 +109,19 @@ def summary_with_options(analysis: Analysis, required: float | None, other: Anal
             ],
         }
     if other is not None:
-        summary["compare"] = compare_summaries(summary, other.summary())
+        found = dict(other.summary())
+        summary["compare"] = compare_summaries(summary, found)
+        summary["warnings"] = [*analysis.warnings, *_of_other(found)]
     finite: dict[str, Any] = _without_nan(summary)
     return finite
+
+
+def _of_other(summary: Mapping[str, Any]) -> list[str]:
+    """What the other machine's effects wait for: without them the two machines may look the same."""
+    return [
+        f"--compare {summary['machine']}: {one['effect']} does not act: {one['reason']}"
+        for one in summary["effects_idle"]
+    ]
 
 
 def _contents(

@@ -7,10 +7,13 @@ pivots, by themselves.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness import closed_form, exact, extremes
+from toolpath_stiff.stiffness.acting import acting_effects
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 
@@ -24,8 +27,9 @@ ROUTES = ("exact", "closed_form", "compiled")
 
 
 def is_closed_form(model: StiffnessModel) -> bool:
-    """Whether linear struts on a rigid platform are all there is, so that the closed form holds."""
-    return model.is_plain and bool(np.isinf(model.platform_bars))
+    """Whether linear struts on a rigid platform are all that acts, so that the closed form holds."""
+    acting = replace(model, effects=acting_effects(model))
+    return acting.is_plain and bool(np.isinf(acting.platform_bars))
 
 
 def choose_route(model: StiffnessModel, poses: int) -> str:
@@ -122,9 +126,16 @@ def _exact(
     for start in range(0, len(position), BLOCK):
         rows = slice(start, start + BLOCK)
         turn = None if rotation is None else rotation[rows]
-        path = load_path(model, position[rows], turn, lengths[rows], force)
+        path = _path(model, position[rows], turn, lengths[rows], force)
         compliance[rows] = exact.tip_compliance(model, path)
     return compliance
+
+
+def _path(
+    model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: FloatArray, force: float
+) -> LoadPath:
+    """What the effects see of n poses of a program, the model's conditions included."""
+    return load_path(model, position, rotation, tool_length, force, **model.conditions.columns(len(position)))
 
 
 def compliance_along(
@@ -141,7 +152,7 @@ def compliance_along(
     for start in range(0, len(position), BLOCK):
         rows = slice(start, start + BLOCK)
         turn = None if rotation is None else rotation[rows]
-        path = load_path(model, position[rows], turn, lengths[rows], force)
+        path = _path(model, position[rows], turn, lengths[rows], force)
         result[rows] = exact.compliance_along(model, path, direction[rows])
     return result
 
@@ -166,7 +177,7 @@ def extreme_directions(
     for start in range(0, len(position), at_a_time):
         rows = slice(start, start + at_a_time)
         turn = None if rotation is None else rotation[rows]
-        path = load_path(model, position[rows], turn, lengths[rows], force)
+        path = _path(model, position[rows], turn, lengths[rows], force)
 
         def along(directions: FloatArray, poses: NDArray[np.int64], path: LoadPath = path) -> FloatArray:
             return exact.compliance_along(model, path.take(poses), directions)

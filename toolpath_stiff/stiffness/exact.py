@@ -62,7 +62,7 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
     parallel: FloatArray | None = None
     for active in model.effects:
         effect, values = active.effect, active.values
-        if effect.load_dependent and path.strut_forces is None:
+        if (effect.load_dependent and path.strut_forces is None) or not effect.acts_on(path, values):
             continue
         series = effect.strut_compliance(path, values)
         form = effect.load_compliance(path, values)

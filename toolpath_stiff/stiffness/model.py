@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.machine.uncertainty import STRUT_LAW, with_parameter
 from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath, read_parameters
+from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Conditions, Effect, LoadPath, read_parameters
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.stiffness.effects.registry import find_effect, known_effects
 
@@ -46,6 +46,8 @@ class StiffnessModel:
         The machine that the control computes with, where effects make the true one differ unknown to it; else None.
     given
         The machine as it was loaded, before geometry effects; None for a model that `build_model` did not make.
+    conditions
+        Under what programs run; measurements bring their own. `acting` says which effects that leaves.
     """
 
     machine: Machine
@@ -53,6 +55,7 @@ class StiffnessModel:
     instruments: tuple[ActiveEffect, ...] = ()
     control: Machine | None = None
     given: Machine | None = None
+    conditions: Conditions = field(default_factory=Conditions)
 
     @property
     def load_dependent(self) -> bool:
@@ -74,7 +77,10 @@ class StiffnessModel:
 
 
 def build_model(
-    machine: Machine, effect_files: Iterable[str | Path] = (), extra: Iterable[ActiveEffect] = ()
+    machine: Machine,
+    effect_files: Iterable[str | Path] = (),
+    extra: Iterable[ActiveEffect] = (),
+    conditions: Conditions | None = None,
 ) -> StiffnessModel:
     """The model of a machine with the effects of its file and any extra ones.
 
@@ -86,6 +92,8 @@ def build_model(
         Python files with a user's own effects, which the machine's entries may name.
     extra
         Further effects, after those of the machine.
+    conditions
+        Under what programs run; unless given, what the machine file says.
 
     Raises
     ------
@@ -109,10 +117,12 @@ def build_model(
                 f"machine {machine.name}: effect {name} is given twice",
                 hint="keep one of them (finite platform bars count as platform_flexibility)",
             )
-    return _assembled(machine, acting, reading)
+    return _assembled(machine, acting, reading, conditions or Conditions(machine.setup, machine.temperature))
 
 
-def _assembled(given: Machine, acting: Sequence[ActiveEffect], reading: Sequence[ActiveEffect]) -> StiffnessModel:
+def _assembled(
+    given: Machine, acting: Sequence[ActiveEffect], reading: Sequence[ActiveEffect], conditions: Conditions
+) -> StiffnessModel:
     """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
     machine = control = given
     for active in acting:
@@ -120,7 +130,7 @@ def _assembled(given: Machine, acting: Sequence[ActiveEffect], reading: Sequence
         if not active.effect.unknown_to_control:
             control = active.effect.geometry(control, active.values)
     deceived = any(active.effect.unknown_to_control for active in acting)
-    return StiffnessModel(machine, tuple(acting), tuple(reading), control if deceived else None, given)
+    return StiffnessModel(machine, tuple(acting), tuple(reading), control if deceived else None, given, conditions)
 
 
 def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> StiffnessModel:
@@ -141,7 +151,8 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     if model.given is None:
         raise InputError(f"a model without its machine has no parameter {name!r}")
     if name in STRUT_LAW:
-        return _assembled(with_parameter(model.given, name, change), model.effects, model.instruments)
+        moved = with_parameter(model.given, name, change)
+        return _assembled(moved, model.effects, model.instruments, model.conditions)
     owner, _, key = name.partition(".")
     effects = {"effects": list(model.effects), "instruments": list(model.instruments)}
     for kind in effects.values():
@@ -153,7 +164,7 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
                 if not low <= value <= high:
                     raise InputError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
                 kind[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
-                return _assembled(model.given, effects["effects"], effects["instruments"])
+                return _assembled(model.given, effects["effects"], effects["instruments"], model.conditions)
     raise InputError(f"machine {model.given.name} has no parameter {name!r}")
 
 

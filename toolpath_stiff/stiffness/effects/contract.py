@@ -29,6 +29,9 @@ FloatArray = NDArray[np.float64]
 
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
 DEFAULT_FORCE = 1000.0  # N, assumed wherever neither the user nor the data say at which load
+# Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
+CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
+SETUP = "setup"  # the condition, and the name of every parameter that names a set-up
 
 
 @dataclass(frozen=True)
@@ -141,6 +144,34 @@ class LoadPath:
         return replace(self, struts=struts, **arrays)
 
 
+@dataclass(frozen=True)
+class Conditions:
+    """Under what a program runs: what measurements say row by row, and a program does not say.
+
+    Attributes
+    ----------
+    setup
+        Name of the clamping arrangement; "": none of those that have a name; None: nobody says.
+    temperature
+        Degrees C; None: nobody says.
+    """
+
+    setup: str | None = None
+    temperature: float | None = None
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Which of `CONDITIONS` somebody has given."""
+        return tuple(name for name, attribute in CONDITIONS.items() if getattr(self, attribute, None) is not None)
+
+    def columns(self, n: int) -> dict[str, Any]:
+        """The same for n poses, as `LoadPath` holds it."""
+        return {
+            "setup": None if self.setup is None else np.full(n, self.setup),
+            "temperature": None if self.temperature is None else np.full(n, self.temperature),
+        }
+
+
 class Effect:
     """Base of all effects; subclass, fill in the attributes, implement what the effect adds.
 
@@ -155,7 +186,8 @@ class Effect:
     parameters
         What it is made of.
     needs
-        Columns of the measurements without which it cannot be tested.
+        Columns of the measurements without which it cannot be tested. Where one of `CONDITIONS` is among them and
+        nobody gives it (a program without `--setup`), the effect does not act, and results say so.
     load_dependent
         Whether the compliance depends on the size of the load; it is then the secant one.
     unknown_to_control
@@ -196,6 +228,20 @@ class Effect:
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
         """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m."""
         return stiffness
+
+    def conditions(self, p: Mapping[str, Any]) -> tuple[str, ...]:
+        """Which of `CONDITIONS` it waits for with these values: those of `needs`, and those that a value names.
+
+        None for a geometry: a machine has one, whatever the conditions.
+        """
+        if type(self).geometry is not Effect.geometry:
+            return ()
+        named = (q.name for q in self.parameters if q.kind == "text" and p.get(q.name))
+        return tuple(dict.fromkeys(name for name in (*self.needs, *named) if name in CONDITIONS))
+
+    def acts_on(self, path: LoadPath, p: Mapping[str, Any]) -> bool:
+        """Whether these poses come with every condition that it waits for."""
+        return all(getattr(path, CONDITIONS[name]) is not None for name in self.conditions(p))
 
     @property
     def is_instrument(self) -> bool:

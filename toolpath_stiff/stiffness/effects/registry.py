@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.stiffness.effects.contract import LINKS, Effect, Parameter
 
 ENTRY_POINTS = "toolpath_stiff.effects"
@@ -69,6 +70,7 @@ def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
 
 def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
     """The effect of that name. Raises `InputError` with the nearest name if there is none."""
+    files = list(files)
     known = known_effects(files)
     if name in known:
         return known[name]
@@ -76,7 +78,11 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
     if name in broken:
         raise InputError(f"effect {name} does not load: {broken[name]}", hint="repair or uninstall its package")
     near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {near[0]}?" if near else "`tps effects list` lists them"
+    hint = (
+        f"did you mean {near[0]}?"
+        if near
+        else f"`{command_line('effects', 'list', *options(effects=list(files)))}` lists them"
+    )
     raise InputError(f"unknown effect {name!r}", expected=f"one of {', '.join(known)}", hint=hint)
 
 
@@ -84,7 +90,9 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
     """Name -> effect of every `Effect` subclass that a Python file defines. Raises `InputError`."""
     path = Path(file)
     if not path.is_file():
-        raise InputError(f"effects file {str(file)!r} does not exist", hint="`tps effects new FILE.py` writes one")
+        raise InputError(
+            f"effects file {str(file)!r} does not exist", hint=f"`{command_line('effects', 'new', path)}` writes one"
+        )
     name = f"toolpath_stiff_user_effects_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

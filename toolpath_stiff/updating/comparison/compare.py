@@ -266,6 +266,7 @@ def _document(
         one["text"] = same[-1]["text"]
     document: dict[str, Any] = {
         "machine": predictor.machine.name,
+        "effects": predictor.effects_that_act,
         "data": list(dict.fromkeys(data.file.tolist())),
         "readings": len(data),
         "seed": seed,

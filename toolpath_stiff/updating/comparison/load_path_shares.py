@@ -61,6 +61,9 @@ def _by_link(model: StiffnessModel, data: Measurements) -> FloatArray:
     for active in model.effects:
         effect, values = active.effect, active.values
         energy = np.zeros(len(data))
+        if not effect.acts_on(path, values):
+            columns.append(energy)
+            continue
         series, form = effect.strut_compliance(path, values), effect.load_compliance(path, values)
         beside = effect.parallel_stiffness(path, values)
         if series is not None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
@@ -26,8 +27,11 @@ FloatArray = NDArray[np.float64]
 TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
 
 
-def document(diagnosis: Diagnosis, command: str = "") -> dict[str, Any]:
-    """Everything that `diagnose.json` holds but the next measurements, which `plan` works out."""
+def document(diagnosis: Diagnosis, command: str = "", asked: Asked | None = None) -> dict[str, Any]:
+    """Everything that `diagnose.json` holds but the next measurements, which `plan` works out.
+
+    `command` is the one that was run, `asked` what those must carry that go on from there.
+    """
     main = diagnosis.main
     return {
         "verdict": diagnosis.verdict,
@@ -42,7 +46,7 @@ def document(diagnosis: Diagnosis, command: str = "") -> dict[str, Any]:
             {"effect": name, "missing": list(columns)} for name, columns in sorted(diagnosis.cannot_test.items())
         ],
         "next_measurements": [],
-        "next": next_steps(diagnosis),
+        "next": next_steps(diagnosis, asked or Asked(diagnosis.files)),
         "by_noise": {name: _in_short(judgement) for name, judgement in diagnosis.judgements.items()},
         "noise": _noise(main),
         "gates": _gates(main),
@@ -65,10 +69,11 @@ def document(diagnosis: Diagnosis, command: str = "") -> dict[str, Any]:
         },
         "path": None,
         "assumptions": assumptions(diagnosis),
-        "warnings": list(diagnosis.data.warnings),
+        "warnings": list(diagnosis.predictor.data.warnings),
         "notes": list(diagnosis.data.notes),
         "seed": diagnosis.seed,
         "machine": diagnosis.machine.name,
+        "effects": diagnosis.predictor.effects_that_act,
         "data": list(diagnosis.files),
         "readings": len(diagnosis.data),
         "command": command,

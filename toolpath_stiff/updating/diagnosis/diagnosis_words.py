@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.updating.inference.confounding import CONFOUNDED
 from toolpath_stiff.updating.inference.verdict import FALSE_ALARM, NONE, Judgement
@@ -110,20 +111,24 @@ def _confounded(diagnosis: Diagnosis) -> list[str]:
     return found
 
 
-def next_steps(diagnosis: Diagnosis) -> list[str]:
-    """What to do next."""
+def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
+    """What to do next, as hints: commands run as they stand."""
     if diagnosis.verdict == "identified" and diagnosis.best is not None:
         names = [name for name in diagnosis.plausible if name != NONE]
-        return [f"add it: tps update DATA {' '.join('--add ' + name for name in names)} -o machine.toml"]
+        # The diagnosis weighs every effect with the strut law refitted: the update is to do the same.
+        own = [*options(add=names), "--strut-law", "-o", asked.updated_machine]
+        return [hint("add it" if len(names) == 1 else "add them", asked.command("update", *own))]
     if diagnosis.verdict == "ambiguous":
-        found = ["measure what tells them apart: tps plan DATA"]
+        found = [hint("measure what tells them apart", asked.command("plan"))]
         if len(diagnosis.judgements) > 1:
             found.insert(0, "repeat a few readings, re-clamped, or state --noise: the verdict hangs on the scatter")
         return found
     if diagnosis.verdict == "unexplained":
+        file = asked.new_effect
         return [
-            "look where the residuals lie (tps compare DATA), write the effect that you suspect as one file "
-            "(tps effects new), and try it: tps diagnose DATA --effects FILE.py"
+            hint("look where the residuals lie", asked.command("compare")),
+            hint("write the effect that you suspect as one file", command_line("effects", "new", file)),
+            hint("and try it", asked.command("diagnose", effects=[file])),
         ]
     return ["use the model; `detectable` lists what could still be there unseen"]
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.stiffness.acting import setup_of
+from toolpath_stiff.stiffness.effects.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.updating.inference.predict import scaled_law
@@ -60,21 +62,28 @@ def next_measurements(
     return rows, remarks
 
 
-def choice_on_path(diagnosis: Diagnosis, program: Program, origin: Pose | None = None) -> dict[str, Any]:
+def choice_on_path(
+    diagnosis: Diagnosis, program: Program, origin: Pose | None = None, given: Conditions | None = None
+) -> dict[str, Any]:
     """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
 
-    Where the program is out of reach, or a model has no answer there, the reason instead.
+    Where the program is out of reach, or a model has no answer there, the reason instead. `given` is under what the
+    program runs; unless it names a set-up, the one that an explanation belongs to: there the choice matters.
     """
     from toolpath_stiff.analysis import analyse
     from toolpath_stiff.analysis.statistics import stiffness_figures
 
     names = [name for name in diagnosis.explanations if name == NONE or name in diagnosis.fits]
-    found: dict[str, Any] = {"program": program.name, "explanations": {}}
+    conditions = given or Conditions(diagnosis.machine.setup, diagnosis.machine.temperature)
+    if conditions.setup is None:
+        effects = [active for name in names if name != NONE for active in diagnosis.fits[name].effects]
+        conditions = replace(conditions, setup=next(filter(None, map(setup_of, effects)), None))
+    found: dict[str, Any] = {"program": program.name, "setup": conditions.setup, "explanations": {}}
     for name in names:
         fit = diagnosis.base if name == NONE else diagnosis.fits[name]
         machine = diagnosis.machine.with_changes(strut_law=scaled_law(diagnosis.machine.strut_law, fit.law))
         try:
-            model = build_model(machine, diagnosis.predictor.effect_files, fit.effects)
+            model = build_model(machine, diagnosis.predictor.effect_files, fit.effects, conditions)
             model = replace(model, instruments=())  # readings differ, the machine under the tool does not
             analysis = analyse(model, program, origin=origin, step=PATH_STEP)
         except TpsError as error:

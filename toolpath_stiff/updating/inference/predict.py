@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.acting import idle_on_readings
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model
 from toolpath_stiff.updating.readings.measurements import Measurements, measured_path
@@ -59,18 +60,29 @@ class Predictor:
     ------
     InputError
         The machine's effects are wrong, or the strut law leaves a strut no stiffness at a measured pose.
+
+    Attributes
+    ----------
+    data
+        The readings, with a warning for each effect of the machine file that adds nothing to them.
     """
 
     def __init__(self, machine: Machine, data: Measurements, effect_files: Sequence[str | Path] = ()) -> None:
         self.machine = machine
-        self.data = data
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)
+        self.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle_on(self.base, data).values()))))
         self._timeless = _prepare(self.base, data, timed=False)
         self._timed = _prepare(self.base, data, timed=True)
 
     def __len__(self) -> int:
         return len(self.data)
+
+    @property
+    def effects_that_act(self) -> list[str]:
+        """Effects and instruments of the machine file that change these readings, for headings."""
+        idle = idle_on(self.base, self.data)
+        return [one.effect.name for one in (*self.base.effects, *self.base.instruments) if one.effect.name not in idle]
 
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
         """(n,) ln(N/m) that the readings should show; nan where the model has no answer.
@@ -87,7 +99,8 @@ class Predictor:
         if model.instruments:
             path = replace(self._full_path(), machine=model.machine)
             for active in model.instruments:
-                stiffness = active.effect.reading(stiffness, path, active.values)
+                if active.effect.acts_on(path, active.values):
+                    stiffness = active.effect.reading(stiffness, path, active.values)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(np.where(stiffness > 0.0, np.log(stiffness), np.nan))
 
@@ -191,6 +204,11 @@ class Predictor:
         """(n,) ln k of the machine file's model, before instruments."""
         prepared = self._timeless
         return np.asarray(np.log(self._mechanics(self.base, prepared))[prepared.which])
+
+
+def idle_on(model: StiffnessModel, data: Measurements) -> dict[str, str]:
+    """Effects of the model that add nothing to these readings -> a sentence for people."""
+    return idle_on_readings(model, data.missing, set(data.setup.tolist()))
 
 
 def prepared_first(prepared: _Prepared) -> NDArray[np.int64]:

@@ -336,5 +336,6 @@ def model_stiffness(model: StiffnessModel, data: Measurements) -> FloatArray:
     path = measured_path(model, data)
     stiffness = 1.0 / exact.compliance_along(model, path, data.direction)
     for active in model.instruments:
-        stiffness = active.effect.reading(stiffness, path, active.values)
+        if active.effect.acts_on(path, active.values):
+            stiffness = active.effect.reading(stiffness, path, active.values)
     return np.asarray(stiffness)

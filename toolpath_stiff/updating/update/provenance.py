@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty
+from toolpath_stiff.stiffness.effects.contract import SETUP
 from toolpath_stiff.updating.inference.fit import Fit
 from toolpath_stiff.updating.inference.predict import scaled_law
 from toolpath_stiff.updating.readings.measurements import NIST_TABLE_1
@@ -38,7 +39,9 @@ def _bytes(file: str) -> bytes:
         raise InputError(f"cannot read {file!r}: {error.strerror}") from None
 
 
-def fitted_machine(machine: Machine, fit: Fit, provenance: Mapping[str, Any], widened: float = 1.0) -> Machine:
+def fitted_machine(
+    machine: Machine, fit: Fit, provenance: Mapping[str, Any], widened: float = 1.0, setups: Iterable[str] = ()
+) -> Machine:
     """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
 
     Parameters
@@ -51,6 +54,8 @@ def fitted_machine(machine: Machine, fit: Fit, provenance: Mapping[str, Any], wi
         Keys and values for machine files, the same for every entry.
     widened
         Factor on the standard deviations.
+    setups
+        Names of the set-ups that were measured: where an effect belongs to one, the machine file lists them all.
     """
     effects, instruments = list(machine.effects), list(machine.instruments)
     for candidate, active in zip(fit.candidates, fit.effects, strict=True):
@@ -65,6 +70,9 @@ def fitted_machine(machine: Machine, fit: Fit, provenance: Mapping[str, Any], wi
             "origins": {**machine.origins, "strut_law": "fitted"},
             "remarks": {**machine.remarks, "strut_law": remark},
         }
+    if any(SETUP in one.effect.conditions(one.values) for one in fit.effects):
+        known = sorted({*setups} - {"", *machine.setups})
+        changes["setups"] = (*machine.setups, *known)
     return machine.with_changes(**changes, uncertainty=_uncertainty(machine, fit, widened))
 
 

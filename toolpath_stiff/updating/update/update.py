@@ -143,7 +143,7 @@ class Update:
 
     def fitted(self, provenance: dict[str, object]) -> Machine:
         """The machine with the last model."""
-        return fitted_machine(self.machine, self.last.fit, provenance, self.widening)
+        return fitted_machine(self.machine, self.last.fit, provenance, self.widening, self.data.setup.tolist())
 
 
 def update(

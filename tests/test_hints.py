@@ -1,0 +1,195 @@
+"""What is printed to be pasted runs as it stands, and carries what the command before it was told."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import toolpath_stiff
+from tests.machine.test_machine_files import HAL
+from toolpath_stiff import rig
+from toolpath_stiff.cli.main import COMMANDS, main
+from toolpath_stiff.hints import Asked, command_line, hint, parted
+from toolpath_stiff.updating.diagnosis.diagnosis_words import next_steps
+
+PACKAGE = Path(toolpath_stiff.__file__).parent
+DRAWING = ("diagnose", "compare", "update", "plan", "map")
+NAMES = "|".join(command.name for command in COMMANDS)
+
+
+def commands_in(printed: str) -> list[str]:
+    """Commands on lines of their own, and whole ones in backticks."""
+    own_lines = [line.strip() for line in printed.splitlines() if re.match(rf"\s*tps ({NAMES})\b", line)]
+    return [*own_lines, *re.findall(rf"`(tps (?:{NAMES}) [^`]+)`", " ".join(printed.split()))]
+
+
+def run(line: str, capsys, code: int = 0) -> list[str]:
+    """Run a command as a shell would split it; the commands that it prints, on either stream."""
+    words = shlex.split(line)[1:]
+    assert main([*words, *(["--no-plots"] if words[0] in DRAWING else [])]) == code, line
+    captured = capsys.readouterr()
+    return commands_in(captured.out + captured.err)
+
+
+def follow(line: str, capsys) -> list[str]:
+    """Run a command and everything that it and its followers print, each once."""
+    done: list[str] = []
+    waiting = [line]
+    while waiting:
+        now = waiting.pop(0)
+        if now not in done:
+            done.append(now)
+            waiting += run(now, capsys)
+    return done
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder whose name a shell has to be told with quotes."""
+    folder = tmp_path / "first try"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def test_from_an_exercise_to_the_machine_that_explains_it(here, capsys):
+    """A blind exercise, its diagnosis, update, comparison, map: nothing is typed after the first command."""
+    (here / "set up.py").write_text(USER_EFFECT)
+    new = "tps rig new --seed 3 --layout paper --hidden setup_compliance --noise 1 --out 'ex 1'"
+    diagnosis = run(new, capsys)
+    assert diagnosis == ["tps diagnose 'ex 1/measurements.csv' --machine 'ex 1/machine.toml'"]
+    done = follow(f"{diagnosis[0]} --effects 'set up.py' --noise 1 --strut-spread 0.5", capsys)
+    update = next(line for line in done if line.startswith("tps update"))
+    for part in ("--machine 'ex 1/machine.toml'", "--effects 'set up.py'", "--noise 1", "--strut-spread 0.5"):
+        assert part in update
+    assert (here / "ex 1/machine-updated.toml").is_file()
+    assert {shlex.split(line)[1] for line in done} == {"diagnose", "update", "compare", "map"}
+    assert any(line.startswith("tps map") and "--setup riser" in line for line in done)
+    readings = "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm\n0,0,900,X,\n50,0,900,Y,\n"
+    (here / "plan.csv").write_text(readings)
+    again = run("tps rig measure 'ex 1' --at plan.csv --out 'more data.csv'", capsys)
+    assert again == ["tps diagnose 'ex 1/measurements.csv' 'more data.csv' --machine 'ex 1/machine.toml'"]
+
+
+def test_what_the_data_leave_open_is_planned(here, capsys):
+    rows, _ = rig.make_case(7, layout="paper", hidden="spindle_compliance", size=0.1)
+    (here / "a spindle.csv").write_text(rig.csv_text(rows), encoding="utf-8")
+    done = follow("tps diagnose 'a spindle.csv' --noise 2,1", capsys)
+    assert done[1:] == ["tps plan 'a spindle.csv' --noise 2,1"]
+
+
+def test_what_nothing_explains_is_written_and_tried(here, capsys):
+    rows, _ = rig.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
+    (here / "data.csv").write_text(rig.csv_text(rows), encoding="utf-8")
+    asked = Asked(("data.csv",), effects=(), noise=0.03)
+    steps = next_steps(SimpleNamespace(verdict="unexplained", best=None), asked)
+    lines = [line for _, line in map(parted, steps)]
+    assert [shlex.split(line)[1] for line in lines] == ["compare", "effects", "diagnose"]
+    for line in lines:
+        run(line, capsys)
+    again = Asked(("data.csv",), effects=("my_effect.py",))
+    assert again.new_effect == "my_effect_2.py"
+
+
+def test_templates_and_imports(here, capsys):
+    done = follow("tps machine new 'my machine.toml'", capsys)
+    assert done[1:] == ["tps machine check 'my machine.toml'"]
+    (here / "kins.hal").write_text(HAL)
+    done = follow("tps machine from-linuxcnc kins.hal --units mm -o 'from hal.toml'", capsys)
+    assert done[1:] == ["tps machine check 'from hal.toml'"]
+    done = follow("tps effects new my_screw.py", capsys)
+    assert done[1:] == ["tps effects show my_screw --effects my_screw.py"]
+
+
+@pytest.mark.parametrize(
+    ("line", "printed"),
+    [
+        ("tps pose 0 0 5000 --machine 'my machine.toml'", ["tps machine show 'my machine.toml'"]),
+        ("tps pose 0 0 800 --machine 'other one.toml'", ["tps machine list", "tps machine new 'other one.toml'"]),
+        ("tps machine check 'other one.toml'", ["tps machine new 'other one.toml'"]),
+        ("tps effects show nothing_like_it --effects own.py", ["tps effects list --effects own.py"]),
+        ("tps effects list --effects another.py", ["tps effects new another.py"]),
+    ],
+)
+def test_hints_of_errors_run_too(line, printed, here, capsys):
+    run("tps machine new 'my machine.toml'", capsys)
+    run("tps effects new own.py", capsys)
+    assert run(line, capsys, code=2) == printed
+    for one in printed:
+        run(one, capsys)
+
+
+def test_an_update_never_proposes_the_name_of_its_own_input():
+    machine, seen = "machine.toml", set()
+    for _ in range(4):
+        seen.add(machine)
+        machine = Asked(("a.csv",), machine).updated_machine
+        assert machine not in seen
+    assert Asked(("a.csv",)).updated_machine == "nist-updated.toml"
+    assert Asked(("a.csv",), "here/m.toml").updated_machine == "here/m-updated.toml"
+
+
+def test_options_that_were_left_alone_are_left_out_and_the_rest_is_quoted():
+    assert Asked(("a b.csv", "c.csv")).command("plan") == "tps plan 'a b.csv' c.csv"
+    full = Asked(("a.csv",), "m.toml", ("x.py", "y z.py"), (0.02, 0.015), 0.02)
+    assert full.command("update", "--auto") == (
+        "tps update a.csv --machine m.toml --auto --effects x.py --effects 'y z.py' --noise 2,1.5 --strut-spread 2"
+    )
+    assert parted(hint("try it", command_line("map", "--z", 3))) == ("try it:", "tps map --z 3")
+    assert parted("no command here") == ("no command here", "")
+
+
+def test_the_recorded_command_is_the_one_that_was_run(here, capsys):
+    import json
+
+    assert main(["plan", "--machine", "nist", "--n", "12", "--no-plots", "--out", "my plan"]) == 0
+    capsys.readouterr()
+    found = json.loads((here / "my plan/plan.json").read_text())
+    assert found["command"] == "tps plan --machine nist --n 12 --no-plots --out 'my plan'"
+
+
+def test_no_message_holds_a_command_with_a_gap_to_fill():
+    """Outside help and docstrings a command is made by `hints`: a literal one cannot know the user's files."""
+    gap = re.compile(rf"tps (?:{NAMES})\b[^.`;]*\b(?:DATA|FILE|DIR|EFFECT|PROGRAM|NAME)\b")
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        tree = ast.parse(path.read_text("utf-8"))
+        aside = set()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node, clean=False):
+                aside.add(id(node.body[0].value))
+            if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "EPILOG":
+                aside.add(id(node.value))
+            if isinstance(node, ast.keyword) and node.arg == "expected":  # of a command line itself: its usage
+                aside.add(id(node.value))
+        found += [
+            f"{path.name}:{node.lineno}: {node.value}"
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in aside
+            if gap.search(node.value)
+        ]
+    assert found == []
+
+
+USER_EFFECT = '''
+from toolpath_stiff.stiffness.effects import Effect, Parameter
+
+
+class Bench(Effect):
+    """Readings at the right-hand side are off."""
+
+    name = "bench"
+    title = "bench"
+    link = "instrument"
+    equation = "c = c_0 x"
+    source = "made up"
+    parameters = (Parameter("compliance", "nm/N", 1e-9, (0.0, 100.0), (1.0, 10.0), "made up"),)
+
+    def reading(self, stiffness, path, p):
+        return stiffness / (1.0 + p["compliance"] * stiffness * (path.position[:, 0] > 0.1))
+'''

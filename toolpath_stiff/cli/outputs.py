@@ -1,0 +1,62 @@
+"""What a command writes may not be what it reads: one check for all of them, before any work is done.
+
+Every argument that names a file is an input, but those that say where results go. With `--replace` (`--force` is the
+same where it has no other meaning) the old file is kept beside the new one.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import check_outputs, keep_old
+
+DESTINATIONS = ("out", "output", "write", "command_line")
+
+
+def add_replace_option(parser: argparse.ArgumentParser, *, force: bool = True) -> None:
+    """`--replace`, and `--force` for the same unless that means something else here."""
+    parser.add_argument(
+        "--replace",
+        *(["--force"] if force else []),
+        action="store_true",
+        dest="replace",
+        help="write over a file that is there and matters; the old one is kept beside it as NAME.old",
+    )
+
+
+def inputs_of(args: argparse.Namespace) -> Iterator[str]:
+    """Every argument that may name a file to read."""
+    for name, value in vars(args).items():
+        if name not in DESTINATIONS:
+            yield from (one for one in (value if isinstance(value, list) else [value]) if isinstance(one, str) and one)
+
+
+def check_written(
+    args: argparse.Namespace, files: Iterable[str | Path | None], more_inputs: Iterable[str | Path] = ()
+) -> list[Path]:
+    """Refuse to write over an input; the inputs that are to be replaced, for `keep`.
+
+    `files` are all that the command will write or remove. Raises `InputError`, which names --replace.
+    """
+    outputs = [file for file in files if file]
+    return check_outputs(outputs, [*inputs_of(args), *more_inputs], args.replace)
+
+
+def check_new(args: argparse.Namespace, file: str) -> list[Path]:
+    """The same for a template, which writes over nothing at all."""
+    if Path(file).exists() and not args.replace:
+        raise InputError(
+            f"{file!r} exists already", hint="choose another name, or say --replace: the old file is kept beside it"
+        )
+    return [Path(file)] if Path(file).exists() else []
+
+
+def keep(replaced: Iterable[Path], quiet: bool = False) -> None:
+    """Keep what is about to be replaced, and say where."""
+    for file in replaced:
+        kept = keep_old(file)
+        if kept is not None and not quiet:
+            print(f"kept the old {file} as {kept}")

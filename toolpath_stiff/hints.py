@@ -1,0 +1,109 @@
+"""Commands to paste, written in one place: quoted for the shell, with every option of the run that still matters.
+
+A hint is a sentence and, on a line of its own that no page or terminal breaks, the command. In a result it
+is one text: the sentence, a colon, a line feed, the command.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+
+PROGRAM = "tps"
+MACHINE, STRUT_SPREAD = "nist", 0.01  # what commands take unless told
+NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
+
+
+def command_line(*words: object) -> str:
+    """A command line of `tps`, quoted for the shell."""
+    return shlex.join([PROGRAM, *map(str, words)])
+
+
+def hint(sentence: str, line: str) -> str:
+    """A sentence and the command that it asks for."""
+    return f"{sentence}:\n{line}"
+
+
+def parted(text: str) -> tuple[str, str]:
+    """Sentence and command of a hint; the command is "" where there is none."""
+    sentence, _, line = text.partition("\n")
+    return sentence, line
+
+
+def options(**given: object) -> list[str]:
+    """`--name value` of everything that is given: not None, not False; lists once an entry, True without a value."""
+    words: list[str] = []
+    for name, value in given.items():
+        option = "--" + name.replace("_", "-")
+        for one in value if isinstance(value, list | tuple) else [value]:
+            words += [] if one is None or one is False else [option] if one is True else [option, str(one)]
+    return words
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a command on measurements was asked, for the commands that go on from there.
+
+    Attributes
+    ----------
+    data
+        Measurement files.
+    machine
+        Name or file.
+    effects
+        Files with the user's own effects.
+    noise, strut_spread
+        Relative sd of one reading, or of repeat and clamping, None if not given; of the struts' stiffnesses.
+    """
+
+    data: tuple[str, ...]
+    machine: str = MACHINE
+    effects: tuple[str, ...] = ()
+    noise: float | tuple[float, float] | None = None
+    strut_spread: float = STRUT_SPREAD
+
+    def command(self, name: str, *own: str, machine: str | None = None, effects: Sequence[str] = ()) -> str:
+        """`tps name` on the same data with the same options; `own` words of that command come after the machine.
+
+        `machine` is another one, `effects` are further files.
+        """
+        chosen = machine or self.machine
+        return command_line(
+            name,
+            *self.data,
+            *options(machine=chosen if chosen != MACHINE else None),
+            *own,
+            *options(effects=[*self.effects, *effects], noise=self._noise()),
+            *options(strut_spread=percent(self.strut_spread) if self.strut_spread != STRUT_SPREAD else None),
+        )
+
+    def _noise(self) -> str | None:
+        if self.noise is None:
+            return None
+        return ",".join(percent(part) for part in (self.noise if isinstance(self.noise, tuple) else (self.noise,)))
+
+    @property
+    def updated_machine(self) -> str:
+        """A name for the machine file that an update of this one writes: beside it, and never its own."""
+        path = PurePath(self.machine)
+        stem = path.stem if path.suffix == ".toml" else path.name
+        before = NUMBERED.search(stem)
+        number = int(before[1] or 1) + 1 if before else 1
+        name = NUMBERED.sub("", stem) + "-updated" + (f"-{number}" if number > 1 else "") + ".toml"
+        return str(path.with_name(name))
+
+    @property
+    def new_effect(self) -> str:
+        """A name for a file with an effect of the user's own that is not among the given ones."""
+        taken, number = {PurePath(file).name for file in self.effects}, 1
+        while (name := f"my_effect{f'_{number}' if number > 1 else ''}.py") in taken:
+            number += 1
+        return name
+
+
+def percent(share: float) -> str:
+    """A share as the per cent that options take."""
+    return f"{100.0 * share:.10g}"
