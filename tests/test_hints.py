@@ -14,7 +14,7 @@ import toolpath_stiff
 from tests.machine.test_machine_files import HAL
 from toolpath_stiff import rig
 from toolpath_stiff.cli.main import COMMANDS, main
-from toolpath_stiff.hints import Asked, command_line, hint, parted
+from toolpath_stiff.hints import Asked, command_line, hint, parted, without_destination
 from toolpath_stiff.updating.diagnosis.diagnosis_words import next_steps
 
 PACKAGE = Path(toolpath_stiff.__file__).parent
@@ -150,7 +150,8 @@ def test_the_recorded_command_is_the_one_that_was_run(here, capsys):
     assert main(["plan", "--machine", "nist", "--n", "12", "--no-plots", "--out", "my plan"]) == 0
     capsys.readouterr()
     found = json.loads((here / "my plan/plan.json").read_text())
-    assert found["command"] == "tps plan --machine nist --n 12 --no-plots --out 'my plan'"
+    assert found["command"] == "tps plan --machine nist --n 12 --no-plots"  # wherever its results go
+    assert command_line(*without_destination(["plan", "a b.csv", "--out=x", "--n", "3"])) == "tps plan 'a b.csv' --n 3"
 
 
 def test_no_message_holds_a_command_with_a_gap_to_fill():

@@ -22,6 +22,15 @@ def command_line(*words: object) -> str:
     return shlex.join([PROGRAM, *map(str, words)])
 
 
+def without_destination(words: Sequence[str]) -> list[str]:
+    """The words of a command line without `--out`: where results go does not matter for what they are."""
+    return [
+        word
+        for word, before in zip(words, ["", *words], strict=False)
+        if word != "--out" and before != "--out" and not word.startswith("--out=")
+    ]
+
+
 def hint(sentence: str, line: str) -> str:
     """A sentence and the command that it asks for."""
     return f"{sentence}:\n{line}"

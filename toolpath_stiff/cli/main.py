@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from toolpath_stiff import __version__
 from toolpath_stiff.cli.arguments import whole_options
 from toolpath_stiff.errors import TpsError
-from toolpath_stiff.hints import command_line
+from toolpath_stiff.hints import command_line, without_destination
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = build_parser(chosen)
     try:
         args = parser.parse_args(whole_options(arguments))
-        args.command_line = command_line(*arguments)
+        args.command_line = command_line(*without_destination(arguments))
         if args.command is None:
             parser.print_help()
             return 2
