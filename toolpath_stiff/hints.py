@@ -14,6 +14,7 @@ from pathlib import PurePath
 
 PROGRAM = "tps"
 MACHINE, STRUT_SPREAD = "nist", 0.01  # what commands take unless told
+NO_MATTER = ("--out", "--jobs")  # each takes a value
 NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
 
 
@@ -23,11 +24,11 @@ def command_line(*words: object) -> str:
 
 
 def without_destination(words: Sequence[str]) -> list[str]:
-    """The words of a command line without `--out`: where results go does not matter for what they are."""
+    """The words of a command line but for options that change no result: where it goes, how many threads make it."""
     return [
         word
         for word, before in zip(words, ["", *words], strict=False)
-        if word != "--out" and before != "--out" and not word.startswith("--out=")
+        if word.partition("=")[0] not in NO_MATTER and before not in NO_MATTER
     ]
 
 
