@@ -21,6 +21,7 @@ RANK = {
     "hints": 0,
     "files": 1,
     "column_files": 1,
+    "tables": 2,
     "nc": 2,
     "path": 3,
     "machine": 4,

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 
+NOT_WINDOWS = frozenset(b"\x81\x8d\x8f\x90\x9d")  # bytes that Windows' Latin-1 (cp1252) leaves undefined
+
 
 def write_atomically(path: str | Path, content: str | bytes | Iterable[str | bytes]) -> Path:
     """Write text (UTF-8, line feeds as they are), bytes or pieces of text; folders are made as needed.
@@ -60,16 +62,31 @@ def _umask() -> int:
     return mask
 
 
-def read_text(path: str | Path, what: str) -> str:
-    """Text of a UTF-8 (or, failing that, Latin-1) file; `what` names it in messages. Raises `InputError`."""
+def read_bytes(path: str | Path, what: str) -> bytes:
+    """Content of a file; `what` names it in messages. Raises `InputError`."""
     try:
-        content = Path(path).read_bytes()
+        return Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+
+
+def decoded(content: bytes) -> str:
+    """Text of bytes: UTF-16 (told by its byte-order mark or its zeros), UTF-8 or, failing that, Windows' Latin-1."""
+    start = content[:400]
+    if start.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return content.decode("utf-16", "replace")
+    for encoding, zeros in (("utf-16-le", start[1::2]), ("utf-16-be", start[::2])):
+        if zeros and zeros.count(0) > 0.8 * len(zeros):
+            return content.decode(encoding, "replace")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return content.decode("latin-1")
+        return content.decode("cp1252") if not set(content) & NOT_WINDOWS else content.decode("latin-1")
+
+
+def read_text(path: str | Path, what: str) -> str:
+    """Text of a file in any of these encodings; `what` names it in messages. Raises `InputError`."""
+    return decoded(read_bytes(path, what))
 
 
 def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], replace: bool = False) -> list[Path]:

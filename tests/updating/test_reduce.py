@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.tables import parse_table
 from toolpath_stiff.updating.readings.measurements import read_measurements
-from toolpath_stiff.updating.readings.raw_records import read_raw, reduce_loop
+from toolpath_stiff.updating.readings.raw_records import COLUMNS, read_raw, reduce_loop
 
 HEADING = "x_mm,y_mm,z_mm,direction,point,jog_um,force_N,displacement_um\n"
 JOGS = (0.0, 100.0, 200.0, 100.0, 0.0, -100.0, -200.0, -100.0, 0.0)
@@ -36,7 +37,7 @@ def records(stiffness: float, gauge: float, gap: float = 0.0, friction: float = 
 
 
 def reduced(text: str):
-    (loop,) = read_raw(HEADING + text, "raw.csv")
+    (loop,) = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS))
     return reduce_loop(loop)
 
 
@@ -88,7 +89,7 @@ def test_drift_opens_the_loop():
 
 def test_loops_are_told_apart_and_come_in_order():
     text = records(40.0, 30.0, where="0,0,800,Z,B") + records(30.0, 30.0) + records(35.0, 30.0, where="0,0,800,Y,B")
-    loops = read_raw(HEADING + text, "raw.csv")
+    loops = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS))
     assert [loop.place["direction"] + loop.place["point"] for loop in loops] == ["ZB", "XA", "YB"]
     assert [round(reduce_loop(loop).stiffness / 1e6, 6) for loop in loops] == [40.0, 30.0, 35.0]
 
@@ -174,7 +175,7 @@ def test_the_raw_file_is_never_overwritten(raw, capsys):
 def test_all_bad_loops_are_named():
     text = HEADING + "0,0,800,X,A,0,x,0\n0,0,800,Y,A,0,0,y\n"
     with pytest.raises(InputErrors) as caught:
-        read_raw(text, "raw.csv")
+        read_raw(parse_table(text, "raw.csv", COLUMNS))
     assert [error.line for error in caught.value.errors] == [2, 3]
     with pytest.raises(InputError):
-        read_raw("a\n", "raw.csv")
+        read_raw(parse_table("a\n", "raw.csv", COLUMNS))

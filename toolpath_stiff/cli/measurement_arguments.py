@@ -12,7 +12,12 @@ from toolpath_stiff.hints import MACHINE, STRUT_SPREAD, Asked
 
 def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherwise: str = "") -> None:
     """DATA, --machine and --effects."""
-    parser.add_argument("data", nargs=nargs, metavar="DATA", help="measurement files, or nist-table1" + otherwise)
+    parser.add_argument(
+        "data",
+        nargs=nargs,
+        metavar="DATA",
+        help="measurement files (CSV, or FILE.xlsx[#SHEET]), or nist-table1" + otherwise,
+    )
     parser.add_argument(
         "--machine", default=MACHINE, metavar="NAME|FILE", help=f"machine name or file (default: {MACHINE})"
     )

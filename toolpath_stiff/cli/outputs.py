@@ -28,10 +28,13 @@ def add_replace_option(parser: argparse.ArgumentParser, *, force: bool = True) -
 
 
 def inputs_of(args: argparse.Namespace) -> Iterator[str]:
-    """Every argument that may name a file to read."""
+    """Every argument that may name a file to read; of a workbook's sheet, the workbook."""
+    from toolpath_stiff.tables import split_name
+
     for name, value in vars(args).items():
         if name not in DESTINATIONS:
-            yield from (one for one in (value if isinstance(value, list) else [value]) if isinstance(one, str) and one)
+            named = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, str) and one]
+            yield from (split_name(one)[0] for one in named)
 
 
 def check_written(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.updating.readings.raw_records import Loop, LoopFigures
 
 EPILOG = """\
-columns of RAW.csv:
+columns of RAW:
   x_mm,y_mm,z_mm,direction     where and along what (X, Y, Z; or dx,dy,dz), optionally a_deg,b_deg,c_deg
   jog_um                       how far the machine was told to move from zero
   force_N,displacement_um      gauge and indicator, positive the way the jog counts
@@ -30,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("raw", metavar="RAW.csv", help="raw records")
+    parser.add_argument("raw", metavar="RAW", help="raw records: CSV, or FILE.xlsx[#SHEET]")
     parser.add_argument(
         "--out", metavar="FILE", help="measurement file to write (default: <name>_measurements.csv); loops go beside it"
     )
@@ -41,12 +42,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
-    from toolpath_stiff.files import read_text, write_atomically
-    from toolpath_stiff.updating.readings.raw_records import measurement_csv, read_raw, reduce_loops
+    from toolpath_stiff.files import write_atomically
+    from toolpath_stiff.tables import read_table, split_name
+    from toolpath_stiff.updating.readings.raw_records import COLUMNS, measurement_csv, read_raw, reduce_loops
 
-    loops = read_raw(read_text(args.raw, "raw records"), args.raw)
+    raw = read_table(args.raw, "raw records", COLUMNS)
+    loops = read_raw(raw)
     figures = reduce_loops(loops, args.raw)
-    out = Path(args.out or f"{Path(args.raw).stem}_measurements.csv")
+    out = Path(args.out or f"{Path(split_name(args.raw)[0]).stem}_measurements.csv")
     picture = None if args.no_plots else out.with_name(f"{out.stem}_loops.png")
     replaced = check_written(args, [out, picture])
     png = b""
@@ -58,6 +61,8 @@ def run(args: argparse.Namespace) -> int:
     write_atomically(out, measurement_csv(loops, figures))
     if picture is not None:
         write_atomically(picture, png)
+    for note in raw.notes:
+        print(f"tps: note: {note}", file=sys.stderr)
     written = [str(path) for path in (out, picture) if path is not None]
     if args.json:
         print(json.dumps({"loops": describe(loops, figures), "files": written}, indent=2, ensure_ascii=False))

@@ -6,13 +6,14 @@ so on). A bad row is named with its line; all bad rows of a file are reported to
 
 from __future__ import annotations
 
-import csv
 import difflib
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
@@ -23,6 +24,13 @@ LABELS = ("setup", "clamp", "repeat", "point", "loop")
 WIDE = tuple(f"measured_{axis}_N_per_mm" for axis in "xyz")
 WIDE_MODEL = tuple(f"modeled_{axis}_N_per_mm" for axis in "xyz")
 OPTIONAL = ("force_N", "sd_N_per_mm", *LABELS, "time_min", "tool_extension_mm", "temperature_C")
+COLUMNS = Columns(
+    numbers=(
+        *POSITION, *ANGLES, *VECTOR, "stiffness_N_per_mm", "displacement_um", "force_N", "sd_N_per_mm", "time_min",
+        "tool_extension_mm", "temperature_C", *WIDE, *WIDE_MODEL,
+    ),
+    texts=("direction", *LABELS),
+)  # fmt: skip
 KNOWN = (*POSITION, *ANGLES, "direction", *VECTOR, "stiffness_N_per_mm", "displacement_um", *OPTIONAL)
 
 # N/mm: no machine is softer than 0.1 N/um or stiffer than 10 kN/um; beyond, the unit is not N/mm.
@@ -37,6 +45,7 @@ BOUNDS = {
     "time_min": (0.0, 1e6),
     "temperature_C": (-50.0, 200.0),
 }
+DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be their quotient, rounding allowed
 
 
@@ -88,13 +97,13 @@ class RowFile:
     notes: tuple[str, ...]
 
 
-def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
-    """Read a measurement file.
+def read_rows(table: Table, planned: bool = False) -> RowFile:
+    """Rows of a measurement file.
 
     Parameters
     ----------
-    text, file
-        Content and name.
+    table
+        As `tables.read_table` reads it with `COLUMNS`.
     planned
         Whether the stiffness may be left empty (a plan of measurements).
 
@@ -105,17 +114,13 @@ def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
     InputErrors
         Bad rows, all of them.
     """
-    table = list(table_lines(text, file))
-    if not table:
-        raise InputError("the file is empty", expected="a heading and rows of measurements", file=file)
-    (line, heading), body = table[0], table[1:]
-    heading = [name.strip() for name in heading]
+    file, heading, line = table.file, list(table.heading), table.heading_line
     _check_heading(heading, file, line, planned)
-    if not body:
+    if not table.rows:
         raise InputError("no rows below the heading", expected="one row a measured stiffness", file=file, line=line)
     known = {*KNOWN, *WIDE, *WIDE_MODEL}
-    more = [name for name in heading if name not in known and _all_numbers(body, heading.index(name))]
-    notes = [
+    more = [name for name in heading if name not in known and _all_numbers(table, heading.index(name))]
+    notes = [*table.notes] + [
         f"{file}: column {name} holds text and is not used"
         for name in heading
         if name not in known and name not in more
@@ -124,12 +129,9 @@ def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
         notes.append(f"{file}: the printed model values (modeled_x_N_per_mm and so on) are not used")
     rows: list[Row] = []
     errors: list[InputError] = []
-    for line, cells in body:
+    for line, cells in table.rows:
         try:
-            if len(cells) != len(heading):
-                raise InputError(f"row with {len(cells)} cells", expected=f"{len(heading)} as in the heading")
-            record = dict(zip(heading, (cell.strip() for cell in cells), strict=True))
-            rows += _rows_of(record, more, file, line, planned)
+            rows += _rows_of(table.record(cells), more, file, line, planned)
         except InputError as error:
             errors.append(InputError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
     errors += duplicates(rows)
@@ -137,17 +139,6 @@ def read_rows(text: str, file: str, planned: bool = False) -> RowFile:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
     columns = {name for name in heading if name in KNOWN}
     return RowFile(tuple(rows), frozenset(columns), tuple(notes))
-
-
-def table_lines(text: str, file: str) -> Iterator[tuple[int, list[str]]]:
-    """Line number and cells of every line that is neither empty nor a comment. Raises `InputError`."""
-    reader = csv.reader(text.splitlines())
-    try:
-        for cells in reader:
-            if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
-                yield reader.line_num, cells
-    except csv.Error as error:  # a quote that never ends, say
-        raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
 
 
 def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:
@@ -181,9 +172,9 @@ def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> N
         refuse("no measured stiffness", expected="stiffness_N_per_mm, or force_N with displacement_um")
 
 
-def _all_numbers(body: list[tuple[int, list[str]]], column: int) -> bool:
+def _all_numbers(table: Table, column: int) -> bool:
     try:
-        return all(math.isfinite(float(cells[column])) for _, cells in body)
+        return all(math.isfinite(float(cells[column])) for _, cells in table.rows)
     except (ValueError, IndexError):
         return False
 
@@ -256,11 +247,12 @@ def number(record: Mapping[str, str], name: str) -> float:
     """A cell that must hold a finite number within `BOUNDS`."""
     text = record[name]
     try:
-        value = float(text)
+        value = math.nan if "_" in text else float(text)  # Python's own "1_000" is no number of an office
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"{name} = {text!r}", expected="a finite number")
+        dated = "the spreadsheet has made a date of it" if DATE.match(text) else ""
+        raise InputError(f"{name} = {text!r}", expected="a finite number", hint=dated)
     low, high = BOUNDS.get(name, (-math.inf, math.inf))
     if not low <= value <= high:
         doubt = "; is the unit right?" if value > 0.0 else ""

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.files import read_text
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
@@ -20,7 +19,16 @@ from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
-from toolpath_stiff.updating.readings.measurement_rows import LABELS, OPTIONAL, Row, RowFile, duplicates, read_rows
+from toolpath_stiff.tables import parse_table, read_table
+from toolpath_stiff.updating.readings.measurement_rows import (
+    COLUMNS,
+    LABELS,
+    OPTIONAL,
+    Row,
+    RowFile,
+    duplicates,
+    read_rows,
+)
 
 FloatArray = NDArray[np.float64]
 TextArray = NDArray[np.str_]
@@ -127,7 +135,7 @@ def read_measurements(
     Parameters
     ----------
     paths
-        One or several CSV files; `nist-table1` is the paper's Table 1.
+        One or several files, CSV or .xlsx (`FILE.xlsx#SHEET`); `nist-table1` is the paper's Table 1.
     machine
         The machine that was measured; its poses are checked against it.
     planned
@@ -165,7 +173,7 @@ def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
     """One file; its bad rows are handed back, so that those of all files are reported together."""
     if name == NIST_TABLE_1:
         text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
-        table = read_rows(text, NIST_TABLE_1)
+        table = read_rows(parse_table(text, NIST_TABLE_1, COLUMNS))
         rows = tuple(
             replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
             for row in table.rows
@@ -173,7 +181,7 @@ def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
         note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
         return RowFile(rows, table.columns | {"setup"}, (*table.notes, note))
     try:
-        return read_rows(read_text(name, "measurements"), name, planned)
+        return read_rows(read_table(name, "measurements", COLUMNS), planned)
     except InputErrors as bad:
         return bad
 

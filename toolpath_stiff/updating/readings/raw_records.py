@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_um, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.readings.measurement_rows import (
     ANGLES,
@@ -29,7 +30,6 @@ from toolpath_stiff.updating.readings.measurement_rows import (
     direction_of,
     number,
     optional_number,
-    table_lines,
 )
 
 FloatArray = NDArray[np.float64]
@@ -37,6 +37,9 @@ FloatArray = NDArray[np.float64]
 READINGS = ("jog_um", "force_N", "displacement_um")
 PLACE = (*POSITION, *ANGLES, "direction", *VECTOR, *LABELS, "tool_extension_mm")  # what one loop has in common
 CONDITIONS = ("time_min", "temperature_C")
+COLUMNS = Columns(
+    numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", *READINGS, *CONDITIONS), texts=("direction", *LABELS)
+)
 SIGNED = {"force_N": 1e7, "displacement_um": 1e6, "jog_um": 1e6}  # largest magnitude, either sign
 SAME_JOG = 1e-9  # m: jogs this close are the same step
 FIGURES = ("lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
@@ -111,8 +114,8 @@ class LoopFigures:
     closure: float
 
 
-def read_raw(text: str, file: str) -> list[Loop]:
-    """Loops of a file of raw records, in the order of their first record.
+def read_raw(table: Table) -> list[Loop]:
+    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`), in the order of their first record.
 
     Raises
     ------
@@ -121,21 +124,15 @@ def read_raw(text: str, file: str) -> list[Loop]:
     InputErrors
         Bad records, all of them.
     """
-    table = list(table_lines(text, file))
-    if not table:
-        raise InputError("the file is empty", expected="a heading and raw records", file=file)
-    (line, heading), body = table[0], table[1:]
-    heading = [name.strip() for name in heading]
-    _check_heading(heading, file, line)
-    if not body:
-        raise InputError("no records below the heading", file=file, line=line)
+    file = table.file
+    _check_heading(list(table.heading), file, table.heading_line)
+    if not table.rows:
+        raise InputError("no records below the heading", file=file, line=table.heading_line)
     groups: dict[tuple[str, ...], list[tuple[int, dict[str, str], list[float]]]] = {}
     errors = []
-    for line, cells in body:
+    for line, cells in table.rows:
         try:
-            if len(cells) != len(heading):
-                raise InputError(f"row with {len(cells)} cells", expected=f"{len(heading)} as in the heading")
-            record = dict(zip(heading, (cell.strip() for cell in cells), strict=True))
+            record = table.record(cells)
             for name in (*POSITION, *(angle for angle in ANGLES if angle in record)):
                 number(record, name)
             direction_of(record)

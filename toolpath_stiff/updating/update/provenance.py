@@ -5,16 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import read_bytes
 from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty
 from toolpath_stiff.stiffness.effects.contract import SETUP
+from toolpath_stiff.tables import split_name
 from toolpath_stiff.updating.inference.fit import Fit
 from toolpath_stiff.updating.inference.predict import scaled_law
 from toolpath_stiff.updating.readings.measurements import NIST_TABLE_1
@@ -33,10 +33,7 @@ def data_hash(files: Sequence[str]) -> str:
 def _bytes(file: str) -> bytes:
     if file == NIST_TABLE_1:
         return (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_bytes()
-    try:
-        return Path(file).read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot read {file!r}: {error.strerror}") from None
+    return read_bytes(split_name(file)[0], "measurements")
 
 
 def fitted_machine(

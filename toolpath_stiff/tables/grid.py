@@ -1,0 +1,32 @@
+"""Cells of a table as they stand, before anything is read into them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+SPREADSHEET_ERROR = re.compile(r"#[A-ZÄÖÜ][A-ZÄÖÜ0-9/_]*[!?]|#N/A|#N/?V")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Line (row of a sheet) and cells of every row that is neither empty nor a comment.
+
+    `separator` is "" for a sheet; `merged` are cells that are merged side by side, row -> which.
+    """
+
+    rows: list[tuple[int, list[str]]]
+    separator: str
+    notes: tuple[str, ...] = ()
+    merged: Mapping[int, str] = field(default_factory=dict)
+
+
+def typed(cell: str) -> str:
+    """A cell without space around it; the printer's minus as a keyboard's."""
+    return cell.strip().replace("\u2212", "-")
+
+
+def counts(cells: list[str]) -> bool:
+    """Whether a row is neither empty nor a comment; an error of the spreadsheet begins like one."""
+    return any(cells) and (not cells[0].startswith("#") or bool(SPREADSHEET_ERROR.fullmatch(cells[0])))

@@ -1,0 +1,266 @@
+"""Tables as offices write them, to one form: headings by their known names, numbers with a decimal point.
+
+Text with commas, semicolons or tabs between the cells, decimal commas, a byte-order mark, UTF-16 or Latin-1, any line
+ends; or a sheet of an Excel workbook (`workbook`). Titles above the heading are passed over, a row of units below
+it is held against the headings. What could mean two things ("1,234") is refused.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.files import decoded, read_bytes
+from toolpath_stiff.tables.grid import SPREADSHEET_ERROR, Grid, counts, typed
+from toolpath_stiff.tables.marks import with_points
+from toolpath_stiff.tables.workbook import is_workbook, sheet_grid, split_name
+
+SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
+LOOKED_AT = 20  # rows among which the heading is searched
+HEADING_FROM = 3  # known columns in a row make it the heading, so that titles may stand above it
+# Tokens of units, as `_key` makes them: those of the columns and those that stand there by mistake.
+LENGTHS, FORCES = ("nm", "um", "mm", "cm", "m", "in", "inch"), ("n", "kn")
+OTHERS = ("n_per_um", "n_per_mm", "n_per_m", "kn_per_mm", "deg", "rad", "mrad", "s", "min", "h", "c", "k", "f", "%")
+UNITS = frozenset((*LENGTHS, *FORCES, *OTHERS))
+SAME_TOKEN = {"degc": "c", "degrees": "deg", "minutes": "min", "micron": "um", "microns": "um"}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns that a kind of table may have: those of numbers, named with their units, and those of text."""
+
+    numbers: tuple[str, ...]
+    texts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Table:
+    """A heading and rows of cells.
+
+    Attributes
+    ----------
+    file
+        For messages.
+    heading, heading_line
+        Known columns by their names, others as they stand; the line that it stands on.
+    rows
+        Line (row of a sheet) and cells, stripped; numbers have a decimal point.
+    separator
+        Between the cells of a text file; "" for a sheet.
+    notes
+        What was read differently from how it is written, in words.
+    """
+
+    file: str
+    heading: tuple[str, ...]
+    heading_line: int
+    rows: tuple[tuple[int, tuple[str, ...]], ...]
+    separator: str
+    notes: tuple[str, ...] = ()
+
+    def record(self, cells: Sequence[str]) -> dict[str, str]:
+        """Column -> cell of one row. Raises `InputError` where a row has too few or too many."""
+        if len(cells) == len(self.heading):
+            return dict(zip(self.heading, cells, strict=True))
+        comma = self.separator == "," and len(cells) > len(self.heading)
+        raise InputError(
+            f"row with {len(cells)} cells",
+            expected=f"{len(self.heading)} as in the heading",
+            hint="a decimal comma between commas? Write semicolons between the cells" if comma else "",
+        )
+
+
+def read_table(path: str, what: str, columns: Columns) -> Table:
+    """Read a table from a text file or an Excel workbook, whatever its name ends in.
+
+    Parameters
+    ----------
+    path
+        The file; `FILE.xlsx#SHEET` names the sheet, else it is the first that is not empty.
+    what
+        What the file holds, for messages.
+    columns
+        What it may have.
+
+    Raises
+    ------
+    InputError, InputErrors
+        The file cannot be read, is empty, or its cells can be read in two ways; with line and column.
+    """
+    workbook, sheet = split_name(path)
+    content = read_bytes(workbook, what)
+    if is_workbook(content):
+        return _table(sheet_grid(content, workbook, sheet), path, columns)
+    if sheet:
+        raise InputError(f"{workbook!r} is not an Excel workbook and has no sheets", file=path)
+    return parse_table(decoded(content), path, columns)
+
+
+def parse_table(text: str, file: str, columns: Columns) -> Table:
+    """The same from the text of a file."""
+    return _table(_text_grid(text, file, columns), file, columns)
+
+
+def _text_grid(text: str, file: str, columns: Columns) -> Grid:
+    declared = re.match(r"\ufeff?sep=(.)\s*[\r\n]", text, re.IGNORECASE)  # Excel's own first line
+    if declared and declared[1] in SEPARATORS:
+        return Grid(list(_lines(text, file, declared[1]))[1:], declared[1])
+    known = _known(columns)
+    scored = []
+    for rank, separator in enumerate(SEPARATORS):
+        first = []
+        for row in _lines(text, file, separator, strict=False):
+            first.append(row[1])
+            if len(first) == LOOKED_AT:
+                break
+        best = max((_score(cells, known) for cells in first), default=0)
+        scored.append((best, max((len(cells) for cells in first), default=0), -rank, separator))
+    separator = max(scored)[-1]
+    return Grid(list(_lines(text, file, separator)), separator)
+
+
+def _lines(text: str, file: str, separator: str, strict: bool = True) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of every line that is neither empty nor a comment. Raises `InputError`."""
+    reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
+    try:
+        for cells in reader:
+            stripped = [typed(cell) for cell in cells]
+            if counts(stripped):
+                yield reader.line_num, stripped
+    except csv.Error as error:  # a quote that never ends, say
+        if strict:
+            raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
+
+
+def _table(grid: Grid, file: str, columns: Columns) -> Table:
+    if not grid.rows:
+        raise InputError("the file is empty", expected="a heading and rows below it", file=file)
+    known = _known(columns)
+    top = min(len(grid.rows), LOOKED_AT)
+    scores = [_score(cells, known) for _, cells in grid.rows[:top]]
+    at = next((i for i, score in enumerate(scores) if score >= HEADING_FROM), 0)
+    line, written = grid.rows[at]
+    body = grid.rows[at + 1 :]
+    notes = list(grid.notes)
+    if at:
+        notes.append(f"{file}: what stands above the heading in line {line} is passed over")
+    units: list[str] = []
+    if body and _is_unit_row(body[0][1], written):
+        units = body[0][1]
+        notes.append(f"{file}: line {body[0][0]} is a row of units")
+        body = body[1:]
+    width = max((i + 1 for _, cells in [grid.rows[at], *body] for i, cell in enumerate(cells) if cell), default=0)
+    written = (written + [""] * width)[:width] if grid.separator == "" or len(written) > width else written
+    _refuse_merged(grid, written, file, line)
+    heading = [_name(cell, unit, known, file, line) for cell, unit in _paired(written, units)]
+    renamed = [f"{old!r} as {new}" for old, new in zip(written, heading, strict=True) if old != new]
+    if renamed:
+        notes.append(f"{file}: headings are read by their known names: {', '.join(renamed)}")
+    rows = [(at_line, _fitted(cells, len(heading), grid.separator == "")) for at_line, cells in body]
+    _refuse_spreadsheet_errors(heading, rows, file)
+    numbers = [i for i, name in enumerate(heading) if name not in columns.texts]
+    rows, commas = with_points(heading, rows, numbers, grid.separator, file)
+    if commas:
+        notes.append(f"{file}: numbers are read with decimal commas")
+    return Table(file, tuple(heading), line, tuple((n, tuple(c)) for n, c in rows), grid.separator, tuple(notes))
+
+
+def _fitted(cells: list[str], width: int, pad: bool) -> list[str]:
+    """Without empty cells beyond the heading; those of a sheet are as long as the heading."""
+    while len(cells) > width and not cells[-1]:
+        cells = cells[:-1]
+    return cells + [""] * (width - len(cells)) if pad else cells
+
+
+def _paired(written: list[str], units: list[str]) -> Iterator[tuple[str, str]]:
+    return zip(written, (units + [""] * len(written))[: len(written)], strict=True)
+
+
+def _key(name: str) -> str:
+    """A heading without case, brackets, spaces and signs: `Stiffness [N/mm]` and `stiffness_N_per_mm` are one."""
+    text = unicodedata.normalize("NFKC", name.replace("°", "deg").replace("º", "deg")).casefold()
+    tokens = re.findall(r"[^\W_]+|%", text.replace("μ", "u").replace("/", " per "))
+    return "_".join(SAME_TOKEN.get(token, token) for token in tokens)
+
+
+def _known(columns: Columns) -> dict[str, str]:
+    """Key -> name of every column."""
+    return {_key(name): name for name in (*columns.numbers, *columns.texts)}
+
+
+def _meant(key: str, known: Mapping[str, str]) -> str | None:
+    """The known column that a heading with no unit, or with another one, means."""
+    for own, name in known.items():
+        base = next((own[: -len(unit) - 1] for unit in sorted(UNITS, key=len, reverse=True) if _ends(own, unit)), None)
+        if base and (key == base or (key.startswith(f"{base}_") and key[len(base) + 1 :] in UNITS)):
+            return name
+    return None
+
+
+def _ends(key: str, unit: str) -> bool:
+    return key.endswith(f"_{unit}") and len(key) > len(unit) + 1
+
+
+def _score(cells: Sequence[str], known: Mapping[str, str]) -> int:
+    """How many cells of a row are headings."""
+    keys = {_key(cell) for cell in cells if cell}
+    return sum(key in known or _meant(key, known) is not None for key in keys)
+
+
+def _is_unit_row(cells: Sequence[str], heading: Sequence[str]) -> bool:
+    """Whether the cells are units, empty, a dash, or (merged cells) the heading once more; and one is a unit."""
+    units = [cell for cell, above in zip(cells, [*heading, *[""] * len(cells)], strict=False) if cell != above]
+    return any(_key(cell) in UNITS for cell in units) and all(
+        _key(cell) in UNITS or not cell.strip("-–[]() ") for cell in units
+    )
+
+
+def _name(written: str, unit: str, known: Mapping[str, str], file: str, line: int) -> str:
+    """The known name of a heading and the unit below it; others as they stand. Raises `InputError`."""
+    key, unit_key = _key(written), _key(unit)
+    if not key:
+        return written
+    bare = unit_key not in UNITS
+    if not bare and f"{key}_{unit_key}" in known:
+        return known[f"{key}_{unit_key}"]
+    name = known.get(key) or _meant(key, known)
+    if name is None:
+        return written
+    if key in known and (bare or _ends(key, unit_key)):
+        return name
+    if not bare:
+        found = f"column {written!r} with {unit!r} in the row of units"
+    elif any(_ends(key, other) for other in UNITS):
+        found = f"unknown column {written!r} (in another unit?)"
+    else:
+        found = f"column {written!r} has no unit"
+    raise InputError(
+        found, expected=name, hint=f"did you mean {name}? Otherwise give it another name", file=file, line=line
+    )
+
+
+def _refuse_merged(grid: Grid, heading: Sequence[str], file: str, line: int) -> None:
+    if "" in heading and grid.merged and line in grid.merged:
+        raise InputError(
+            f"merged cells in the heading: {grid.merged[line]}",
+            expected="one heading a column",
+            hint="split the merged cells, or leave them in a row above the heading",
+            file=file,
+            line=line,
+        )
+
+
+def _refuse_spreadsheet_errors(heading: Sequence[str], rows: list[tuple[int, list[str]]], file: str) -> None:
+    errors = [
+        InputError(f"{name} = {cell}, an error of the spreadsheet", expected="a value", file=file, line=line)
+        for line, cells in rows
+        for name, cell in zip(heading, cells, strict=False)
+        if SPREADSHEET_ERROR.fullmatch(cell)
+    ]
+    if errors:
+        raise InputErrors(errors)
