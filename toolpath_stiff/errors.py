@@ -63,3 +63,16 @@ class InputErrors(TpsError):
 
 class UnreachableError(InputError):
     """A pose that the machine cannot take: a limit exceeded, or a singular configuration."""
+
+
+class EffectFault(TpsError):
+    """A user's own effect does not do what the contract asks: where, what it did, what was expected.
+
+    Not an `InputError`: fits take those for values to walk away from, and a fault must end them. Keywords as there.
+    """
+
+    def __init__(
+        self, found: str, *, expected: str = "", hint: str = "", file: str | None = None, line: int | None = None
+    ) -> None:
+        self.found, self.file, self.line = found, file, line
+        super().__init__(str(InputError(found, expected=expected, hint=hint, file=file, line=line)))

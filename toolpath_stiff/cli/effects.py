@@ -16,11 +16,13 @@ from toolpath_stiff.hints import command_line, hint, options
 if TYPE_CHECKING:
     from toolpath_stiff.stiffness.effects import Effect, Parameter
 
+CHECK_FAILED = 1
 EPILOG = """\
 examples:
   tps effects list
   tps effects show platform_flexibility
   tps effects new my_screw.py            a working effect to change into yours
+  tps effects check my_screw.py          shapes, symmetry, units, neutral value, speed; exit code 1 if it fails
   tps effects list --effects my_screw.py
 
 Machine files carry effects as [[effect]], those that act on readings as [[instrument]].
@@ -31,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    actions = parser.add_subparsers(dest="action", metavar="list|show|new", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="list|show|new|check", required=True)
     listing = actions.add_parser("list", help="all effects, in the order of the load path")
     showing = actions.add_parser("show", help="equation, parameters, units, bounds, typical values and their source")
     showing.add_argument("name", metavar="NAME", help="name of the effect")
@@ -40,6 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "--effects", action="append", default=[], metavar="FILE.py", help="file with your own physical effects"
         )
         add_json_option(sub, "print JSON")
+    checking = actions.add_parser("check", help="try the effects of a file against the contract")
+    checking.add_argument("file", metavar="FILE.py", help="file with your own physical effects")
+    checking.add_argument("--machine", default="nist", metavar="NAME|FILE", help="to try them on (default: nist)")
+    add_json_option(checking, "print JSON")
     writing = actions.add_parser("new", help="write a commented, working example of an effect")
     writing.add_argument("file", metavar="FILE.py", help="file to write")
     add_replace_option(writing)
@@ -49,6 +55,8 @@ def run(args: argparse.Namespace) -> int:
     """List, show or write."""
     if args.action == "new":
         return write_template(args.file, check_new(args, args.file))
+    if args.action == "check":
+        return check(args)
     from toolpath_stiff.stiffness.effects import find_effect, known_effects
     from toolpath_stiff.stiffness.effects.registry import installed_effects
 
@@ -63,6 +71,32 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(table(effects, broken))
     return 0
+
+
+def check(args: argparse.Namespace) -> int:
+    """Try every effect of a file; exit code 1 if one fails."""
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.stiffness.effects import effects_from_file, known_effects
+    from toolpath_stiff.stiffness.effects.trial import try_effect
+
+    machine = load_machine(args.machine)
+    known_effects([args.file])  # names that are taken
+    trials = [try_effect(effect, machine) for effect in effects_from_file(args.file).values()]
+    good = all(trial.passed for trial in trials)
+    if args.json:
+        rows = [
+            {"effect": t.effect.name, "passed": t.passed, "checks": [vars(outcome) for outcome in t.outcomes]}
+            for t in trials
+        ]
+        print(_as_json({"file": args.file, "machine": machine.name, "passed": good, "effects": rows}))
+        return 0 if good else CHECK_FAILED
+    words = {True: "good", False: "FAILS", None: "note"}
+    for trial in trials:
+        print(f"{trial.effect.name}, on machine {machine.name}: {'good' if trial.passed else 'FAILS'}")
+        width = max(len(outcome.name) for outcome in trial.outcomes)
+        for outcome in trial.outcomes:
+            print(f"  {words[outcome.passed]:<5}  {outcome.name:<{width}}  {outcome.found}")
+    return 0 if good else CHECK_FAILED
 
 
 def describe(effect: Effect) -> dict[str, object]:

@@ -20,12 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.stiffness.shared_load import SharedLoad, settle
 from toolpath_stiff.units import mm_from_m
 
 FloatArray = NDArray[np.float64]
+
+NOT_POSITIVE = -1e-10  # of the largest eigenvalue: below, it is no rounding
 
 
 @dataclass(frozen=True)
@@ -61,12 +64,11 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
     loads: FloatArray | None = None
     parallel: FloatArray | None = None
     for active in model.effects:
-        effect, values = active.effect, active.values
-        if (effect.load_dependent and path.strut_forces is None) or not effect.acts_on(path, values):
+        if active.effect.load_dependent and path.strut_forces is None:
             continue
-        series = effect.strut_compliance(path, values)
-        form = effect.load_compliance(path, values)
-        beside = effect.parallel_stiffness(path, values)
+        series = active.adds("strut_compliance", path)
+        form = active.adds("load_compliance", path)
+        beside = active.adds("parallel_stiffness", path)
         strut = strut if series is None else strut + series
         loads = form if loads is None else loads if form is None else loads + form
         parallel = beside if parallel is None else parallel if beside is None else parallel + beside
@@ -139,7 +141,7 @@ def wrench_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n, 6, 6) compliance of the tip for forces and moments; load-dependent effects are not in it."""
     wrenches = np.broadcast_to(np.eye(6), (len(path), 6, 6))
     twists, _ = respond(path, assemble_links(model, path), wrenches)
-    return np.asarray(0.5 * (twists + np.swapaxes(twists, 1, 2)))
+    return _possible(model, path, np.asarray(0.5 * (twists + np.swapaxes(twists, 1, 2))))
 
 
 def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
@@ -148,7 +150,7 @@ def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     wrenches[:, :3] = np.eye(3)
     twists, _ = respond(path, assemble_links(model, path), wrenches)
     compliance = twists[:, :3]
-    return np.asarray(0.5 * (compliance + np.swapaxes(compliance, 1, 2)))
+    return _possible(model, path, np.asarray(0.5 * (compliance + np.swapaxes(compliance, 1, 2))))
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,8 @@ def under_load(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> 
 
 def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
     """(n,) m/N, displacement along unit vectors (n, 3) per force along them; see `under_load`."""
-    return np.asarray(np.einsum("ni,ni->n", under_load(model, path, direction).twists[:, :3], direction))
+    along = np.asarray(np.einsum("ni,ni->n", under_load(model, path, direction).twists[:, :3], direction))
+    return _possible(model, path, along[:, None, None])[:, 0, 0]
 
 
 def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenches: FloatArray) -> LoadPath:
@@ -228,4 +231,32 @@ def _unsettled(model: StiffnessModel, path: LoadPath, row: int) -> InputError:
         f"the strut forces do not settle at X{x:.1f} Y{y:.1f} Z{z:.1f} (mm) under {path.force[row]:g} N with {names}",
         expected="a stretch of each strut that grows with its force",
         hint="check the parameters of these effects",
+    )
+
+
+def _possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> FloatArray:
+    """The compliance (n, k, k) itself; refused where effects from outside the package make it not positive definite.
+
+    Raises
+    ------
+    InputError
+        With these effects and the pose; a fit walks away from there.
+    """
+    names = [active.effect.name for active in model.effects if guard.is_foreign(active.effect)]
+    if not names or not len(compliance):
+        return compliance
+    finite = np.asarray(np.isfinite(compliance).all(axis=(1, 2)))
+    eigenvalues = np.linalg.eigvalsh(np.where(finite[:, None, None], compliance, np.eye(compliance.shape[1])))
+    bad = np.asarray(eigenvalues[:, 0] <= NOT_POSITIVE * np.abs(eigenvalues).max(axis=1))
+    if not finite.all():  # a singular pose has no answer with or without the effects
+        regular = np.isfinite(_solve(path.struts.jacobian, path.struts.directions[..., :1])).all(axis=(1, 2))
+        bad = np.asarray(bad | (~finite & regular))
+    if not bad.any():
+        return compliance
+    x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[int(np.argmax(bad))])
+    those = f"effect{'s' if len(names) > 1 else ''} {', '.join(names)}"
+    raise InputError(
+        f"with {those} the tip has no positive stiffness at X{x:g} Y{y:g} Z{z:g} mm",
+        expected="a compliance that is positive definite",
+        hint="`tps effects check FILE.py` tries an effect by itself",
     )

@@ -15,6 +15,7 @@ from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.machine.uncertainty import STRUT_LAW, with_parameter
 from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
+from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Conditions, Effect, LoadPath, read_parameters
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.stiffness.effects.registry import find_effect, known_effects
@@ -28,6 +29,28 @@ class ActiveEffect:
 
     effect: Effect
     values: Mapping[str, float]
+
+    def adds(self, hook: str, path: LoadPath) -> FloatArray | None:
+        """What `strut_compliance`, `load_compliance` or `parallel_stiffness` returns; None where it does not act.
+
+        Raises `EffectFault`.
+        """
+        if not self.effect.acts_on(path, self.values):
+            return None
+        return guard.added(self.effect, hook, path, self.values)
+
+    def geometry(self, machine: Machine) -> Machine:
+        """The machine with the effect's geometry. Raises `EffectFault`."""
+        return guard.changed_geometry(self.effect, machine, self.values)
+
+    def reading(self, stiffness: FloatArray, path: LoadPath) -> FloatArray:
+        """What an instrument shows, (n,) N/m, for a true stiffness; the same where it does not act.
+
+        Raises `EffectFault`.
+        """
+        if not self.effect.acts_on(path, self.values):
+            return stiffness
+        return guard.read_off(self.effect, stiffness, path, self.values)
 
 
 @dataclass(frozen=True)
@@ -126,9 +149,9 @@ def _assembled(
     """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
     machine = control = given
     for active in acting:
-        machine = active.effect.geometry(machine, active.values)
+        machine = active.geometry(machine)
         if not active.effect.unknown_to_control:
-            control = active.effect.geometry(control, active.values)
+            control = active.geometry(control)
     deceived = any(active.effect.unknown_to_control for active in acting)
     return StiffnessModel(machine, tuple(acting), tuple(reading), control if deceived else None, given, conditions)
 

@@ -14,10 +14,12 @@ from types import ModuleType
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.stiffness.effects.contract import LINKS, Effect, Parameter
+from toolpath_stiff.stiffness.effects.contract import LINKS, Effect
+from toolpath_stiff.stiffness.effects.declarations import check_declarations
+from toolpath_stiff.stiffness.effects.guard import line_in
 
 ENTRY_POINTS = "toolpath_stiff.effects"
-NOT_EFFECTS = ("contract", "registry")
+NOT_EFFECTS = ("contract", "declarations", "guard", "registry", "trial")
 
 
 @cache
@@ -42,7 +44,7 @@ def installed_effects() -> tuple[dict[str, Effect], dict[str, str]]:
         try:
             loaded = point.load()
             effect = loaded() if isinstance(loaded, type) else loaded
-            _check(effect, point.name)
+            check_declarations(effect, point.name)
             if effect.name in packaged_effects() or effect.name in found:
                 raise InputError(f"effect {effect.name} exists already")
             found[effect.name] = effect
@@ -87,43 +89,54 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
 
 
 def effects_from_file(file: str | Path) -> dict[str, Effect]:
-    """Name -> effect of every `Effect` subclass that a Python file defines. Raises `InputError`."""
+    """Name -> effect of every `Effect` subclass that a Python file defines; run once as long as it does not change.
+
+    Raises
+    ------
+    InputError
+        There is no such file, it fails when it is run (with the line), or what it declares is wrong.
+    """
     path = Path(file)
-    if not path.is_file():
+    try:
+        state = path.stat()
+    except OSError:
+        state = None
+    if state is None or not path.is_file():
         raise InputError(
             f"effects file {str(file)!r} does not exist", hint=f"`{command_line('effects', 'new', path)}` writes one"
         )
+    return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
+
+
+@cache
+def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]:
+    """`path`, `changed` and `size` tell files and their versions apart."""
     name = f"toolpath_stiff_user_effects_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise InputError("not a Python file", expected="a name that ends in .py", file=str(file))
+        raise InputError("not a Python file", expected="a name that ends in .py", file=file)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-        found = _effects_in(module, str(file))
+        found = _effects_in(module, file)
     except InputError:
         raise
-    except Exception as error:
-        line = getattr(error, "lineno", None) or _line_in(error, path)
-        raise InputError(f"{type(error).__name__}: {error}", file=str(file), line=line) from None
+    except (Exception, SystemExit) as error:  # whatever a user's file does
+        raise _failure(error, file) from None
     if not found:
         raise InputError(
-            "defines no effect",
-            expected="a class derived from toolpath_stiff.stiffness.effects.Effect",
-            file=str(file),
+            "defines no effect", expected="a class derived from toolpath_stiff.stiffness.effects.Effect", file=file
         )
     return found
 
 
-def _line_in(error: BaseException, path: Path) -> int | None:
-    """Line of `path` that raised `error`."""
-    trace, line = error.__traceback__, None
-    while trace is not None:
-        if Path(trace.tb_frame.f_code.co_filename).resolve() == path.resolve():
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
+def _failure(error: BaseException, file: str) -> InputError:
+    """Where a file failed when it was run, and of what."""
+    if isinstance(error, SyntaxError) and error.filename and Path(error.filename).resolve() == Path(file).resolve():
+        return InputError(f"{type(error).__name__}: {error.msg}", file=file, line=error.lineno, column=error.offset)
+    what = f"{type(error).__name__}: {error}".rstrip(": ")
+    return InputError(f"{what}, when the file is run", file=file, line=line_in(error, file))
 
 
 def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
@@ -132,36 +145,8 @@ def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
     for value in vars(module).values():
         if isinstance(value, type) and issubclass(value, Effect) and value.__module__ == module.__name__:
             effect = value()
-            _check(effect, where)
+            check_declarations(effect, where)
             if effect.name in found and type(found[effect.name]) is not value:
                 raise InputError(f"{where}: effect {effect.name} is defined twice", hint="give one another name")
             found[effect.name] = effect
     return found
-
-
-def _check(effect: object, where: str) -> None:
-    """Refuse what is not a complete effect."""
-    if not isinstance(effect, Effect):
-        raise InputError(f"{where}: {effect!r} is not an effect")
-    label = type(effect).__name__
-    for attribute in ("name", "title", "link", "equation", "source", "parameters"):
-        if not hasattr(effect, attribute):
-            raise InputError(f"{where}: effect {label} has no `{attribute}`")
-    if effect.link not in LINKS:
-        raise InputError(f"{where}: effect {label}: link = {effect.link!r}", expected=f"one of {', '.join(LINKS)}")
-    if not all(isinstance(parameter, Parameter) for parameter in effect.parameters):
-        raise InputError(f"{where}: effect {label}: parameters hold something else", expected="Parameter(...)")
-    names = [parameter.name for parameter in effect.parameters]
-    doubled = {name for name in names if names.count(name) > 1}
-    if doubled:
-        raise InputError(f"{where}: effect {label}: parameter {doubled.pop()} is declared twice")
-    for parameter in effect.parameters:
-        low, high = parameter.bounds
-        if parameter.kind == "text":
-            continue
-        if not low < high or not low <= parameter.neutral <= high:
-            raise InputError(
-                f"{where}: effect {label}: parameter {parameter.name}: bounds {parameter.bounds}, "
-                f"neutral {parameter.neutral:g}",
-                expected="low < high with the neutral value between them",
-            )

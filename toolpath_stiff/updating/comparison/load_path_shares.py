@@ -59,13 +59,9 @@ def _by_link(model: StiffnessModel, data: Measurements) -> FloatArray:
     loads = np.concatenate([f, w], axis=1)
     columns = [*(f**2 / path.machine.strut_law.stiffness(path.struts.lengths)).T]
     for active in model.effects:
-        effect, values = active.effect, active.values
         energy = np.zeros(len(data))
-        if not effect.acts_on(path, values):
-            columns.append(energy)
-            continue
-        series, form = effect.strut_compliance(path, values), effect.load_compliance(path, values)
-        beside = effect.parallel_stiffness(path, values)
+        series, form = active.adds("strut_compliance", path), active.adds("load_compliance", path)
+        beside = active.adds("parallel_stiffness", path)
         if series is not None:
             energy += (series * f**2).sum(axis=1)
         if form is not None:

@@ -99,8 +99,7 @@ class Predictor:
         if model.instruments:
             path = replace(self._full_path(), machine=model.machine)
             for active in model.instruments:
-                if active.effect.acts_on(path, active.values):
-                    stiffness = active.effect.reading(stiffness, path, active.values)
+                stiffness = active.reading(stiffness, path)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(np.where(stiffness > 0.0, np.log(stiffness), np.nan))
 

@@ -344,6 +344,5 @@ def model_stiffness(model: StiffnessModel, data: Measurements) -> FloatArray:
     path = measured_path(model, data)
     stiffness = 1.0 / exact.compliance_along(model, path, data.direction)
     for active in model.instruments:
-        if active.effect.acts_on(path, active.values):
-            stiffness = active.effect.reading(stiffness, path, active.values)
+        stiffness = active.reading(stiffness, path)
     return np.asarray(stiffness)

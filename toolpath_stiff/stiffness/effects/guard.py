@@ -1,0 +1,200 @@
+"""What an effect from outside the package returns, held against the contract before it enters a result.
+
+Each fault is one `EffectFault` with file and line of the effect's code and the pose. The packaged effects are held
+against the contract by the tests and go through unchecked.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import EffectFault
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
+from toolpath_stiff.units import mm_from_m
+
+FloatArray = NDArray[np.float64]
+
+# What each hook returns for n poses: shape beyond n, and in words.
+SHAPES: dict[str, tuple[tuple[int, ...], str]] = {
+    "strut_compliance": ((6,), "(n, 6) m/N"),
+    "load_compliance": ((12, 12), "(n, 12, 12), symmetric"),
+    "parallel_stiffness": ((6, 6), "(n, 6, 6), symmetric"),
+}
+HOOKS = (*SHAPES, "geometry", "reading")
+ASYMMETRY = 1e-9  # of the largest entry at the pose
+TRIED = 2000  # poses that are tried one by one for the one that fails
+
+
+def is_foreign(effect: Effect) -> bool:
+    """Whether the effect comes from a user's file or another package."""
+    return not type(effect).__module__.startswith("toolpath_stiff.stiffness.effects.")
+
+
+def added(effect: Effect, hook: str, path: LoadPath, values: Mapping[str, Any]) -> FloatArray | None:
+    """What one of `SHAPES` adds at n poses; None adds nothing. Raises `EffectFault`."""
+    method: Callable[..., Any] = getattr(effect, hook)
+    if not is_foreign(effect):
+        own: FloatArray | None = method(path, values)
+        return own
+    _protect(path)
+    raw = _called(effect, hook, path, lambda one: method(one, values))
+    if raw is None:
+        return None
+    shape, words = SHAPES[hook]
+    found = _array(effect, hook, raw, (len(path), *shape), words)
+    _refuse_not_finite(effect, hook, found, path)
+    if len(shape) == 2 and len(path):
+        apart = np.abs(found - np.swapaxes(found, 1, 2)).max(axis=(1, 2))
+        bad = apart > ASYMMETRY * np.abs(found).max(axis=(1, 2))
+        if bad.any():
+            i, j, k = (int(v) for v in np.unravel_index(_largest_gap(found, bad), found.shape))
+            raise _fault(
+                effect, hook, f"is not symmetric{_at(path, i)}: entry ({j}, {k}) is {found[i, j, k]:g}, "
+                f"entry ({k}, {j}) is {found[i, k, j]:g}", words,
+            )  # fmt: skip
+    return found
+
+
+def changed_geometry(effect: Effect, machine: Machine, values: Mapping[str, Any]) -> Machine:
+    """The machine with the effect's geometry. Raises `EffectFault`."""
+    if not is_foreign(effect):
+        return effect.geometry(machine, values)
+    found = _called(effect, "geometry", None, lambda _: effect.geometry(machine, values))
+    if not isinstance(found, Machine):
+        raise _fault(effect, "geometry", f"returns {_kind(found)}", "a Machine (machine.with_changes(...))")
+    for name in ("frame_joints", "platform_joints"):
+        joints = getattr(found, name)
+        if not isinstance(joints, np.ndarray) or joints.shape != (6, 3) or not np.isfinite(joints).all():
+            raise _fault(effect, "geometry", f"gives {name} that are {_kind(joints)}", "(6, 3) finite numbers, m")
+    if not np.isfinite(found.reference_tool_length):
+        raise _fault(effect, "geometry", "gives reference_tool_length that is not finite", "m")
+    return found
+
+
+def read_off(effect: Effect, stiffness: FloatArray, path: LoadPath, values: Mapping[str, Any]) -> FloatArray:
+    """What an instrument shows for a true stiffness (n,) N/m. Raises `EffectFault`."""
+    if not is_foreign(effect):
+        return effect.reading(stiffness, path, values)
+    _protect(path)
+    true = stiffness.copy()
+    raw = _called(effect, "reading", None, lambda _: effect.reading(true, path, values))
+    found = _array(effect, "reading", raw, stiffness.shape, "(n,) N/m")
+    bad = np.isfinite(stiffness) & ~(np.isfinite(found) & (found > 0.0))
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise _fault(effect, "reading", f"shows {found[i]:g} N/m{_at(path, i)}", "a finite number above 0")
+    return found
+
+
+def line_in(error: BaseException, file: str) -> int | None:
+    """The innermost line of `file` on the way to `error`."""
+    trace, line = error.__traceback__, None
+    while trace is not None:
+        if Path(trace.tb_frame.f_code.co_filename).resolve() == Path(file).resolve():
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+def file_of(effect: Effect) -> str:
+    """The file that defines it, as short as it can be written from here."""
+    module = sys.modules.get(type(effect).__module__)
+    file = Path(getattr(module, "__file__", None) or type(effect).__module__)
+    return str(file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file)
+
+
+def _called(effect: Effect, hook: str, path: LoadPath | None, call: Callable[[Any], Any]) -> Any:
+    try:
+        with np.errstate(all="ignore"):  # what it divides by zero shows in the result
+            return call(path)
+    except (Exception, SystemExit) as error:  # whatever a user's code does
+        line = line_in(error, file_of(effect)) or _line_of(effect, hook)
+        hint = ""
+        if isinstance(error, KeyError):
+            hint = f"its parameters are {', '.join(p.name for p in effect.parameters) or 'none'}"
+        elif "read-only" in str(error):
+            hint = "copy an array before you change it: the core and other effects use the same one"
+        where = "" if path is None else _where_it_fails(path, call)
+        what = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise EffectFault(
+            f"effect {effect.name}: {hook} ends in {what}{where}", hint=hint, file=file_of(effect), line=line
+        ) from None
+
+
+def _where_it_fails(path: LoadPath, call: Callable[[Any], Any]) -> str:
+    if len(path) < 2:
+        return _at(path, 0) if len(path) else " without poses"
+    for i in range(min(len(path), TRIED)):
+        try:
+            with np.errstate(all="ignore"):
+                call(path.take(np.array([i])))
+        except (Exception, SystemExit):
+            return _at(path, i)
+    return f" for {len(path)} poses together, though not for each alone"
+
+
+def _protect(path: LoadPath) -> None:
+    """An effect that writes into what it is shown would falsify the others."""
+    for owner in (path, path.struts):
+        for field in fields(owner):
+            array = getattr(owner, field.name)
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
+
+
+def _array(effect: Effect, hook: str, raw: Any, shape: tuple[int, ...], words: str) -> FloatArray:
+    found = np.asarray(raw) if isinstance(raw, np.ndarray | np.generic | float | int | list | tuple) else None
+    if found is None or found.dtype.kind not in "fiu":
+        raise _fault(effect, hook, f"returns {_kind(raw)}", words)
+    if found.shape != shape:
+        poses = f"{shape[0]} pose{'s' if shape[0] != 1 else ''}"
+        raise _fault(effect, hook, f"returns shape {found.shape} for {poses}", f"{shape}, that is {words}")
+    return np.asarray(found, dtype=float)
+
+
+def _refuse_not_finite(effect: Effect, hook: str, found: FloatArray, path: LoadPath) -> None:
+    bad = ~np.isfinite(found)
+    if path.strut_forces is not None:  # nan at a singular pose, where nothing can be asked
+        bad[~np.isfinite(path.strut_forces).all(axis=1)] = False
+    if bad.any():
+        first = np.unravel_index(int(np.argmax(bad)), found.shape)
+        raise _fault(effect, hook, f"returns {found[first]:g}{_at(path, int(first[0]))}", "finite numbers")
+
+
+def _largest_gap(found: FloatArray, bad: NDArray[np.bool_]) -> int:
+    gap = np.abs(found - np.swapaxes(found, 1, 2))
+    gap[~bad] = -1.0
+    return int(np.argmax(gap))
+
+
+def _at(path: LoadPath, i: int) -> str:
+    x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[i])
+    return f" at X{x:g} Y{y:g} Z{z:g} mm"
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape} of {value.dtype}"
+    return "nothing (None)" if value is None else f"{type(value).__name__} ({value!r:.40})"
+
+
+def _fault(effect: Effect, hook: str, found: str, expected: str) -> EffectFault:
+    return EffectFault(
+        f"effect {effect.name}: {hook} {found}", expected=expected, file=file_of(effect), line=_line_of(effect, hook)
+    )
+
+
+def _line_of(effect: Effect, hook: str) -> int | None:
+    """Line on which the hook is defined, if the effect's own file defines it."""
+    code = getattr(inspect.unwrap(getattr(type(effect), hook)), "__code__", None)
+    own = code is not None and Path(code.co_filename).resolve() == Path(file_of(effect)).resolve()
+    return code.co_firstlineno if own and code is not None else None
