@@ -65,7 +65,7 @@ BAD_FILES = [
     (changed("default_origin_mm = [0.0, 0.0, 800.0]", "default_origin_mm = [0.0, 0.0]"), "3 or 6 numbers"),
     (changed("neutral_pose_mm_deg = [0.0, 0.0, 800.0, 0.0, 0.0, 0.0]", "neutral_pose_mm_deg = [0, 0]"), "6 numbers"),
     ("effect = 3\n" + NIST, "write [[effect]]"),
-    (NIST + '\n[[effect]]\nname = "x"\nprovenance = "campaign 3"\n', "[effect] provenance = 'campaign 3'"),
+    (NIST + '\n[[effect]]\nname = "x"\nprovenance = "campaign 3"\n', "[[effect]] provenance = 'campaign 3'"),
     (NIST + "\n[[effect]]\nbar_stiffness_N_per_m = 1e9\n", "name is missing"),
 ]
 

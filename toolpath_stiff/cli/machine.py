@@ -26,7 +26,7 @@ examples:
 """
 # The pose of the paper's Figure 2 is the one to show the paper's machine in.
 FIGURE_2 = (-0.3, 0.3, 0.3, -0.5235987755982988, 0.0, 0.0)
-OUT_OF_REACH = 1
+OUT_OF_REACH = NOT_GOOD = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,8 +42,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show.add_argument("--out", metavar="FILE.png", help="the picture (default: reports/<name>.png)")
     add_replace_option(show)
     show.add_argument("--json", action="store_true", help="print JSON, draw nothing unless --out is given")
-    check = actions.add_parser("check", help="check a machine file")
+    check = actions.add_parser(
+        "check", help="check a machine file for slips, draw it; exit code 1 if it cannot be right"
+    )
     check.add_argument("file", metavar="FILE")
+    check.add_argument(
+        "--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects that it names"
+    )
+    check.add_argument("--out", metavar="FILE.png", help="the picture (default: reports/<file>_machine.png)")
     new = actions.add_parser("new", help="write a commented template")
     new.add_argument("file", metavar="FILE")
     add_replace_option(new)
@@ -181,11 +187,14 @@ def _figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
 
 
 def _check(args: argparse.Namespace) -> int:
-    """Load the file, build its model, look whether its default origin is within reach."""
+    """Load the file, say what is wrong or doubtful, draw the machine at its neutral pose."""
     import numpy as np
 
-    from toolpath_stiff.analysis.poses import evaluate_poses
+    from toolpath_stiff.analysis.machine_check import check_machine, neutral_words, symmetry_words
+    from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.machine.kinematics import solve_struts_at
+    from toolpath_stiff.report.machine_picture import machine_views
     from toolpath_stiff.stiffness.acting import acting_names, condition_warnings
     from toolpath_stiff.stiffness.model import build_model
 
@@ -193,39 +202,46 @@ def _check(args: argparse.Namespace) -> int:
         new = command_line("machine", "new", args.file)
         raise InputError(f"cannot read machine file {args.file!r}", hint=f"`{new}` writes a template")
     machine = load_machine(Path(args.file))
-    model = build_model(machine)
-    origin = np.array([machine.default_origin])
-    found = evaluate_poses(model, origin[:, :3], origin[:, 3:])
+    target = args.out or f"reports/{Path(args.file).stem}_machine.png"
+    replaced = check_written(args, [target])
+    model = build_model(machine, args.effects)
+    found = check_machine(model)
+    pose = np.array(machine.limits.neutral_pose)
+    marked = tuple((stray.body, stray.joint) for stray in found.symmetry.strays)
+    keep(replaced)
+    write_atomically(target, machine_views(machine, pose, solve_struts_at(machine, pose), marked))
+    verdict = "the file is good" if found.good else f"{len(found.wrong)} things cannot be right"
+    if len(found.wrong) == 1:
+        verdict = "one thing cannot be right"
+    if found.good and found.doubtful:
+        verdict = "the file can be used; look at what is doubtful"
+    print(f"{args.file}: {machine.title}: {verdict}")
+    for word, texts in (("WRONG", found.wrong), ("doubtful", found.doubtful), ("warning", condition_warnings(model))):
+        for text in texts:
+            print(f"  {word}: {text}")
     effects = ", ".join([*acting_names(model), *(active.effect.name for active in model.instruments)]) or "none"
-    if not found.reach.reachable[0]:
-        raise InputError(
-            f"the default origin is out of reach: {found.reach.describe(0)}",
-            hint="change default_origin_mm or the limits",
-            file=args.file,
-        )
-    print(f"{args.file}: {machine.title}: the file is good\n  effects: {effects}")
-    for warning in condition_warnings(model):
-        print(f"  warning: {warning}")
-    kx, ky, kz = found.along_axes[0] / 1e3
-    print(f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; {found.reach.describe(0)}")
-    return 0
+    print(f"  effects: {effects}\n  {symmetry_words(found.symmetry)}")
+    if found.neutral.reach.reachable[0]:
+        print(f"  {neutral_words(machine, found.neutral)}")
+    if found.origin.reach.reachable[0]:
+        kx, ky, kz = found.origin.along_axes[0] / 1e3
+        print(f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; ", end="")
+        print(found.origin.reach.describe(0))
+    print(f"written:\n  {target}")
+    return 0 if found.good else NOT_GOOD
 
 
 def _new(args: argparse.Namespace) -> int:
+    from importlib import resources
+
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.machine import load_machine, machine_toml
+    from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
 
     target, replaced = Path(args.file), check_new(args, args.file)
-    preamble = (
-        "A machine file for tps. Every section names the origin of its figures:\n"
-        "published, recovered (from published figures) or assumed. The figures below are those of the packaged\n"
-        "machine nist: replace them by your own, then run `tps machine check` on this file."
-    )
-    machine = load_machine("nist").with_changes(
-        name=target.stem, title=f"my hexapod ({target.stem})", source="say where the figures come from"
-    )
+    text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
+    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
     keep(replaced)
-    write_atomically(target, machine_toml(machine, preamble))
+    write_atomically(target, text.replace("REMARK", TEMPLATE_REMARK))
     print(f"written:\n  {target}\n{hint('edit it, then', command_line('machine', 'check', target))}")
     return 0
 

@@ -7,10 +7,8 @@ bound.
 
 from __future__ import annotations
 
-import math
 import re
 import tomllib
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -20,75 +18,17 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.machine.keys import INFINITY, OPTIONAL_SECTIONS, SECTIONS, Key, as_array, describe, shorten
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, Pose, StrutLaw
+from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
 from toolpath_stiff.machine.uncertainty import read_uncertainty
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, mm_from_m, rad_from_deg
 
 DEFAULT_MACHINE = "nist"
-INFINITY = math.inf
 FloatArray = NDArray[np.float64]
 # Smallest singular value of the six strut screws (arms in units of the platform's size) that is no singularity.
 SINGULAR = 1e-6
-
-
-@dataclass(frozen=True)
-class Key:
-    """What a key of a machine file may hold.
-
-    `shape` () for a number or a text, (3,) or (6, 3) for lists of numbers, (0,) for texts, each once; `also_length`
-    admits another length.
-    Bounds are inclusive unless `open_low`.
-    """
-
-    unit: str = ""
-    shape: tuple[int, ...] = ()
-    low: float = -1e5
-    high: float = 1e5
-    required: bool = True
-    text: bool = False
-    infinite: bool = False
-    open_low: bool = False
-    also_length: int | None = None
-
-
-JOINTS_MM = Key(unit="mm", shape=(6, 3), required=False)
-# Rows of radius, angle about Z, height: keeps the symmetry of a machine exact, and reads better.
-JOINTS_CYLINDRICAL = Key(unit="mm, deg, mm", shape=(6, 3), required=False)
-SECTIONS: dict[str, dict[str, Key]] = {
-    "": {
-        "name": Key(text=True),
-        "title": Key(text=True, required=False),
-        "source": Key(text=True, required=False),
-    },
-    "frame_joints": {"mm": JOINTS_MM, "cylindrical_mm_deg": JOINTS_CYLINDRICAL},
-    "platform_joints": {"mm": JOINTS_MM, "cylindrical_mm_deg": JOINTS_CYLINDRICAL},
-    "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
-    "strut_law": {
-        "length_mm": Key(unit="mm", shape=(2,), low=0.0, open_low=True),
-        "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=0.0, high=1e5, open_low=True),
-    },
-    "platform": {"bar_stiffness_N_per_m": Key(unit="N/m", low=1e5, high=INFINITY, infinite=True, open_low=True)},
-    "limits.strut_length": {
-        "min_mm": Key(unit="mm", low=0.0),
-        "max_mm": Key(unit="mm", low=0.0, open_low=True),
-    },
-    "limits.joint_angle": {
-        "frame_max_deg": Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True),
-        "platform_max_deg": Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True),
-        "neutral_pose_mm_deg": Key(unit="mm, deg", shape=(6,)),
-    },
-    "limits.workspace": {"min_mm": Key(unit="mm", shape=(3,)), "max_mm": Key(unit="mm", shape=(3,))},
-    "limits.singularity": {"min_index": Key(low=0.0, high=1.0)},
-    "setup": {
-        "default_origin_mm": Key(unit="mm[, deg]", shape=(3,), also_length=6),
-        "rapid_mm_per_min": Key(unit="mm/min", low=0.0, high=1e6, open_low=True),
-        "name": Key(text=True, required=False),
-        "names": Key(text=True, shape=(0,), required=False),
-        "temperature_C": Key(unit="degrees C", low=-50.0, high=200.0, required=False),
-    },
-}
-OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "setup")
 
 
 def packaged_machines() -> dict[str, Path]:
@@ -157,13 +97,15 @@ class _Reader:
             f"{label}{found}", expected=expected, hint=hint, file=self.file, line=self.line_of(section, key)
         )
 
-    def line_of(self, section: str, key: str) -> int | None:
-        """Line on which a key of a section stands, None if it is not found."""
+    def line_of(self, section: str, key: str, nth: int = 0) -> int | None:
+        """Line on which a key of a section (the nth of its name) stands, None if it is not found."""
         inside = section == ""
+        seen = -1
         for number, line in enumerate(self.lines, 1):
             header = re.match(r"\s*\[\[?\s*([\w.]+)\s*\]", line)
             if header:
-                inside = header[1] == section
+                seen += header[1] == section
+                inside = header[1] == section and seen == nth
                 if inside and not key:
                     return number
             elif inside and key and re.match(rf"\s*{re.escape(key)}\s*=", line):
@@ -224,12 +166,14 @@ class _Reader:
         size = max(float(np.linalg.norm(arms, axis=1).mean()), 1e-9)
         screws = np.concatenate([directions, np.cross(arms, directions) / size], axis=1)
         if not np.isfinite(screws).all() or np.linalg.svd(screws)[1][-1] < SINGULAR:
+            symmetry = find_symmetry(machine)
+            strays = "; ".join(describe_stray(stray, symmetry.kind) for stray in symmetry.strays)
             raise self.fail(
                 "limits.joint_angle",
                 "neutral_pose_mm_deg",
                 ": the machine is singular there",
                 expected="a pose in the middle of the workspace",
-                hint="check the joints as well: similar hexagons without a twist are singular everywhere",
+                hint=strays or "check the joints as well: similar hexagons without a twist are singular everywhere",
             )
 
     def sections(self, table: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -280,7 +224,7 @@ class _Reader:
                 raise self.fail(name, key, ": unknown key", expected=f"one of {', '.join(allowed)}")
         for key, rule in keys.items():
             if rule.required and key not in content:
-                raise self.fail(name, key, " is missing", expected=_describe(rule))
+                raise self.fail(name, key, " is missing", expected=describe(rule))
         if name and name != "setup" and content.get("origin") not in ORIGINS:
             raise self.fail(
                 name,
@@ -291,7 +235,7 @@ class _Reader:
         return {k: self.value(name, k, v, keys[k]) if k in keys else str(v) for k, v in content.items()}
 
     def value(self, section: str, key: str, raw: Any, rule: Key) -> Any:
-        shown = _shorten(raw)
+        shown = shorten(raw)
         if rule.text and rule.shape:
             if not isinstance(raw, list) or not all(map(_is_text, raw)) or len(set(raw)) < len(raw):
                 raise self.fail(section, key, f" = {shown}", expected="a list of names, each once")
@@ -300,10 +244,10 @@ class _Reader:
             if not _is_text(raw):
                 raise self.fail(section, key, f" = {shown}", expected="a text that is not empty")
             return raw
-        array = _as_array(raw)
+        array = as_array(raw)
         shapes = [rule.shape, *([(rule.also_length,)] if rule.also_length else [])]
         if array is None or array.shape not in shapes:
-            raise self.fail(section, key, f" = {shown}", expected=_describe(rule))
+            raise self.fail(section, key, f" = {shown}", expected=describe(rule))
         bad = np.isnan(array) | (array < rule.low) | (array > rule.high)
         if rule.open_low:
             bad |= array <= rule.low
@@ -311,7 +255,7 @@ class _Reader:
             bad |= np.isinf(array)
         if bad.any():
             worst = float(array[bad][0])
-            raise self.fail(section, key, f" = {worst:g}", expected=_describe(rule))
+            raise self.fail(section, key, f" = {worst:g}", expected=describe(rule))
         return float(array) if array.ndim == 0 else array
 
     def joints(self, section: str, values: dict[str, dict[str, Any]]) -> FloatArray:
@@ -375,60 +319,28 @@ class _Reader:
         rows = table.get(kind, [])
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             raise self.fail("", kind, f" is not a list of tables; write [[{kind}]]")
-        entries = []
-        for row in rows:
-            name = row.get("name")
-            if not isinstance(name, str) or not name:
-                raise self.fail(kind, "name", " is missing" if name is None else f" = {name!r}", "an effect's name")
-            provenance = row.get("provenance", {})
-            if not isinstance(provenance, dict):
-                raise self.fail(kind, "provenance", f" = {_shorten(provenance)}", f"a table [{kind}.provenance]")
-            parameters = {k: v for k, v in row.items() if k not in ("name", "provenance")}
-            entries.append(EffectEntry(name, parameters, provenance))
-        return tuple(entries)
+        return tuple(self.entry(row, kind, nth) for nth, row in enumerate(rows))
+
+    def entry(self, row: dict[str, Any], kind: str, nth: int) -> EffectEntry:
+        """The nth entry of its kind."""
+        found = {key: self.line_of(kind, key, nth) for key in ("", *row)}
+        lines = {key: line for key, line in found.items() if line is not None}
+
+        def refuse(key: str, told: str, expected: str) -> InputError:
+            line = lines.get(key, lines.get(""))
+            return InputError(f"[[{kind}]] {key}{told}", expected=expected, file=self.file, line=line)
+
+        name, provenance = row.get("name"), row.get("provenance", {})
+        if not isinstance(name, str) or not name:
+            raise refuse("name", " is missing" if name is None else f" = {name!r}", "an effect's name")
+        if not isinstance(provenance, dict):
+            raise refuse("provenance", f" = {shorten(provenance)}", f"a table [{kind}.provenance]")
+        parameters = {key: value for key, value in row.items() if key not in ("name", "provenance")}
+        return EffectEntry(name, parameters, provenance, self.file, lines)
 
 
 def _is_text(raw: Any) -> bool:
     return isinstance(raw, str) and bool(raw.strip())
-
-
-def _as_array(raw: Any) -> FloatArray | None:
-    """A float array of TOML numbers and lists of them; None for anything else (booleans too)."""
-
-    def numeric(item: Any) -> bool:
-        if isinstance(item, list):
-            return all(numeric(part) for part in item)
-        return isinstance(item, int | float) and not isinstance(item, bool)
-
-    if not numeric(raw):
-        return None
-    try:
-        return np.array(raw, dtype=float)
-    except ValueError:  # rows of unequal length
-        return None
-
-
-def _describe(rule: Key) -> str:
-    if rule.text:
-        return "a text"
-    shape = {
-        (): "a number",
-        (2,): "2 numbers",
-        (3,): "3 numbers",
-        (6,): "6 numbers",
-        (6, 3): "6 rows of 3 numbers",
-    }[rule.shape]
-    if rule.also_length:
-        shape = f"{rule.shape[0]} or {rule.also_length} numbers"
-    unit = f" in {rule.unit}" if rule.unit else ""
-    low = f"above {rule.low:g}" if rule.open_low else f"at least {rule.low:g}"
-    high = "" if math.isinf(rule.high) else f", at most {rule.high:g}"
-    return f"{shape}{unit}, {low}{high}"
-
-
-def _shorten(raw: Any) -> str:
-    text = repr(raw)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _pose(values: Any) -> Pose:

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.errors import InputError
+
 if TYPE_CHECKING:
     from toolpath_stiff.machine.uncertainty import Uncertainty
 
@@ -86,11 +88,22 @@ class Limits:
 
 @dataclass(frozen=True)
 class EffectEntry:
-    """One `[[effect]]` or `[[instrument]]` of a machine file: its name, parameters (SI) and provenance."""
+    """One `[[effect]]` or `[[instrument]]` of a machine file: its name, parameters in their own units, provenance.
+
+    `file` and `lines` (key -> line, "" for the heading) say where it stands; they do not make entries differ.
+    """
 
     name: str
     parameters: Mapping[str, Any]
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    file: str = field(default="", compare=False)
+    lines: Mapping[str, int] = field(default_factory=dict, compare=False)
+
+    def error(self, found: str, key: str = "", expected: str = "", hint: str = "", where: str = "") -> InputError:
+        """An error at one of its keys, or at its heading; `where` names an entry that no file holds."""
+        line = self.lines.get(key, self.lines.get(""))
+        text = found if self.file or not where else f"{where}: {found}"
+        return InputError(text, expected=expected, hint=hint, file=self.file or None, line=line)
 
 
 @dataclass(frozen=True)

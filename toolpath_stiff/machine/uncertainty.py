@@ -84,7 +84,7 @@ def with_parameter(machine: Machine, name: str, change: float) -> Machine:
         for i, entry in enumerate(entries):
             if entry.name == owner and key in entry.parameters:
                 moved = {**entry.parameters, key: entry.parameters[key] + change}
-                entries[i] = EffectEntry(entry.name, moved, entry.provenance)
+                entries[i] = replace(entry, parameters=moved)
                 return machine.with_changes(**{kind: tuple(entries)})
     raise InputError(f"machine {machine.name} has no parameter {name!r}")
 

@@ -16,6 +16,9 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_
 
 FloatArray = NDArray[np.float64]
 
+# `tps machine new` puts it in every section; what still has it was not replaced.
+TEMPLATE_REMARK = "value of the template, not of this machine"
+
 HEADINGS = {
     "frame_joints": "Base frame: Z up. Row i is strut i + 1: x, y, z in mm\n"
     "# (or cylindrical_mm_deg: rows of radius in mm, angle in degrees, height in mm).",
@@ -70,12 +73,14 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
         low, high = mm_from_m(limits.workspace)
         sections["limits.workspace"] = {"min_mm": _list(low), "max_mm": _list(high)}
     lines = [f"# {line}".rstrip() for line in preamble.splitlines()]
-    lines += [f"{key} = {_text(getattr(machine, key))}" for key in ("name", "title", "source") if getattr(machine, key)]
+    lines += [
+        f"{key} = {toml_text(getattr(machine, key))}" for key in ("name", "title", "source") if getattr(machine, key)
+    ]
     for name, values in sections.items():
         lines += ["", f"# {HEADINGS[name]}", f"[{name}]", *(f"{key} = {value}" for key, value in values.items())]
-        lines.append(f"origin = {_text(machine.origins.get(name, 'assumed'))}")
+        lines.append(f"origin = {toml_text(machine.origins.get(name, 'assumed'))}")
         if name in machine.remarks:
-            lines.append(f"remark = {_text(machine.remarks[name])}")
+            lines.append(f"remark = {toml_text(machine.remarks[name])}")
     for kind, entries in (("effect", machine.effects), ("instrument", machine.instruments)):
         for entry in entries:
             lines += ["", *_entry(kind, entry)]
@@ -91,7 +96,7 @@ def _conditions(machine: Machine) -> dict[str, str]:
 
 
 def _entry(kind: str, entry: EffectEntry) -> list[str]:
-    lines = [f"[[{kind}]]", f"name = {_text(entry.name)}"]
+    lines = [f"[[{kind}]]", f"name = {toml_text(entry.name)}"]
     lines += [f"{key} = {_value(value)}" for key, value in entry.parameters.items()]
     if entry.provenance:
         lines += [f"[{kind}.provenance]", *(f"{key} = {_value(value)}" for key, value in entry.provenance.items())]
@@ -127,7 +132,7 @@ def _rows(values: FloatArray) -> str:
     return "[\n" + "".join(f"    {_list(row)},\n" for row in values) + "]"
 
 
-def _text(value: str) -> str:
+def toml_text(value: str) -> str:
     """A TOML basic string; JSON's escapes are TOML's."""
     return json.dumps(value, ensure_ascii=False)
 
@@ -143,4 +148,4 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(_value(v) for v in value) + "]"
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key} = {_value(v)}" for key, v in value.items()) + "}"
-    return _text(str(value))
+    return toml_text(str(value))

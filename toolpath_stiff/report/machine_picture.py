@@ -101,3 +101,48 @@ def _finish(axes: Any, points: FloatArray) -> None:
     axes.tick_params(labelsize=7.5, colors="#6b7280")
     axes.locator_params(nbins=5)
     axes.view_init(elev=18, azim=-62)
+
+
+def machine_views(
+    machine: Machine, pose: FloatArray, struts: Struts, marked: tuple[tuple[str, int], ...] = ()
+) -> bytes:
+    """PNG of the machine from above and from the side at one pose (6,) m and rad, struts numbered.
+
+    `marked` are joints that stand apart, drawn with a ring: ("frame" or "platform", index from 0).
+    """
+    joints = mm_from_m(pose[:3] + struts.arms[0])
+    frame, tip = mm_from_m(machine.frame_joints), mm_from_m(pose[:3])
+    with house_style():
+        figure = new_figure(14.0, 7.4)
+        for k, (first, second, title) in enumerate(((0, 1, "from above"), (0, 2, "from the side, along Y"))):
+            axes = figure.add_axes((0.06 + 0.49 * k, 0.09, 0.42, 0.74))
+            _draw_view(axes, frame, joints, tip, [first, second])
+            for body, i in marked:
+                at = (frame if body == "frame" else joints)[i]
+                axes.plot(at[first], at[second], "o", ms=18, mfc="none", mec=TOOL, mew=2.0)
+            axes.set_title(title, fontsize=11, color="#374151")
+            axes.set_xlabel(f"{'XYZ'[first]} mm")
+            axes.set_ylabel(f"{'XYZ'[second]} mm")
+        _heading(figure, machine, pose)
+        if marked:
+            words = "ring: does not follow the symmetry of the other joints"
+            figure.text(0.98, 0.91, words, fontsize=11, color=TOOL, ha="right")
+        return png_bytes(figure)
+
+
+def _draw_view(axes: Any, frame: FloatArray, joints: FloatArray, tip: FloatArray, seen: list[int]) -> None:
+    for body, colour in ((frame, FRAME), (joints, PLATFORM)):
+        beside = body[:, :2] - body[:, :2].mean(axis=0)
+        order = np.argsort(np.arctan2(beside[:, 1], beside[:, 0]), kind="stable")
+        axes.plot(*body[[*order, order[0]]][:, seen].T, color=colour, lw=1.6)
+        axes.plot(*body[:, seen].T, "o", color=colour, ms=6)
+    for i, (one, other) in enumerate(zip(frame[:, seen], joints[:, seen], strict=True)):
+        axes.plot(*np.array([one, other]).T, color=STRUT, lw=1.8)
+        # Struts of a vertex, and those behind each other, have their numbers at different places.
+        at = one + (0.25 + 0.1 * i) * (other - one)
+        axes.text(*at, f"{i + 1}", fontsize=10, weight="bold", color=STRUT, ha="center", va="center", bbox=_LABEL)
+    axes.plot(*tip[seen], "o", color=TOOL, ms=8)
+    axes.annotate("tool tip", tip[seen], xytext=(8, -4), textcoords="offset points", fontsize=9, color=TOOL)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.06)
+    axes.grid(True, color="#e5e7eb", lw=0.6)

@@ -192,17 +192,19 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
 
 
 def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
-    effect = find_effect(entry.name, files)
     kind = "instrument" if instrument else "effect"
-    if effect.is_instrument != instrument:
-        other = "effect" if instrument else "instrument"
-        raise InputError(
-            f"machine {machine.name}: [[{kind}]] {entry.name} acts on "
-            f"{'readings' if effect.is_instrument else 'the machine'}",
-            hint=f"write it as [[{other}]]",
-        )
     where = f"machine {machine.name}, [[{kind}]]"
-    return ActiveEffect(effect, read_parameters(effect, entry.parameters, where))
+    try:
+        effect = find_effect(entry.name, files)
+    except InputError as error:
+        if error.file:  # one of the files with effects
+            raise
+        raise entry.error(error.found, "name", error.expected, error.hint) from None
+    if effect.is_instrument != instrument:
+        acts = f"[[{kind}]] {entry.name} acts on {'readings' if effect.is_instrument else 'the machine'}"
+        hint = f"write it as [[{'effect' if instrument else 'instrument'}]]"
+        raise entry.error(acts, hint=hint, where=f"machine {machine.name}")
+    return ActiveEffect(effect, read_parameters(effect, entry, where))
 
 
 def load_path(

@@ -21,9 +21,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import EffectEntry, Machine
 
 FloatArray = NDArray[np.float64]
 
@@ -249,28 +248,29 @@ class Effect:
         return self.link == "instrument"
 
 
-def read_parameters(effect: Effect, given: Mapping[str, Any], where: str) -> dict[str, Any]:
+def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> dict[str, Any]:
     """SI values of an effect's parameters from a machine file's keys; choices as they are.
 
     Raises
     ------
     InputError
-        A key is unknown or missing, a value is not a number or out of bounds; `where` names the file.
+        A key is unknown or missing, a value is not a number or out of bounds; at its line of the machine file, or with
+        `where` for an entry that stands in none.
     """
     by_key = {parameter.key: parameter for parameter in effect.parameters}
-    for key in given:
+    for key in entry.parameters:
         if key not in by_key:
-            raise InputError(
-                f"{where}: effect {effect.name}: unknown key {key}",
-                expected=f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance",
-            )
+            known = f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance"
+            raise entry.error(f"effect {effect.name}: unknown key {key}", key, expected=known, where=where)
     values: dict[str, Any] = {}
     for key, parameter in by_key.items():
-        if key not in given:
-            raise InputError(f"{where}: effect {effect.name}: {key} is missing", expected=parameter.expected)
-        value = given[key]
+        if key not in entry.parameters:
+            found = f"effect {effect.name}: {key} is missing"
+            raise entry.error(found, expected=parameter.expected, where=where)
+        value = entry.parameters[key]
         if not _is_valid(parameter, value):
-            raise InputError(f"{where}: effect {effect.name}: {key} = {value!r}", expected=parameter.expected)
+            found = f"effect {effect.name}: {key} = {value!r}"
+            raise entry.error(found, key, expected=parameter.expected, where=where)
         values[parameter.name] = float(value) * parameter.si if parameter.kind == "real" else value
     return values
 
