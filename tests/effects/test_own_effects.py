@@ -123,7 +123,7 @@ WRONG_DECLARATIONS = [
     ([('title = "mine"', "title = 3")], 8, "title = 3"),
     ([('name = "mine"', 'name = "my effect"')], 7, "name = 'my effect'"),
     ([("needs = ()", 'needs = "time_min"')], 12, "needs = 'time_min'"),
-    ([('    equation = "c_i += c"\n', "")], 6, "has no `equation`"),
+    ([('    equation = "c_i += c"\n', "")], 6, "`equation` is missing"),
     ([("strut_compliance", "strut_complaince")], 17, "strut_complaince is never called; expected strut_compliance"),
     ([("strut_compliance", "stiffening")], 6, "adds nothing; expected one of"),
     ([("class Mine(Effect):", "class Mine(Effect:")], 6, "SyntaxError"),

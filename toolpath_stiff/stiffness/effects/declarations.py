@@ -40,12 +40,12 @@ def check_declarations(effect: object, where: str) -> None:
     own = type(effect)
 
     def refuse(attribute: str, found: str, expected: str = "", index: int | None = None) -> InputError:
-        line = _line_of(own, attribute, index)
+        line = line_of(own, attribute, index)
         return InputError(f"effect {own.__name__}: {found}", expected=expected, file=where, line=line)
 
     for attribute in (*TEXTS, "parameters"):
         if not hasattr(effect, attribute):
-            raise refuse("", f"has no `{attribute}`")
+            raise refuse("", f"`{attribute}` is missing")
     for attribute in TEXTS:
         value = getattr(effect, attribute)
         if not isinstance(value, str) or not value.strip():
@@ -127,7 +127,7 @@ def _check_hooks(effect: Effect, refuse: Any) -> None:
         raise refuse("link", found, '`reading` alone with link "instrument", or the others with another link')
 
 
-def _line_of(own: type, attribute: str, index: int | None = None) -> int | None:
+def line_of(own: type, attribute: str, index: int | None = None) -> int | None:
     """Line of a class, of what it assigns or defines, or of an element of that."""
     tree = _parsed(inspect.getsourcefile(own)) if _has_source(own) else None
     for node in ast.walk(tree) if tree else ():

@@ -15,7 +15,7 @@ from types import ModuleType
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.stiffness.effects.contract import LINKS, Effect
-from toolpath_stiff.stiffness.effects.declarations import check_declarations
+from toolpath_stiff.stiffness.effects.declarations import check_declarations, line_of
 from toolpath_stiff.stiffness.effects.guard import line_in
 
 ENTRY_POINTS = "toolpath_stiff.effects"
@@ -65,7 +65,10 @@ def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
     for file in files:
         for name, effect in effects_from_file(file).items():
             if name in known:
-                raise InputError(f"effect {name} exists already", hint="give it another name", file=str(file))
+                line = line_of(type(effect), "name")
+                raise InputError(
+                    f"effect {name} exists already", hint="give it another name", file=str(file), line=line
+                )
             known[name] = effect
     return dict(sorted(known.items(), key=lambda item: (LINKS.index(item[1].link), item[0])))
 
@@ -147,6 +150,11 @@ def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
             effect = value()
             check_declarations(effect, where)
             if effect.name in found and type(found[effect.name]) is not value:
-                raise InputError(f"{where}: effect {effect.name} is defined twice", hint="give one another name")
+                raise InputError(
+                    f"effect {effect.name} is defined twice",
+                    hint="give one another name",
+                    file=where,
+                    line=line_of(value, "name"),
+                )
             found[effect.name] = effect
     return found
