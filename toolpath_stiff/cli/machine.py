@@ -50,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects that it names"
     )
     check.add_argument("--out", metavar="FILE.png", help="the picture (default: reports/<file>_machine.png)")
+    add_replace_option(check)
     new = actions.add_parser("new", help="write a commented template")
     new.add_argument("file", metavar="FILE")
     add_replace_option(new)
