@@ -199,6 +199,15 @@ def test_pose_prints_table_1_and_the_paper_pose(part, capsys):
     assert "15889 N/mm" in capsys.readouterr().out
 
 
+def test_pose_reads_tables_as_offices_write_them(part, capsys):
+    poses = part.parent / "poses.csv"
+    poses.write_text("X [mm];Y [mm];Z [mm]\n0;0;1268,225\n", encoding="utf-8-sig")
+    assert main(["pose", "--csv", "poses.csv"]) == 0
+    captured = capsys.readouterr()
+    assert round(float(next(csv.DictReader(captured.out.splitlines()))["kx_N_per_mm"])) == 57950  # Table 1
+    assert "decimal commas" in captured.err
+
+
 def test_pose_csv_keeps_the_order_and_names_bad_cells(part, capsys):
     poses = part.parent / "poses.csv"
     poses.write_text("z_mm,x_mm,y_mm\n1268.225,0,0\n353.225,-300,0\n")

@@ -30,6 +30,7 @@ Angles are roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); the positio
 coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row a pose in the
 same order, with empty cells where a pose is out of reach (exit code 1).
 """
+FARTHEST = 1e5  # mm and degrees; more is a slip of unit or key
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
 
@@ -40,7 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "pose", nargs="*", type=finite_number, metavar="X Y Z [A B C]", help="tool tip in mm, angles in degrees"
     )
-    parser.add_argument("--csv", metavar="FILE", help="read poses from a CSV file, write CSV to standard output")
+    parser.add_argument(
+        "--csv",
+        metavar="FILE",
+        help="read poses from a table (CSV, or FILE.xlsx[#SHEET]), write CSV to standard output",
+    )
     add_machine_options(parser)
     add_json_option(parser, "print JSON instead of a table")
 
@@ -120,54 +125,46 @@ def _csv(model: StiffnessModel, args: argparse.Namespace) -> int:
 
 
 def _read_poses(file: str) -> FloatArray:
-    """(n, 6) mm and degrees from a CSV file. Raises `InputErrors` with every bad cell named."""
-    import csv
-    from pathlib import Path
-
+    """(n, 6) mm and degrees from a table. Raises `InputErrors` with every bad cell named."""
     import numpy as np
 
-    path = Path(file)
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [(stream_line, row) for stream_line, row in enumerate(csv.reader(stream), 1) if any(row)]
-    except OSError as error:
-        raise InputError(f"cannot read {file!r}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError("not a text file", expected="CSV with columns x_mm,y_mm,z_mm", file=file) from None
-    if len(rows) < 2:
-        raise InputError("no poses", expected=f"a heading ({','.join(POSE_COLUMNS)}) and rows", file=file)
-    heading = [cell.strip() for cell in rows[0][1]]
-    for name in heading:
-        if name in POSE_COLUMNS and heading.count(name) > 1:
-            raise InputError(f"column {name} appears twice", file=file, line=rows[0][0])
-    missing = [name for name in POSE_COLUMNS[:3] if name not in heading]
+    from toolpath_stiff.tables import Columns, read_table
+
+    table = read_table(file, "poses", Columns(POSE_COLUMNS))
+    missing = [name for name in POSE_COLUMNS[:3] if name not in table.heading]
     if missing:
         raise InputError(
-            f"column {missing[0]} is missing (found {', '.join(heading)})",
+            f"column {missing[0]} is missing (found {', '.join(table.heading)})",
             expected=", ".join(POSE_COLUMNS[:3]),
             file=file,
-            line=rows[0][0],
+            line=table.heading_line,
         )
-    where = {name: heading.index(name) for name in POSE_COLUMNS if name in heading}
-    poses, errors = np.zeros((len(rows) - 1, 6)), []
-    for i, (line, row) in enumerate(rows[1:]):
-        for name, column in where.items():
-            text = row[column].strip() if column < len(row) else ""
+    if not table.rows:
+        raise InputError("no poses", expected=f"rows below the heading ({','.join(POSE_COLUMNS)})", file=file)
+    columns = [(i, name) for i, name in enumerate(POSE_COLUMNS) if name in table.heading]
+    poses, errors = np.zeros((len(table.rows), 6)), []
+    for row, (line, cells) in enumerate(table.rows):
+        for i, name in columns:
+            at = table.heading.index(name)
+            text = cells[at] if at < len(cells) else ""
             try:
-                value = float(text)
+                poses[row, i] = _coordinate(text)
             except ValueError:
-                value = math.nan
-            if not math.isfinite(value) or abs(value) > 1e5:
-                errors.append(
-                    InputError(
-                        f"row {i + 1}, {name}: {text!r}", expected="a number within +-100000", file=file, line=line
-                    )
-                )
-                continue
-            poses[i, POSE_COLUMNS.index(name)] = value
+                expected = f"a number within +-{FARTHEST:g}"
+                errors.append(InputError(f"row {row + 1}, {name}: {text!r}", expected=expected, file=file, line=line))
     if errors:
         raise InputErrors(errors)
+    for note in table.notes:
+        print(f"tps: note: {note}", file=sys.stderr)
     return poses
+
+
+def _coordinate(text: str) -> float:
+    """A finite number within reason. Raises `ValueError`."""
+    value = float(text)
+    if not math.isfinite(value) or abs(value) > FARTHEST:
+        raise ValueError(text)
+    return value
 
 
 def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
@@ -177,8 +174,8 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
     from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated
 
     poses = np.array([[*args.pose, 0.0, 0.0, 0.0][:6]])
-    if np.abs(poses).max() > 1e5:
-        raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected="numbers within +-100000")
+    if np.abs(poses).max() > FARTHEST:
+        raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected=f"numbers within +-{FARTHEST:g}")
     found = _evaluate(model, poses, args.force)
     if not found.reach.reachable[0]:
         raise UnreachableError(
