@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.nc.cutter_location import MM, START, leaning, read, refused, tilt
-from toolpath_stiff.nc.cutter_location.tilting import GREAT_CIRCLE_DEG
+from toolpath_stiff.nc.cutter_location.geometry import GREAT_CIRCLE_DEG
 from toolpath_stiff.nc.moves import ARC
 from toolpath_stiff.path import move_lengths, sample_moves
 from toolpath_stiff.path.rotations import rotation_matrices

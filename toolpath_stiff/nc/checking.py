@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes import WORK_OFFSETS, code_meaning, would_change
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
-from toolpath_stiff.nc.cutter_location.checking import CheckedCutterLocation
-from toolpath_stiff.nc.cutter_location.program import not_for
+from toolpath_stiff.nc.cutter_location import reading as cutter_location
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose, pose_in_mm, pose_in_si
@@ -234,34 +233,34 @@ def _on_the_part(
 def _check_cutter_location(
     lines: tuple[str, ...], name: str, origin: Iterable[float], block_delete: bool, controller: Controller
 ) -> Checked:
-    reading = CheckedCutterLocation(name, copy.deepcopy(controller.tools), MOST_ERRORS)
-    reading.check(lines)
+    checked = cutter_location.check(lines, name, controller.tools, MOST_ERRORS)
+    state = checked.state
     offsets = controller.offsets is not None and any(offset.given for offset in controller.offsets.table)
-    warnings = (*not_for(controller, offsets, block_delete), *reading.warnings)
-    findings = [finding_of(error) for error in reading.errors]
+    warnings = (*cutter_location.not_for(controller, offsets, block_delete), *state.warnings)
+    findings = [finding_of(error) for error in checked.errors]
     findings += [Finding(line_in(text), 0, "warning", text, WARNING) for text in warnings]
-    findings += [Finding(0, 0, "assumption", text, NOTE) for text in reading.assumptions]
+    findings += [Finding(0, 0, "assumption", text, NOTE) for text in state.assumptions]
     x, y, z, a, b, c = origin
     return Checked(
-        used=tuple(UsedCode(line, 1, word, text, NOTE, count) for word, text, line, count in reading.meanings()),
+        used=tuple(UsedCode(line, 1, word, text, NOTE, count) for word, text, line, count in checked.meanings()),
         unsupported=tuple(
             Finding(
                 word.line,
                 word.column,
                 word.word,
-                f"{word.reason}; it would change {'what is not known' if word.word in reading.doubtful else NO_CHANGE}",
+                f"{word.reason}; it would change {'what is not known' if word.word in state.doubtful else NO_CHANGE}",
                 NOTE,
             )
-            for word in reading.unsupported
+            for word in cutter_location.unsupported(state)
         ),
         findings=tuple(sorted(findings, key=lambda f: (f.line, f.column))),
-        start=reading.start,
-        end=reading.state(),
-        moves=reading.recorder.moves() if len(reading.recorder) else None,
+        start=checked.start,
+        end=checked.end,
+        moves=state.recorder.moves() if len(state.recorder) else None,
         origin=(x, y, z, a, b, c),
-        complete=not reading.errors,
+        complete=not checked.errors,
         dialect=CUTTER_LOCATION,
-        marks=tuple(reading.marks),
+        marks=tuple(state.marks),
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
-from toolpath_stiff.nc.cutter_location import program as cutter_location
+from toolpath_stiff.nc.cutter_location import reading as cutter_location
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames, Pose, pose_in_mm, pose_in_si

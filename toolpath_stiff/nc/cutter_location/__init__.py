@@ -1,5 +1,6 @@
 """Cutter-location files: the points, tool axes and feeds that CAM systems hand to post processors, in APT's words.
 
-`statements` reads lines; `vocabulary` knows what words mean; `circles`, `tilting` and `cycles` do the geometry;
-`tool_path` makes moves; `modes`, `curves` and `reading` execute statements; `program` and `checking` are the way in.
+`reading` is the way in, for `Program` and for `tps check`. `statements` splits lines; `vocabulary` is the table of
+words, whose functions stand in `modes`, `motion` and `cycles`; each takes the `state` and a statement. `tool_path`
+makes moves of what `geometry` computes.
 """

@@ -1,4 +1,4 @@
-"""CYCLE/ of a cutter-location file, in pairs of a word and its value.
+"""CYCLE/ of a cutter-location file, in pairs of a word and its value, and the holes that it drills.
 
 Read is what systems agree on: `DEPTH` or `FEDTO` counts from the GOTO point into the hole along the tool axis, `CLEAR`
 from it outwards (PTC, "CL Output for Holemaking Cycles"; Autodesk's post for CAMplete; Siemens NX writes FEDTO below
@@ -8,87 +8,133 @@ from CLEAR and others from the surface; RETURN,0 and RTRCTO,AUTO, which go to pl
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number, number_of
+from toolpath_stiff.nc.cutter_location import tool_path
+from toolpath_stiff.nc.cutter_location.geometry import Vector
+from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS, SECONDS_PER_DAY
+from toolpath_stiff.nc.cutter_location.state import Cycle, State
+from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
+from toolpath_stiff.nc.cutter_location.vocabulary import PTC, word
 from toolpath_stiff.nc.cycles import Drilling
 
 # The first word, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip breaking).
 KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73"}
+PAIRS = ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL")
+ALIASES = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}
 EXPAND = "have the CAM system write the moves of the cycle"
 MOST_PECKS = 100_000
-SECONDS_PER_DAY = 86400.0
 
 
-@dataclass(frozen=True)
-class Cycle:
-    """A drilling cycle: the hole, heights from the GOTO point in mm; its feed in mm/min or mm per revolution."""
+@dataclass
+class _Given:
+    """What a CYCLE/ says: strokes as of a G code, numbers in the file's unit by word, the unit of its feed."""
 
-    hole: Drilling
-    feed: float
-    per_revolution: bool
+    code: str
+    values: dict[str, float] = field(default_factory=dict)
+    unit: str = ""
+    fedto: bool = False
 
 
-def read_cycle(
-    statement: Statement, name: str, scale: float, feed_units: Mapping[str, tuple[float | None, bool]]
-) -> Cycle | None:
-    """The cycle of a CYCLE/ statement, None for CYCLE/OFF. Raises `InputError`."""
+@word("CYCLE", meaning="drilling cycle", source=PTC, form="/DRILL, /DEEP or /BRKCHP in pairs, /OFF")
+def cycle(state: State, statement: Statement) -> None:
+    """The cycle that the next points drill; CYCLE/OFF ends it."""
+    state.no_circle("CYCLE/")
+    state.cycle = _read(state, statement)
 
-    def fail(found: str, expected: str = "", at: Argument | None = None, hint: str = EXPAND) -> InputError:
-        place = at or statement
-        return InputError(found, expected=expected, hint=hint, file=name, line=place.line, column=place.column)
 
+def drill(state: State, target: Vector, axis: Vector, cycle: Cycle) -> None:
+    """A hole of the cycle in force at a point."""
+    if state.point is not None and axis != state.axis:
+        raise state.fail(
+            "a hole with another tool axis than the move before", "a GOTO/ before the cycle that turns the tool"
+        )
+    tool_path.drill(state, target, axis, cycle.hole, state.feed_per_minute(cycle.feed, cycle.per_revolution))
+
+
+def _read(state: State, statement: Statement) -> Cycle | None:
+    """The cycle of a statement, None for CYCLE/OFF. Raises `InputError`."""
     arguments = list(statement.arguments)
     kind = arguments.pop(0).text.upper() if arguments else ""
     if kind in ("OFF", "NOMORE"):
         return None
     if kind not in KINDS:
-        raise fail(f"CYCLE/{kind} is not supported", ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF")))
-    code = KINDS[kind]
+        raise _refusal(
+            state, f"CYCLE/{kind} is not supported", ", ".join(f"CYCLE/{known}" for known in (*KINDS, "OFF"))
+        )
     if arguments and arguments[0].text.upper() in ("DEEP", "BRKCHP"):  # NX, CAMplete: CYCLE/DRILL,DEEP
-        code = KINDS[arguments.pop(0).text.upper()]
-    values: dict[str, float] = {}
-    fedto = False
-    unit = ""
+        kind = arguments.pop(0).text.upper()
+    given = _Given(KINDS[kind])
     for key, value in zip(arguments[::2], arguments[1::2], strict=False):
-        word = key.text.upper()
-        fedto = fedto or word == "FEDTO"
-        word = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}.get(word, word)
-        if is_number(word):
-            raise fail(
-                "a cycle of numbers without words: their order hangs on the CAM system", "pairs, as DEPTH,5", key
-            )
-        if word in feed_units:
-            unit, word = word, "feed"
-        elif word not in ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL"):
-            raise fail(f"CYCLE/ with {word}, which is not supported", "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed", key)
-        if word in values:
-            raise fail(f"{key.text} twice", "one", key)
-        values[word] = number_of(value, name, f"the number of {key.text}")
+        _take_pair(state, given, key, value)
     if len(arguments) % 2:
-        raise fail(f"{arguments[-1].text!r} without its value", "a number", arguments[-1])
-    for word in ("DEPTH", "feed", "CLEAR"):
-        if word not in values:
-            raise fail(f"{statement.shown} without {word}", "DEPTH, CLEAR and a feed as MMPM,100")
-    depth = abs(values["DEPTH"]) * scale
-    clear, back = values["CLEAR"] * scale, values.get("RETURN", values["CLEAR"]) * scale
-    dwell, peck = values.get("DWELL", 0.0), values.get("STEP", 0.0) * scale
-    if not depth > 0.0 or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY:
-        raise fail(statement.shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more", hint="")
+        raise _refusal(state, f"{arguments[-1].text!r} without its value", "a number", at=arguments[-1])
+    for needed in ("DEPTH", "feed", "CLEAR"):
+        if needed not in given.values:
+            raise _refusal(state, f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100")
+    hole = _hole(state, given)
+    _check(state, given, hole)
+    factor, per_revolution = FEED_UNITS[given.unit]
+    return Cycle(hole, given.values["feed"] * (state.scale if factor is None else factor), per_revolution)
+
+
+def _refusal(
+    state: State, found: str, expected: str = "", hint: str = EXPAND, at: Argument | None = None
+) -> InputError:
+    return state.fail(found, expected, hint, at)
+
+
+def _take_pair(state: State, given: _Given, key: Argument, value: Argument) -> None:
+    name = key.text.upper()
+    given.fedto = given.fedto or name == "FEDTO"
+    name = ALIASES.get(name, name)
+    if is_number(name):
+        raise _refusal(
+            state, "a cycle of numbers without words: their order hangs on the CAM system", "pairs, as DEPTH,5", at=key
+        )
+    if name in FEED_UNITS:
+        given.unit, name = name, "feed"
+    elif name not in PAIRS:
+        raise _refusal(
+            state, f"CYCLE/ with {name}, which is not supported", "DEPTH, CLEAR, STEP, DWELL, RETURN, a feed", at=key
+        )
+    if name in given.values:
+        raise _refusal(state, f"{key.text} twice", "one", at=key)
+    given.values[name] = state.number(value, f"the number of {key.text}")
+
+
+def _hole(state: State, given: _Given) -> Drilling:
+    """The hole in mm, as it is said."""
+    values, scale = given.values, state.scale
+    dwell = values.get("DWELL", 0.0)
+    return Drilling(
+        code="G82" if dwell else given.code,
+        bottom=-abs(values["DEPTH"]) * scale,
+        retract=values["CLEAR"] * scale,
+        clear=values.get("RETURN", values["CLEAR"]) * scale,
+        peck=values.get("STEP", 0.0) * scale,
+        dwell=dwell,
+    )
+
+
+def _check(state: State, given: _Given, hole: Drilling) -> None:
+    """Refuse a hole that cannot be, or of which systems mean different things."""
+    values, shown = given.values, state.statement.shown
+    clear, back, pecks = hole.retract, hole.clear, given.code != "G81"
+    if not hole.bottom < 0.0 or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= hole.dwell <= SECONDS_PER_DAY:
+        raise state.fail(shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more")
     if "RETURN" in values and not back > 0.0:
-        raise fail("RETURN,0 goes to a plane of the CAM system's", "a height above the point")
+        raise _refusal(state, "RETURN,0 goes to a plane of the CAM system's", "a height above the point")
     if back < clear:
-        raise fail("a return below CLEAR", "a height of CLEAR or more", hint="")
-    if fedto and back != clear:
-        raise fail("CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate", "DEPTH")
-    if code == "G81" and peck:
-        raise fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP", hint="")
-    if code != "G81" and (not peck > 0.0 or (clear + depth) / peck > MOST_PECKS):
-        raise fail(f"{statement.shown} without its STEP, or with one too small", "STEP above 0", hint="")
-    if dwell and code != "G81":
-        raise fail("DWELL in a cycle with pecks", "no DWELL")
-    factor, per_revolution = feed_units[unit]
-    feed = values["feed"] * (scale if factor is None else factor)
-    return Cycle(Drilling("G82" if dwell else code, -depth, clear, back, peck, dwell), feed, per_revolution)
+        raise state.fail("a return below CLEAR", "a height of CLEAR or more")
+    if given.fedto and back != clear:
+        raise _refusal(
+            state, "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate", "DEPTH"
+        )
+    if hole.peck and not pecks:
+        raise state.fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP")
+    if pecks and (not hole.peck > 0.0 or (clear - hole.bottom) / hole.peck > MOST_PECKS):
+        raise state.fail(f"{shown} without its STEP, or with one too small", "STEP above 0")
+    if hole.dwell and pecks:
+        raise _refusal(state, "DWELL in a cycle with pecks", "no DWELL")

@@ -1,279 +1,270 @@
-"""Statements of a cutter-location file, executed in order: points, circles, holes."""
+"""A cutter-location file to `Program`, the same contract as the reader of G code; or checked, with all its errors."""
 
 from __future__ import annotations
 
+import copy
+import math
 import re
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.arcs import ArcError
-from toolpath_stiff.nc.cutter_location import vocabulary
-from toolpath_stiff.nc.cutter_location.curves import Curves
-from toolpath_stiff.nc.cutter_location.cycles import Cycle, read_cycle
-from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS, NO_UNITS
-from toolpath_stiff.nc.cutter_location.statements import (
-    Statement,
-    frame_in_comment,
-    is_number,
-    number_of,
-    plain_point,
-    read_statement,
-)
-from toolpath_stiff.nc.cutter_location.tilting import AxisError, Vector
-from toolpath_stiff.nc.cutter_location.tool_path import NoFeedError
-from toolpath_stiff.nc.moves import FEED, RAPID, Unsupported
+from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.cutter_location.geometry import AxisError
+from toolpath_stiff.nc.cutter_location.modes import one_frame
+from toolpath_stiff.nc.cutter_location.motion import to_point
+from toolpath_stiff.nc.cutter_location.state import State
+from toolpath_stiff.nc.cutter_location.statements import Statement, frame_in_comment, plain_point, read_statement
+from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
+from toolpath_stiff.nc.frames import Pose
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 
+NO_CUT = "no cutting move"
+NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
 # CATIA's heading of an operation, a comment; NX and Autodesk's posts have TOOL PATH/ and CSI_TOOL_PATH/.
 OPERATION = re.compile(r"\s*\$\$\s*OPERATION NAME\s*:\s*(.*\S)", re.IGNORECASE)
-HEADINGS = ("TOOL PATH", "CSI_TOOL_PATH")
 PACKED_AT = 50_000  # moves
-LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
+
+OnError = Callable[[InputError], None]
+OnWord = Callable[[str, int], None]
 
 
-class CutterLocation(Curves):
-    """Executes statements; `recorder`, `unsupported`, `warnings`, `assumptions` hold what was found."""
+def not_for(controller: Controller, offsets_given: bool, block_delete: bool) -> tuple[str, ...]:
+    """Warnings about what was asked for and means nothing to a cutter-location file."""
+    given = (
+        ("a dialect", controller.dialect.name != "generic"),
+        ("work offsets", offsets_given),
+        ("posted kinematics", controller.kinematics is not None),
+        ("block-delete switches", block_delete or bool(controller.switches)),
+        ("posted kinematics", controller.kinematics is not None),
+    )
+    return tuple(f"{what} mean nothing to a cutter-location file and are not used" for what, asked in given if asked)
 
-    def __init__(self, name: str, tools: dict[int, ToolEntry] | None) -> None:
-        super().__init__(name, tools)
-        self._last_word = ""
-        self.marks: list[tuple[int, str]] = []  # line and name of each operation
-        self._acts: dict[str, Callable[[Statement], None]] = {
-            "GOTO": self._goto,
-            "": self._more_points,
-            "GODLTA": self._godlta,
-            "FROM": self._from,
-            "GOHOME": self._gohome,
-            "RAPID": self._set_rapid,
-            "FEDRAT": self._fedrat,
-            "SPINDL": self._spindl,
-            "UNITS": self._units,
-            "UNIT": self._units,
-            "MULTAX": self._multax,
-            "TLAXIS": self._tlaxis,
-            "CIRCLE": self._circle,
-            "MOVARC": self._movarc,
-            "INDIRV": self._indirv,
-            "TLON,GOFWD": self._tlon,
-            "LOADTL": self._loadtl,
-            "LOAD": self._load,
-            "CUTTER": self._cutter,
-            "TLDATA": self._tldata,
-            "TOOL PATH": self._tool_path,
-            "DELAY": self._delay,
-            "DWELL": self._delay,
-            "CYCLE": self._cycle_word,
-            "CUTCOM": self._cutcom,
-            "MODE": self._mode,
-            "TOOLNO": self._toolno,
-            "TRANS": self._shift,
-            "ORIGIN": self._shift,
-            "MSYS": self._frame_word,
-            "MCS": self._frame_word,
-            "CSYS": self._frame_word,
-            "ZERO": self._frame_word,
-            "FINI": self._fini,
-        }
 
-    # -- running -----------------------------------------------------------------------------------------------------
+def read(
+    lines: tuple[str, ...],
+    name: str,
+    path: str,
+    origin: Pose | None,
+    default_origin: Pose,
+    tools: dict[int, ToolEntry] | None,
+    warnings: tuple[str, ...] = (),
+) -> Program:
+    """Read a cutter-location file.
 
-    def run(self, lines: tuple[str, ...], on_error: Callable[[InputError], None] | None = None) -> None:
-        """Read all lines; with `on_error`, go on with the next statement after an error."""
-        at = 0
-        while at < len(lines) and not self.ended:
-            here = at
-            if len(self.recorder.line) > PACKED_AT:
-                self.recorder.pack()
-            try:
-                numbers = plain_point(lines[at])
-                if numbers is not None:
-                    self.statement = Statement(at + 1, 1, "GOTO")
-                    self.seen("GOTO", at + 1)
-                    at += 1
-                    self._checked(self._points, numbers)
-                    self._last_word = "GOTO"
-                    continue
-                statement, at = read_statement(lines, at, self.name)
-                if statement is None:
-                    self._comment(lines, here)
-                else:
-                    self.statement = statement
-                    self.seen(statement.word, statement.line)
-                    self._checked(self.execute, statement)
-                    self._last_word = statement.word or self._last_word
-            except InputError as error:
-                if on_error is None:
-                    raise
-                on_error(error)
-                at = max(at, here + 1)
-        if self.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[at:]):
-            self.warnings.append(f"line {at}: FINI ends the file; what follows is not read")
+    Parameters
+    ----------
+    lines, name, path
+        The file's lines; its name for messages; where it lies.
+    origin, default_origin
+        Where program zero sits, m and rad: as asked for, and unless anyone says.
+    tools
+        Tool table; its lengths win over the file's.
+    warnings
+        What the reader has to say beforehand.
+
+    Raises
+    ------
+    InputError
+        With line and column, what was found and what was expected.
+    """
+    state = State(name, copy.deepcopy(tools))
+    run(state, lines)
+    if not state.recorder.cuts:
+        raise _no_cut(name)
+    return Program(
+        name=name,
+        path=path,
+        source=lines,
+        moves=state.recorder.moves(),
+        origin=default_origin if origin is None else origin,
+        origin_source="default" if origin is None else "option",
+        unsupported=unsupported(state),
+        warnings=(*warnings, *state.warnings),
+        assumptions=tuple(state.assumptions),
+        tools=tuple(state.used_tools.values()),
+        dialect=CUTTER_LOCATION,
+        marks=tuple(state.marks),
+    )
+
+
+def _no_cut(name: str) -> InputError:
+    return InputError(NO_CUT, expected="GOTO/ after FEDRAT/, not after RAPID", file=name)
+
+
+# -- running -----------------------------------------------------------------------------------------------------------
+
+
+def run(state: State, lines: tuple[str, ...], on_error: OnError | None = None, on_word: OnWord | None = None) -> None:
+    """Execute all lines in order.
+
+    Parameters
+    ----------
+    state
+        What is in force; it goes on from there.
+    lines
+        The file's.
+    on_error
+        Called with an error, after which the next statement is executed; without it errors are raised.
+    on_word
+        Called with the word and line of every statement.
+    """
+    at = 0
+    while at < len(lines) and not state.ended:
+        if len(state.recorder.line) > PACKED_AT:
+            state.recorder.pack()
+        here = at
         try:
-            self._no_circle("the end of the file")
+            statement: Statement | None = Statement(at + 1, 1, "GOTO")
+            point = plain_point(lines[at])
+            if point is None:
+                statement, at = read_statement(lines, at, state.name)
+            else:
+                at += 1
+            if statement is None:
+                _comment(state, lines, here)
+            else:
+                if on_word is not None:
+                    on_word(statement.word, statement.line)
+                _perform(state, statement, point)
         except InputError as error:
-            if on_error is None:
-                raise
-            on_error(error)
-        self._finish()
+            _pass_on(error, on_error)
+            at = max(at, here + 1)
+    if state.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[at:]):
+        state.warnings.append(f"line {at}: FINI ends the file; what follows is not read")
+    try:
+        state.no_circle("the end of the file")
+    except InputError as error:
+        _pass_on(error, on_error)
+    _conclude(state)
 
-    def _comment(self, lines: tuple[str, ...], at: int) -> None:
-        """What CAM systems say in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
-        found = OPERATION.match(lines[at])
-        if found:
-            self.marks.append((at + 1, found[1]))
-            return
-        frame = frame_in_comment(lines, at)
-        if frame is not None:
-            self.statement = Statement(at + 1, 1, frame[0])
-            self._one_frame(*frame, lines[at].strip()[:40])
 
-    def seen(self, word: str, line: int) -> None:
-        """Called for every statement; the check counts them."""
+def _pass_on(error: InputError, on_error: OnError | None) -> None:
+    if on_error is None:
+        raise error
+    on_error(error)
 
-    def _checked(self, act: Callable[..., None], what: object) -> None:
-        """Errors of the geometry get the place of their statement."""
-        try:
-            act(what)
-        except (ArcError, AxisError, NoFeedError) as error:
-            raise self.fail(error.found, error.expected) from None
 
-    def _finish(self) -> None:
-        if not self.units_said and len(self.recorder):
-            self.assume(NO_UNITS)
-        for noted in self.doubtful.values():
-            times = f" ({noted.count} times)" if noted.count > 1 else ""
-            self.warnings.append(f"line {noted.statement.line}: {noted.statement.shown}: {noted.reason}{times}")
-        if self.unsmooth and not self.smooth:
-            self.warnings.append(
-                f"line {self.first_unsmooth}: the tool turns back where this arc begins, and no arc of the file begins "
-                "smoothly: look whether the arcs turn the right way about their axes"
-            )
+def _perform(state: State, statement: Statement, point: list[float] | None) -> None:
+    """Execute a statement, whose numbers are known if it is a plain GOTO; geometry's errors get its place."""
+    state.statement = statement
+    try:
+        if point is None:
+            execute(state, statement)
+        else:
+            to_point(state, point)
+    except (ArcError, AxisError) as error:
+        raise state.fail(error.found, error.expected) from None
+    state.last_word = statement.word or state.last_word
 
-    @property
-    def unsupported(self) -> tuple[Unsupported, ...]:
-        """Words that were not acted upon, in the order of the file, each once."""
-        both = sorted({**self.noted, **self.doubtful}.values(), key=lambda noted: noted.statement.line)
-        return tuple(
-            Unsupported(
-                noted.statement.line,
-                noted.statement.column,
-                noted.statement.word,
-                noted.reason + (f" ({noted.count} times)" if noted.count > 1 else ""),
-            )
-            for noted in both
+
+def _comment(state: State, lines: tuple[str, ...], at: int) -> None:
+    """What CAM systems say in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
+    found = OPERATION.match(lines[at])
+    if found:
+        state.marks.append((at + 1, found[1]))
+        return
+    frame = frame_in_comment(lines, at)
+    if frame is not None:
+        state.statement = Statement(at + 1, 1, frame[0])
+        one_frame(state, *frame, lines[at].strip()[:40])
+
+
+def _conclude(state: State) -> None:
+    """What is to say of the file as a whole."""
+    if not state.units_said and len(state.recorder):
+        state.assume(NO_UNITS)
+    for noted in state.doubtful.values():
+        statement = noted.statement
+        state.warnings.append(f"line {statement.line}: {statement.shown}: {noted.reason}{noted.times}")
+    if state.unsmooth and not state.smooth:
+        state.warnings.append(
+            f"line {state.first_unsmooth}: the tool turns back where this arc begins, and no arc of the file begins "
+            "smoothly: look whether the arcs turn the right way about their axes"
         )
 
-    # -- words -------------------------------------------------------------------------------------------------------
 
-    def execute(self, statement: Statement) -> None:
-        """Execute a statement."""
-        word = statement.word
-        if word in HEADINGS and statement.arguments:
-            self.marks.append((statement.line, statement.arguments[0].text))
-        act = self._acts.get(word)
-        if act is not None:
-            act(statement)
-        elif word in vocabulary.HARMLESS:
-            self._note(self.noted, statement, vocabulary.HARMLESS[word])
-        elif word.partition(",")[0] in vocabulary.REFUSED:
-            found, hint = vocabulary.REFUSED[word.partition(",")[0]]
-            raise self.fail(f"{statement.shown} {found}, which is not supported", vocabulary.GEOMETRY, hint)
-        elif word in vocabulary.DOUBTFUL:
-            self._note(self.doubtful, statement, vocabulary.DOUBTFUL[word])
-        elif LIKE_G_CODE.match(word) or (not statement.arguments and " " in word):
-            raise self.fail(f"{statement.shown!r} is no statement of a cutter-location file", "a word of APT's")
-        elif word.startswith(vocabulary.LIKE_MOTION) or self._carries_point(statement):
-            raise self.fail(
-                f"{statement.shown}: {word} {vocabulary.UNKNOWN}, and may move the tool",
-                vocabulary.GEOMETRY,
-                "take the line out if it does not",
-            )
-        else:
-            self._note(self.doubtful, statement, f"{word} {vocabulary.UNKNOWN}, and not acted upon")
+def unsupported(state: State) -> tuple[Unsupported, ...]:
+    """Words that were not acted upon, in the order of the file, each once."""
+    both = sorted({**state.noted, **state.doubtful}.values(), key=lambda noted: noted.statement.line)
+    return tuple(
+        Unsupported(noted.statement.line, noted.statement.column, noted.statement.word, f"{noted.reason}{noted.times}")
+        for noted in both
+    )
 
-    def _carries_point(self, statement: Statement) -> bool:
-        numbers = sum(is_number(argument.text) for argument in statement.arguments)
-        return numbers == len(statement.arguments) >= vocabulary.NUMBERS_OF_A_POINT
 
-    # -- points ------------------------------------------------------------------------------------------------------
+# -- checking ----------------------------------------------------------------------------------------------------------
 
-    def _goto(self, statement: Statement) -> None:
-        named = next((a for a in statement.arguments if a.text[:1].isalpha() or a.text[:1] == "("), None)
-        if named is not None:
-            hint = "names need APT's processor: give the file of points that it writes"
-            raise self.fail(f"GOTO/ to {named.text[:30]!r}", "numbers", hint, named)
-        numbers = [number_of(argument, self.name) for argument in statement.arguments]
-        if len(numbers) in (3, 6):
-            self._points(numbers)
-        elif self.circle is not None and len(numbers) >= 9 and len(numbers) % 3 == 0 and not self.multax:
-            self.arc_through([self._scaled(numbers[i : i + 3]) for i in range(0, len(numbers), 3)], self.next_axis)
-        else:
-            raise self.fail(f"GOTO/ with {len(numbers)} numbers", "x,y,z or x,y,z,i,j,k")
 
-    def _more_points(self, statement: Statement) -> None:
-        """A line of numbers alone after GOTO: the next point (Creo writes arcs so)."""
-        if self._last_word != "GOTO":
-            raise self.fail(f"{statement.text[:30]!r} is no statement", "a word, / and its arguments")
-        self.circle = self.followed
-        self._points(self._numbers(statement, 3, 6))
+@dataclass
+class CheckedCutterLocation:
+    """A cutter-location file read with all its errors.
 
-    def _points(self, numbers: list[float]) -> None:
-        """A point, with its tool axis or the one in force."""
-        axis = self._axis_of(numbers)
-        target = self._scaled(numbers[:3])
-        if self.circle is not None:
-            self.arc_through([target], axis)
-            return
-        if self.cycle is not None:
-            self._drill(target, axis, self.cycle)
-            return
-        self._go(target, axis)
+    Attributes
+    ----------
+    state
+        After the last statement.
+    start, end
+        What was in force before the first and after the last.
+    errors
+        Those found.
+    used
+        Words to the line where they stand first and how often.
+    """
 
-    def _go(self, target: Vector, axis: Vector) -> None:
-        motion = RAPID if self.rapid else FEED
-        self.rapid, self.followed, self.direction = 0, None, None
-        self.straight(self.statement.line, motion, target, axis)
+    state: State
+    start: dict[str, str]
+    end: dict[str, str] = field(default_factory=dict)
+    errors: list[InputError] = field(default_factory=list)
+    used: dict[str, list[int]] = field(default_factory=dict)
 
-    def _godlta(self, statement: Statement) -> None:
-        if self.point is None:
-            raise self.fail("GODLTA/ before any point", "FROM/ or GOTO/ before it")
-        numbers = self._numbers(statement, 3, 6)
-        if self.circle is not None or self.cycle is not None:
-            raise self.fail("GODLTA/ on a circle or in a cycle", "GOTO/")
-        axis = self._axis_of(numbers)
-        x, y, z = (p + d for p, d in zip(self.point, self._scaled(numbers[:3]), strict=True))
-        self._go((x, y, z), axis)
+    def meanings(self) -> list[tuple[str, str, int, int]]:
+        """Words used: word, meaning, first line, count."""
+        return [(word, meaning_of(word), line, count) for word, (line, count) in self.used.items()]
 
-    def _gohome(self, statement: Statement) -> None:
-        """NX says where home is; without a point it is the control's."""
-        if statement.arguments:
-            self._points(self._numbers(statement, 3, 6))
-            return
-        self._no_circle("GOHOME")
-        self.rapid = 0
-        self._note(self.doubtful, statement, vocabulary.DOUBTFUL["GOHOME"])
 
-    def _from(self, statement: Statement) -> None:
-        numbers = self._numbers(statement, 3, 6)
-        axis = self._axis_of(numbers)
-        if len(self.recorder):
-            self.warnings.append(
-                f"line {statement.line}: FROM amid the path: the tool is taken to stand there; how it came is not said"
-            )
-        self._no_circle("FROM/")
-        self.stand(self._scaled(numbers[:3]), axis)
+def check(
+    lines: tuple[str, ...], name: str, tools: dict[int, ToolEntry] | None, most_errors: int
+) -> CheckedCutterLocation:
+    """Check a cutter-location file: it goes on where `read` would stop, up to so many errors."""
+    state = State(name, copy.deepcopy(tools))
+    checked = CheckedCutterLocation(state, in_force(state))
 
-    # -- cycles ------------------------------------------------------------------------------------------------------
+    def on_error(error: InputError) -> None:
+        checked.errors.append(error)
+        if len(checked.errors) >= most_errors:
+            raise error
 
-    def _cycle_word(self, statement: Statement) -> None:
-        self._no_circle("CYCLE/")
-        self.cycle = read_cycle(statement, self.name, self.scale, FEED_UNITS)
+    def on_word(word: str, line: int) -> None:
+        if word in checked.used:
+            checked.used[word][1] += 1
+        elif word:
+            checked.used[word] = [line, 1]
 
-    def _drill(self, target: Vector, axis: Vector, cycle: Cycle) -> None:
-        self.rapid, self.followed = 0, None
-        if self.point is not None and axis != self.axis:
-            raise self.fail(
-                "a hole with another tool axis than the move before", "a GOTO/ before the cycle that turns the tool"
-            )
-        feed = self.feed_per_minute(cycle.feed, cycle.per_revolution)
-        self.hole(self.statement.line, target, axis, cycle.hole, feed)
+    try:
+        run(state, lines, on_error, on_word)
+    except InputError as error:
+        if error not in checked.errors:
+            checked.errors.append(error)
+    if not checked.errors and not state.recorder.cuts:
+        checked.errors.append(_no_cut(name))
+    checked.end = in_force(state)
+    return checked
+
+
+def in_force(state: State) -> dict[str, str]:
+    """What is in force, names to words."""
+    i, j, k = state.next_axis
+    feed = "none" if state.feed is None else f"{state.feed:g} mm/{'rev' if state.per_revolution else 'min'}"
+    return {
+        "units": "mm" if state.scale == 1.0 else "inch",
+        "tool axis": f"{i:g} {j:g} {k:g}",
+        "MULTAX": {None: "not said", True: "on", False: "off"}[state.multax],
+        "feed": feed,
+        "spindle": f"{state.speed:g} rpm",
+        "tool": str(state.tool),
+        "tool length": "reference" if math.isnan(state.tool_length) else f"{state.tool_length:g} mm",
+        "cycle": "off" if state.cycle is None else "on",
+    }

@@ -59,6 +59,11 @@ class Statement:
     text: str = ""
 
     @property
+    def words(self) -> list[str]:
+        """The arguments in upper case."""
+        return [argument.text.upper() for argument in self.arguments]
+
+    @property
     def shown(self) -> str:
         """The statement for a message."""
         arguments = ",".join(" ".join(argument.text.split()) for argument in self.arguments)
