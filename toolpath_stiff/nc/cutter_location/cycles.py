@@ -14,9 +14,8 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location import tool_path
 from toolpath_stiff.nc.cutter_location.geometry import Vector
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS, SECONDS_PER_DAY
-from toolpath_stiff.nc.cutter_location.state import Cycle, State
+from toolpath_stiff.nc.cutter_location.state import ALL, PTC, Cycle, State, Word
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
-from toolpath_stiff.nc.cutter_location.vocabulary import PTC, word
 from toolpath_stiff.nc.cycles import Drilling
 
 # The first word, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip breaking).
@@ -37,7 +36,6 @@ class _Given:
     fedto: bool = False
 
 
-@word("CYCLE", meaning="drilling cycle", source=PTC, form="/DRILL, /DEEP or /BRKCHP in pairs, /OFF")
 def cycle(state: State, statement: Statement) -> None:
     """The cycle that the next points drill; CYCLE/OFF ends it."""
     state.no_circle("CYCLE/")
@@ -138,3 +136,6 @@ def _check(state: State, given: _Given, hole: Drilling) -> None:
         raise state.fail(f"{shown} without its STEP, or with one too small", "STEP above 0")
     if hole.dwell and pecks:
         raise _refusal(state, "DWELL in a cycle with pecks", "no DWELL")
+
+
+WORDS = (Word("CYCLE", cycle, "drilling cycle", ALL, PTC, "/DRILL, DEEP or BRKCHP and pairs, or /OFF"),)

@@ -5,28 +5,24 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, unit_axis
-from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
-from toolpath_stiff.nc.cutter_location.vocabulary import (
+from toolpath_stiff.nc.cutter_location.state import (
+    ALL,
     AUTODESK,
     CAMPLETE,
     CATIA,
-    COMPENSATION,
     CREO,
-    HEADING,
+    ISO,
     LISTED,
     NX,
     POSTS,
     PTC,
     REFUSED,
     SIEMENS,
-    TOOL,
-    TOOL_CENTRE,
     VERICUT,
-    WORDS,
-    list_it,
-    word,
+    State,
+    Word,
 )
+from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
 from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -48,13 +44,19 @@ LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_
 SEVERAL_TOOLS = ToolUse(0, math.nan, math.nan, "several tools without numbers")
 SAME_LENGTH_MM = 1e-3
 TURNING, A_MILL = "is not milling", "this is a mill"
+COMPENSATION = "cutter compensation"
+TOOL_CENTRE = "have the CAM system write the path of the tool centre"
+SHIFTS = "shifts all that follows"
+HEADING = "a heading or a remark"
+TOOL = "about the tool; LOADTL, LOAD/TOOL and CUTTER are what counts"
+_FRAME = "where the points' coordinate system lies in the part; the points are taken in that system, as program zero"
+_ZERO = "the work offset of the posted program; here it is program zero"
+FRAMES = {"MSYS": _FRAME, "MCS": _FRAME, "CSYS": _FRAME, "ZERO": _ZERO}
 
 
 # -- units, feed, spindle ----------------------------------------------------------------------------------------------
 
 
-@word("UNITS", meaning="length unit", by=f"{CREO}, {AUTODESK}", form="/MM or /INCHES")
-@word("UNIT", meaning="length unit", by=AUTODESK)
 def units(state: State, statement: Statement) -> None:
     """The length unit; before the first points, which are mm without it."""
     words = statement.words
@@ -67,7 +69,6 @@ def units(state: State, statement: Statement) -> None:
     state.scale, state.units_said = LENGTH_UNITS[words[0]], True
 
 
-@word("FEDRAT", meaning="feed")
 def fedrat(state: State, statement: Statement) -> None:
     """The feed: a number, and its unit before or after it."""
     words = statement.words
@@ -104,7 +105,6 @@ def _inverse(state: State, statement: Statement) -> None:
     state.note(state.noted, "how the post processor writes feeds")
 
 
-@word("SPINDL", meaning="spindle speed")
 def spindl(state: State, statement: Statement) -> None:
     """Revolutions per minute, and whether the spindle turns; surface speeds are listed."""
     words = statement.words
@@ -122,7 +122,6 @@ def spindl(state: State, statement: Statement) -> None:
     state.speed = state.revolutions
 
 
-@word("DELAY", "DWELL", meaning="pause")
 def delay(state: State, statement: Statement) -> None:
     """A pause in seconds, or in revolutions and REV."""
     words = statement.words
@@ -141,7 +140,6 @@ def delay(state: State, statement: Statement) -> None:
 # -- tool axis, coordinate systems -------------------------------------------------------------------------------------
 
 
-@word("MULTAX", meaning="whether points carry a tool axis", by=f"{CATIA}, {CREO}, {AUTODESK}")
 def multax(state: State, statement: Statement) -> None:
     """Points carry a tool axis; after MULTAX/OFF a tilted tool must be said again."""
     words = statement.words
@@ -152,31 +150,17 @@ def multax(state: State, statement: Statement) -> None:
         state.axis_said = False
 
 
-@word("TLAXIS", meaning="tool axis", by="", form="/i,j,k")
 def tlaxis(state: State, statement: Statement) -> None:
     """The tool axis of points that give none."""
     x, y, z = state.numbers(statement, 3)
     state.next_axis, state.axis_said = unit_axis(x, y, z), True
 
 
-_FRAME = "where the points' coordinate system lies in the part; the points are taken in that system, as program zero"
-
-
-@word("MSYS", meaning=_FRAME, kind=LISTED, by=NX, source=SIEMENS)
-@word("MCS", meaning=_FRAME, kind=LISTED, by=AUTODESK, source=POSTS)
-@word("CSYS", meaning=_FRAME, kind=LISTED, by="", source=VERICUT)
-@word(
-    "ZERO",
-    meaning="the work offset of the posted program; here it is program zero",
-    kind=LISTED,
-    by=AUTODESK,
-    source=POSTS,
-)
 def frame_word(state: State, statement: Statement) -> None:
     """A second, different one is refused."""
     numbers = tuple(state.number(a) for a in statement.arguments if is_number(a.text))
     one_frame(state, statement.word, numbers, statement.shown)
-    list_it(state, statement)
+    state.note(state.noted, FRAMES[statement.word])
 
 
 def one_frame(state: State, kind: str, numbers: tuple[float, ...], shown: str) -> None:
@@ -192,7 +176,6 @@ def one_frame(state: State, kind: str, numbers: tuple[float, ...], shown: str) -
     state.frames[kind] = numbers
 
 
-@word("TRANS", "ORIGIN", meaning="shifts all that follows", kind=REFUSED, by="", form="/x,y,z other than 0,0,0")
 def shift(state: State, statement: Statement) -> None:
     """Refused unless it is zero."""
     if statement.arguments and all(is_number(word) for word in statement.words):
@@ -200,12 +183,10 @@ def shift(state: State, statement: Statement) -> None:
         if len(numbers) == 3 and not any(numbers):
             state.note(state.noted, "a shift by nothing")
             return
-    shifts = WORDS[statement.word].meaning
     hint = "have the CAM system write the points where they are cut"
-    raise state.fail(f"{statement.shown} {shifts}, which is not supported", "0,0,0", hint)
+    raise state.fail(f"{statement.shown} {SHIFTS}, which is not supported", "0,0,0", hint)
 
 
-@word("CUTCOM", meaning=COMPENSATION, by=f"{CATIA}, {CREO}", form="/OFF")
 def cutcom(state: State, statement: Statement) -> None:
     """Refused unless it is off."""
     if statement.words != ["OFF"]:
@@ -213,7 +194,6 @@ def cutcom(state: State, statement: Statement) -> None:
     state.note(state.noted, "cutter compensation is off")
 
 
-@word("MODE", meaning="milling, not turning", by=AUTODESK, form="/MILL")
 def mode(state: State, statement: Statement) -> None:
     """Refused unless it is milling."""
     if statement.words != ["MILL"]:
@@ -224,7 +204,6 @@ def mode(state: State, statement: Statement) -> None:
 # -- tools -------------------------------------------------------------------------------------------------------------
 
 
-@word("LOADTL", meaning="tool change", by=f"{CATIA}, {CREO}, {AUTODESK}", source=PTC)
 def loadtl(state: State, statement: Statement) -> None:
     """Another tool: its number, and perhaps LENGTH and the length."""
     if not statement.arguments:
@@ -232,7 +211,6 @@ def loadtl(state: State, statement: Statement) -> None:
     _change_tool(state, statement, statement.arguments[0])
 
 
-@word("LOAD", meaning="tool change", by=NX, source=SIEMENS, form="/TOOL,n")
 def load(state: State, statement: Statement) -> None:
     """NX' LOAD/TOOL and the number."""
     words = statement.words
@@ -269,15 +247,13 @@ def _length_of(state: State, number: int, said: float) -> float:
     return entry.length
 
 
-@word("TOOLNO", meaning=TOOL, kind=LISTED, by=CATIA)
 def toolno(state: State, statement: Statement) -> None:
     """Listed; a turning tool is refused."""
     if "TURN" in statement.words:
         raise state.fail(f"{statement.shown} {TURNING}", "a milling tool", A_MILL)
-    list_it(state, statement)
+    state.note(state.noted, TOOL)
 
 
-@word("CUTTER", meaning="tool diameter", by=f"{CATIA}, {CREO}, {AUTODESK}")
 def cutter(state: State, statement: Statement) -> None:
     """The first number is the diameter, in all of APT's forms."""
     first = statement.arguments[0] if statement.arguments else None
@@ -285,7 +261,6 @@ def cutter(state: State, statement: Statement) -> None:
         _diameter(state, first)
 
 
-@word("TLDATA", meaning="tool diameter", by=NX, source=SIEMENS)
 def tldata(state: State, statement: Statement) -> None:
     """The first number, after the kind of tool."""
     first = next((argument for argument in statement.arguments if is_number(argument.text)), None)
@@ -302,15 +277,13 @@ def _diameter(state: State, argument: Argument) -> None:
 # -- operations, the end -----------------------------------------------------------------------------------------------
 
 
-@word("CSI_TOOL_PATH", meaning=HEADING, kind=LISTED, by=CAMPLETE, source=POSTS)
 def heading(state: State, statement: Statement) -> None:
     """The name of an operation."""
     if statement.arguments:
         state.marks.append((statement.line, statement.arguments[0].text))
-    list_it(state, statement)
+    state.note(state.noted, HEADING)
 
 
-@word("TOOL PATH", meaning=HEADING, kind=LISTED, by=NX, source=SIEMENS)
 def tool_path(state: State, statement: Statement) -> None:
     """The name of an operation, and of its tool."""
     if statement.arguments:
@@ -322,11 +295,39 @@ def tool_path(state: State, statement: Statement) -> None:
         if state.tool == 0 and 0 in state.used_tools and name != state.tool_name:
             state.used_tools[0] = SEVERAL_TOOLS
         state.tool_name = name
-    list_it(state, statement)
+    state.note(state.noted, HEADING)
 
 
-@word("FINI", meaning="end of the file", by=f"{CATIA}, {CREO}, {AUTODESK}")
 def fini(state: State, statement: Statement) -> None:
     """What follows is not read."""
     state.no_circle("FINI")
     state.ended = True
+
+
+_MOST = f"{CATIA}, {CREO}, {AUTODESK}"
+WORDS = (
+    Word("FEDRAT", fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
+    Word("SPINDL", spindl, "spindle speed", ALL, ISO),
+    Word("UNITS", units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),
+    Word("UNIT", units, "length unit", "", ISO, "/MM or INCHES"),
+    Word("MULTAX", multax, "whether points carry a tool axis", _MOST, ISO, "[/ON or OFF]"),
+    Word("TLAXIS", tlaxis, "tool axis", "", ISO, "/i,j,k"),
+    Word("LOADTL", loadtl, "tool change", _MOST, PTC, "/n[,LENGTH,l]"),
+    Word("LOAD", load, "tool change", NX, SIEMENS, "/TOOL,n"),
+    Word("CUTTER", cutter, "tool diameter", _MOST, ISO, "/d"),
+    Word("TLDATA", tldata, "tool diameter", NX, SIEMENS, "/kind,d"),
+    Word("DELAY", delay, "pause", ALL, ISO, "/seconds or revolutions,REV"),
+    Word("DWELL", delay, "pause", "", ISO, "/seconds or revolutions,REV"),
+    Word("MODE", mode, "milling, not turning", AUTODESK, POSTS, "/MILL"),
+    Word("CUTCOM", cutcom, COMPENSATION, f"{CATIA}, {CREO}", ISO, "/OFF"),
+    Word("FINI", fini, "end of the file", _MOST, ISO),
+    Word("TOOL PATH", tool_path, HEADING, NX, SIEMENS, "/name,TOOL,tool", LISTED),
+    Word("CSI_TOOL_PATH", heading, HEADING, CAMPLETE, POSTS, "/name", LISTED),
+    Word("TOOLNO", toolno, TOOL, CATIA, ISO, kind=LISTED),
+    Word("MSYS", frame_word, FRAMES["MSYS"], NX, SIEMENS, kind=LISTED),
+    Word("MCS", frame_word, FRAMES["MCS"], AUTODESK, POSTS, kind=LISTED),
+    Word("CSYS", frame_word, FRAMES["CSYS"], "", VERICUT, kind=LISTED),
+    Word("ZERO", frame_word, FRAMES["ZERO"], AUTODESK, POSTS, kind=LISTED),
+    Word("TRANS", shift, SHIFTS, "", ISO, "/x,y,z other than 0,0,0", REFUSED),
+    Word("ORIGIN", shift, SHIFTS, "", ISO, "/x,y,z other than 0,0,0", REFUSED),
+)

@@ -8,29 +8,31 @@ from dataclasses import replace
 from toolpath_stiff.nc.cutter_location import geometry, tool_path
 from toolpath_stiff.nc.cutter_location.cycles import drill
 from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, AxisError, Circle, Vector, unit_axis
-from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Nested, Statement, nested
-from toolpath_stiff.nc.cutter_location.vocabulary import (
+from toolpath_stiff.nc.cutter_location.state import (
+    ALL,
+    APT,
     AUTODESK,
     CATIA,
     CREO,
     DASSAULT,
     DOUBTFUL,
+    ISO,
     NX,
     PTC,
     SIEMENS,
-    doubt_it,
-    word,
+    State,
+    Word,
 )
+from toolpath_stiff.nc.cutter_location.statements import Nested, Statement, nested
 from toolpath_stiff.nc.moves import FEED, RAPID
 
+HOME = "home is the control's: the way there is not part of the path"
 ROUNDING = 1e-3  # rad, of the arcs that make a whole turn
 
 
 # -- points ------------------------------------------------------------------------------------------------------------
 
 
-@word("GOTO", meaning="the tool moves to a point", form="/x,y,z[,i,j,k]")
 def goto(state: State, statement: Statement) -> None:
     """A point; on a circle several points, too."""
     named = next((a for a in statement.arguments if a.text[:1].isalpha() or a.text[:1] == "("), None)
@@ -47,7 +49,6 @@ def goto(state: State, statement: Statement) -> None:
         raise state.fail(f"GOTO/ with {len(numbers)} numbers", "x,y,z or x,y,z,i,j,k")
 
 
-@word("", meaning="further points of the GOTO before it", by=CREO, source=PTC, form="x,y,z")
 def more_points(state: State, statement: Statement) -> None:
     """A line of numbers alone after GOTO: the next point (Creo writes arcs so)."""
     if state.last_word != "GOTO":
@@ -87,7 +88,6 @@ def _go(state: State, target: Vector, axis: Vector) -> None:
     tool_path.straight(state, motion, target, axis)
 
 
-@word("GODLTA", meaning="the tool moves by a distance", by="", form="/x,y,z[,i,j,k]")
 def godlta(state: State, statement: Statement) -> None:
     """A point by its distance from the last one."""
     if state.point is None:
@@ -100,7 +100,6 @@ def godlta(state: State, statement: Statement) -> None:
     _go(state, (x, y, z), axis)
 
 
-@word("FROM", meaning="the tool stands at a point", form="/x,y,z[,i,j,k]")
 def from_(state: State, statement: Statement) -> None:
     """Where the tool stands."""
     numbers = state.numbers(statement, 3, 6)
@@ -113,14 +112,6 @@ def from_(state: State, statement: Statement) -> None:
     tool_path.stand(state, state.scaled(numbers[:3]), axis)
 
 
-@word(
-    "GOHOME",
-    meaning="home is the control's: the way there is not part of the path",
-    by=NX,
-    kind=DOUBTFUL,
-    source=SIEMENS,
-    form=" without a point",
-)
 def gohome(state: State, statement: Statement) -> None:
     """NX says where home is; without a point it is the control's."""
     if statement.arguments:
@@ -128,10 +119,9 @@ def gohome(state: State, statement: Statement) -> None:
         return
     state.no_circle("GOHOME")
     state.rapid = 0
-    doubt_it(state, statement)
+    state.note(state.doubtful, HOME)
 
 
-@word("RAPID", meaning="the next motion is rapid")
 def rapid(state: State, statement: Statement) -> None:
     """The next motion, and no other, is rapid."""
     if statement.arguments:
@@ -146,13 +136,6 @@ def rapid(state: State, statement: Statement) -> None:
 # -- circles -----------------------------------------------------------------------------------------------------------
 
 
-@word(
-    "CIRCLE",
-    meaning="the next motion follows a circle",
-    by=f"{CREO}, {NX}, {AUTODESK}",
-    source=f"{PTC}; {SIEMENS}",
-    form="/x,y,z,i,j,k[,r[,t,f,d,e]][,TIMES,n]",
-)
 def circle(state: State, statement: Statement) -> None:
     """A circle in the forms of PTC, NX and APT."""
     times = 1
@@ -186,7 +169,6 @@ def _circle_axis(state: State, numbers: list[float]) -> Vector:
         raise state.fail(error.found.replace("a tool axis", "a circle's axis"), error.expected) from None
 
 
-@word("MOVARC", meaning="the next motion follows a circle", by=AUTODESK, form="/x,y,z,i,j,k,r,ANGLE,a")
 def movarc(state: State, statement: Statement) -> None:
     """A circle by the right hand, and the angle that is cut."""
     words = statement.words
@@ -200,7 +182,6 @@ def movarc(state: State, statement: Statement) -> None:
     _await_circle(state, Circle(center, axis, numbers[6] * state.scale, sweep=numbers[7]))
 
 
-@word("INDIRV", meaning="direction in which the next circle begins", by=f"{CATIA}, {CREO}", form="/i,j,k")
 def indirv(state: State, statement: Statement) -> None:
     """The direction at the start, which says which way round."""
     x, y, z = state.numbers(statement, 3)
@@ -259,13 +240,6 @@ def _arc_through(state: State, targets: list[Vector], axis: Vector) -> None:
             )
 
 
-@word(
-    "TLON,GOFWD",
-    meaning="the tool moves along a circle",
-    by=f"{CATIA}, {CREO}",
-    source=DASSAULT,
-    form="/(CIRCLE/x,y,z,r),ON,[2,INTOF,](LINE/x,y,z,x,y,z)",
-)
 def tlon(state: State, statement: Statement) -> None:
     """CATIA's and Creo's arcs in APT's own words."""
     if state.direction is None:
@@ -311,3 +285,19 @@ def _tlon_line(state: State, given: Nested) -> tuple[Vector, Vector]:
         if all(len(end) == 3 for end in ends):
             return state.scaled(ends[0]), state.scaled(ends[1])
     raise state.fail(f"TLON,GOFWD/ up to ({given[0]}/...)", "(LINE/x,y,z,x,y,z)")
+
+
+_POINT = "/x,y,z[,i,j,k]"
+_FOLLOWS = "the next motion follows a circle"
+WORDS = (
+    Word("GOTO", goto, "the tool moves to a point", ALL, ISO, _POINT),
+    Word("", more_points, "further points of the GOTO before it", CREO, PTC, "x,y,z[,i,j,k]"),
+    Word("GODLTA", godlta, "the tool moves by a distance", "", ISO, _POINT),
+    Word("FROM", from_, "the tool stands at a point", ALL, ISO, _POINT),
+    Word("RAPID", rapid, "the next motion is rapid", ALL, ISO),
+    Word("GOHOME", gohome, HOME, NX, SIEMENS, " without a point", DOUBTFUL),
+    Word("CIRCLE", circle, _FOLLOWS, f"{CREO}, {NX}, {AUTODESK}", f"{PTC}; {SIEMENS}", "/x,y,z,i,j,k[,r[,t,f,d,e]]"),
+    Word("MOVARC", movarc, _FOLLOWS, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
+    Word("INDIRV", indirv, "direction in which the next circle begins", f"{CATIA}, {CREO}", APT, "/i,j,k"),
+    Word("TLON,GOFWD", tlon, "the tool moves along a circle", f"{CATIA}, {CREO}", DASSAULT, "/(...),ON,(...)"),
+)

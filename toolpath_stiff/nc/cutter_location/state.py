@@ -1,8 +1,12 @@
-"""Everything that a cutter-location file has set so far, and everything found in it. mm, degrees, mm/min."""
+"""The state of a cutter-location file being read, and what a word is: a function of that state and its statement.
+
+mm, degrees, mm/min.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
@@ -145,3 +149,45 @@ class State:
         if not self.speed > 0.0:
             raise self.fail("a feed per revolution without a spindle speed", "SPINDL/ with RPM before it")
         return feed * self.speed
+
+
+Act = Callable[[State, Statement], None]
+
+# What becomes of a word.
+READ, LISTED, DOUBTFUL, REFUSED = "read", "listed", "listed, with a warning", "refused"
+# Who writes it.
+ALL, CREO, NX, CATIA, AUTODESK, CAMPLETE = "all", "Creo", "NX", "CATIA", "Autodesk", "Autodesk for CAMplete"
+# Where it is described.
+ISO, APT = "ISO 4343", "ISO 4342, the APT language"
+PTC, SIEMENS = 'PTC, "Supported CL Data Commands"', 'Siemens NX, "CLSF Manager"'
+DASSAULT, POSTS = "Dassault, CATIA's help on APT import", "Autodesk's APT posts"
+VERICUT, MANUALS = 'Vericut, "Supported APT-CLS NC Program Records"', "manuals of post processors"
+
+
+@dataclass(frozen=True)
+class Word:
+    """A major word of a statement.
+
+    Attributes
+    ----------
+    name
+        Upper case; "" is a line of numbers alone.
+    act
+        Executes a statement of it.
+    meaning
+        What it is taken for, as `tps check` lists it; of a refused word what it does.
+    written_by, source
+        Which CAM systems write it, "" where that is not known; where it is described.
+    form
+        The arguments that are read, for people.
+    kind
+        READ, LISTED, DOUBTFUL or REFUSED: what becomes of it.
+    """
+
+    name: str
+    act: Act
+    meaning: str
+    written_by: str
+    source: str
+    form: str = ""
+    kind: str = READ

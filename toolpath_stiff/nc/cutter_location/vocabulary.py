@@ -1,42 +1,40 @@
-"""The words of cutter-location files: one table from a word to its function, its meaning, who writes it, the source.
+"""The table of words of cutter-location files: word to function, meaning, who writes it, source; and how it is used.
 
-`word` registers a function that acts upon a word (`modes`, `motion`, `cycles`); the words that need none of their own,
-because they are listed, doubted or refused, stand here. `execute` looks words up.
+A word that acts is a row beside its function in `modes`, `motion` and `cycles`. Those that need no function of their
+own, because they are listed, doubted or refused, are rows here.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
 from itertools import groupby
 
-from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Statement, is_number
-
-Act = Callable[[State, Statement], None]
-
-# What becomes of a word.
-READ, LISTED, DOUBTFUL, REFUSED = "read", "listed", "listed, with a warning", "refused"
-
-# Who writes it.
-ALL, CREO, NX, CATIA, CAMPLETE, AUTODESK = (
-    "all",
-    "Creo",
-    "NX",
-    "CATIA",
-    "Autodesk's post for CAMplete",
-    "Autodesk's posts",
+from toolpath_stiff.nc.cutter_location import cycles, modes, motion
+from toolpath_stiff.nc.cutter_location.modes import COMPENSATION, HEADING, TOOL, TOOL_CENTRE
+from toolpath_stiff.nc.cutter_location.state import (
+    ALL,
+    APT,
+    CAMPLETE,
+    CATIA,
+    CREO,
+    DASSAULT,
+    DOUBTFUL,
+    ISO,
+    LISTED,
+    MANUALS,
+    NX,
+    POSTS,
+    PTC,
+    READ,
+    REFUSED,
+    SIEMENS,
+    VERICUT,
+    Act,
+    State,
+    Word,
 )
-# Where it is described.
-ISO = "ISO 4343"
-APT = "ISO 4342, the APT language"
-PTC = 'PTC, "Supported CL Data Commands"'
-SIEMENS = 'Siemens NX, "CLSF Manager"'
-DASSAULT = "Dassault, CATIA's help on APT import"
-POSTS = "Autodesk's APT posts"
-MANUALS = "manuals of post processors"
-VERICUT = 'Vericut, "Supported APT-CLS NC Program Records"'
+from toolpath_stiff.nc.cutter_location.statements import Statement, is_number
 
 GEOMETRY = "points, tool axes and feeds alone"
 UNKNOWN = "is not known"
@@ -46,138 +44,28 @@ NUMBERS_OF_A_POINT = 3
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
 
 
-@dataclass(frozen=True)
-class Word:
-    """A major word of a statement.
-
-    Attributes
-    ----------
-    name
-        Upper case; "" is a line of numbers alone.
-    act
-        Executes a statement of it.
-    meaning
-        What it is taken for, as `tps check` lists it; of a refused word what it does.
-    kind
-        READ, LISTED, DOUBTFUL or REFUSED: what becomes of it.
-    written_by, source
-        Which CAM systems write it; where it is described.
-    form
-        The arguments that are read, for a list of the words.
-    hint
-        What to do, where it is refused.
-    """
-
-    name: str
-    act: Act
-    meaning: str
-    kind: str
-    written_by: str
-    source: str
-    form: str = ""
-    hint: str = ""
-
-
-WORDS: dict[str, Word] = {}
-
-
-def word(
-    *names: str,
-    meaning: str,
-    by: str = ALL,
-    source: str = ISO,
-    form: str = "",
-    kind: str = READ,
-    hint: str = "",
-) -> Callable[[Act], Act]:
-    """Register a function for words; the arguments are those of `Word`."""
-
-    def register(act: Act) -> Act:
-        for name in names:
-            assert name not in WORDS, name
-            WORDS[name] = Word(name, act, meaning, kind, by, source, form, hint)
-        return act
-
-    return register
-
-
-def look_up(name: str) -> Word | None:
-    """The entry of a word; a refused one is refused with whatever follows its comma, as in `TLRGT,GORGT`."""
-    found = WORDS.get(name)
-    if found is None:
-        head = WORDS.get(name.partition(",")[0])
-        found = head if head is not None and head.act is refuse else None
-    return found
-
-
-def meaning_of(name: str) -> str:
-    """What a word is taken for, for a list of the words used."""
-    found = look_up(name)
-    if found is None:
-        return UNKNOWN
-    return f"{found.meaning}, not supported" if found.kind == REFUSED else found.meaning
-
-
-def execute(state: State, statement: Statement) -> None:
-    """Execute a statement."""
-    found = look_up(statement.word)
-    if found is not None:
-        found.act(state, statement)
-    else:
-        _unknown(state, statement)
-
-
-def _unknown(state: State, statement: Statement) -> None:
-    """Listed with a warning, and refused where the word may move the tool or belong to another language."""
-    name = statement.word
-    if LIKE_G_CODE.match(name) or (not statement.arguments and " " in name):
-        raise state.fail(f"{statement.shown!r} is no statement of a cutter-location file", "a word of APT's")
-    numbers = sum(is_number(argument.text) for argument in statement.arguments)
-    carries_point = numbers == len(statement.arguments) >= NUMBERS_OF_A_POINT
-    if name.startswith(LIKE_MOTION) or carries_point:
-        raise state.fail(
-            f"{statement.shown}: {name} {UNKNOWN}, and may move the tool",
-            GEOMETRY,
-            "take the line out if it does not",
-        )
-    state.note(state.doubtful, f"{name} {UNKNOWN}, and not acted upon")
-
-
-def rows() -> Iterator[tuple[str, str, str, str, str]]:
-    """The table for people: words, what they are taken for, what becomes of them, who writes them, the source."""
-
-    def alike(entry: Word) -> tuple[str, str, str, str]:
-        return (entry.kind, entry.meaning, entry.written_by, entry.source)
-
-    order = (READ, LISTED, DOUBTFUL, REFUSED)
-    entries = sorted(WORDS.values(), key=lambda entry: order.index(entry.kind))
-    for (kind, meaning, written_by, source), group in groupby(entries, alike):
-        names = " ".join(f"`{entry.name}{entry.form}`" for entry in group)
-        yield names, meaning, kind, written_by, source
-
-
 # -- words without a function of their own -----------------------------------------------------------------------------
 
 
-def list_it(state: State, statement: Statement) -> None:
-    """A word that changes nothing of the path."""
-    state.note(state.noted, WORDS[statement.word].meaning)
+def listed(reason: str) -> Act:
+    """What a word does that changes nothing of the path."""
+    return lambda state, statement: state.note(state.noted, reason)
 
 
-def doubt_it(state: State, statement: Statement) -> None:
-    """A word that hangs on the machine: listed, and a warning."""
-    state.note(state.doubtful, WORDS[statement.word].meaning)
+def doubted(reason: str) -> Act:
+    """What a word does that hangs on the machine: it is listed, and a warning."""
+    return lambda state, statement: state.note(state.doubtful, reason)
 
 
-def refuse(state: State, statement: Statement) -> None:
-    """A word that changes the path in a way that is not supported."""
-    entry = look_up(statement.word)
-    assert entry is not None
-    raise state.fail(f"{statement.shown} {entry.meaning}, which is not supported", GEOMETRY, entry.hint)
+def refused(what: str, hint: str) -> Act:
+    """What a word does that changes the path in a way that is not supported."""
+
+    def act(state: State, statement: Statement) -> None:
+        raise state.fail(f"{statement.shown} {what}, which is not supported", GEOMETRY, hint)
+
+    return act
 
 
-HEADING = "a heading or a remark"
-TOOL = "about the tool; LOADTL, LOAD/TOOL and CUTTER are what counts"
 _TOLERANCE = "a tolerance of the CAM system: the points are taken as they stand"
 _STOP = "a stop: the path goes on"
 _SCREEN = "for the CAM system's screen"
@@ -217,8 +105,6 @@ _DOUBTFUL = (
     ("statements that the operator may leave out: they are read", "", ISO, "OPSKIP"),
 )
 
-COMPENSATION = "cutter compensation"
-TOOL_CENTRE = "have the CAM system write the path of the tool centre"
 _WHERE_CUT = "have the CAM system write the points where they are cut"
 _POINT, _POINTS = "have the CAM system write the point", "have the CAM system write points"
 _ONE_SYSTEM = "have the CAM system write points and tool axes in one system"
@@ -244,9 +130,86 @@ _REFUSED = (
     ("is a polynomial", _POINTS, MANUALS, "POLYNO"),
 )
 
-for _meaning, _by, _source, _names in _LISTED:
-    word(*_names.split(), meaning=_meaning, by=_by, source=_source, kind=LISTED)(list_it)
-for _meaning, _by, _source, _names in _DOUBTFUL:
-    word(*_names.split(), meaning=_meaning, by=_by, source=_source, kind=DOUBTFUL)(doubt_it)
-for _meaning, _hint, _source, _names in _REFUSED:
-    word(*_names.split(), meaning=_meaning, by="", source=_source, kind=REFUSED, hint=_hint)(refuse)
+LISTED_WORDS = tuple(
+    Word(name, listed(meaning), meaning, by, source, kind=LISTED)
+    for meaning, by, source, names in _LISTED
+    for name in names.split()
+)
+DOUBTFUL_WORDS = tuple(
+    Word(name, doubted(meaning), meaning, by, source, kind=DOUBTFUL)
+    for meaning, by, source, names in _DOUBTFUL
+    for name in names.split()
+)
+REFUSED_WORDS = tuple(
+    Word(name, refused(what, hint), what, "", source, kind=REFUSED)
+    for what, hint, source, names in _REFUSED
+    for name in names.split()
+)
+
+
+# -- the table ---------------------------------------------------------------------------------------------------------
+
+
+def table(words: Iterable[Word]) -> dict[str, Word]:
+    """Name to word. Raises `ValueError` for a name that is there twice."""
+    found: dict[str, Word] = {}
+    for word in words:
+        if word.name in found:
+            raise ValueError(f"{word.name} is in the table twice")
+        found[word.name] = word
+    return found
+
+
+WORDS = table((*motion.WORDS, *cycles.WORDS, *modes.WORDS, *LISTED_WORDS, *DOUBTFUL_WORDS, *REFUSED_WORDS))
+REFUSED_HEADS = table(REFUSED_WORDS)
+
+
+def look_up(name: str) -> Word | None:
+    """The entry of a word; a refused one is refused with whatever follows its comma, as in `TLRGT,GORGT`."""
+    return WORDS.get(name) or REFUSED_HEADS.get(name.partition(",")[0])
+
+
+def meaning_of(name: str) -> str:
+    """What a word is taken for, for a list of the words used."""
+    found = look_up(name)
+    if found is None:
+        return UNKNOWN
+    return f"{found.meaning}, not supported" if found.kind == REFUSED else found.meaning
+
+
+def execute(state: State, statement: Statement) -> None:
+    """Execute a statement. Raises `InputError`, `arcs.ArcError` and `AxisError`."""
+    found = look_up(statement.word)
+    if found is None:
+        _unknown(state, statement)
+    else:
+        found.act(state, statement)
+
+
+def _unknown(state: State, statement: Statement) -> None:
+    """Listed with a warning, and refused where the word may move the tool or belong to another language."""
+    name = statement.word
+    if LIKE_G_CODE.match(name) or (not statement.arguments and " " in name):
+        raise state.fail(f"{statement.shown!r} is no statement of a cutter-location file", "a word of APT's")
+    numbers = sum(is_number(argument.text) for argument in statement.arguments)
+    carries_point = numbers == len(statement.arguments) >= NUMBERS_OF_A_POINT
+    if name.startswith(LIKE_MOTION) or carries_point:
+        raise state.fail(
+            f"{statement.shown}: {name} {UNKNOWN}, and may move the tool",
+            GEOMETRY,
+            "take the line out if it does not",
+        )
+    state.note(state.doubtful, f"{name} {UNKNOWN}, and not acted upon")
+
+
+def markdown() -> str:
+    """The table for people, as it stands in docs/nc.md: neighbours that say the same share a row."""
+    lines = ["| words | taken for | | written by | source |", "| --- | --- | --- | --- | --- |"]
+    order = (READ, LISTED, DOUBTFUL, REFUSED)
+    words = sorted(WORDS.values(), key=lambda word: order.index(word.kind))
+    for (kind, meaning, by, source), group in groupby(
+        words, lambda word: (word.kind, word.meaning, word.written_by, word.source)
+    ):
+        names = " ".join(f"`{word.name}{word.form}`" for word in group)
+        lines.append(f"| {names} | {meaning} | {kind} | {by} | {source} |")
+    return "\n".join(lines) + "\n"
