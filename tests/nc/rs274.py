@@ -17,6 +17,7 @@ import numpy as np
 
 AVAILABLE = shutil.which("rs274") is not None
 CALL = re.compile(r"^\s*\d+\s+N\S*\s+(\w+)\((.*)\)\s*$")
+NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
 # Comments that make LinuxCNC run Python, and user M codes that it runs as programs: never given to it.
 UNSAFE = re.compile(r";\s*py|\(\s*py|M1\d\d\b", re.IGNORECASE)
 
@@ -52,59 +53,66 @@ def run(program: Path, folder: Path, tool_table: str = "") -> Canon:
 
 
 def parse(text: str) -> Canon:
-    """Follow the canonical calls."""
-    canon = Canon()
+    """Follow the canonical calls. Plain numbers on the way, arrays at the end: a program may have 50,000 calls."""
+    moves: list[tuple[str, list[float], list[float], tuple | None]] = []
     unit, plane = 1.0, "XY"
-    g5x, g92, tool = np.zeros(6), np.zeros(6), np.zeros(3)
-    rotation = 0.0
-    nose = np.zeros(6)  # spindle nose: stands still when a frame or tool length changes
-    units6 = np.ones(6)
+    g5x, g92, tool = [0.0] * 6, [0.0] * 6, [0.0] * 3
+    rotation, turned = 0.0, (1.0, 0.0)
+    nose = [0.0] * 6  # spindle nose: stands still when a frame or tool length changes
+    units6 = [1.0] * 6
 
-    def world(p: np.ndarray) -> np.ndarray:
-        q = p * units6 + g92
-        c, s = math.cos(rotation), math.sin(rotation)
-        q = np.concatenate([[c * q[0] - s * q[1], s * q[0] + c * q[1]], q[2:]])
-        return q + g5x
+    def world(p: list[float]) -> list[float]:
+        q = [v * u + shift for v, u, shift in zip(p, units6, g92, strict=True)]
+        c, s = turned
+        return [v + shift for v, shift in zip([c * q[0] - s * q[1], s * q[0] + c * q[1], *q[2:]], g5x, strict=True)]
 
     for raw in text.splitlines():
         match = CALL.match(raw)
         if not match:
             continue
         name, inner = match.groups()
-        numbers = [float(v) for v in re.findall(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?", inner)]
+        numbers = [float(v) for v in NUMBER.findall(inner)]
         if name == "USE_LENGTH_UNITS":
             unit = 25.4 if "INCH" in inner else 1.0
-            units6 = np.array([unit] * 3 + [1.0] * 3)
+            units6 = [unit] * 3 + [1.0] * 3
         elif name == "SET_G5X_OFFSET":
-            g5x = np.array(numbers[1:7]) * units6
+            g5x = [v * u for v, u in zip(numbers[1:7], units6, strict=True)]
         elif name == "SET_G92_OFFSET":
-            g92 = np.array(numbers[:6]) * units6
+            g92 = [v * u for v, u in zip(numbers[:6], units6, strict=True)]
         elif name == "SET_XY_ROTATION":
             rotation = math.radians(numbers[0])
+            turned = math.cos(rotation), math.sin(rotation)
         elif name == "USE_TOOL_LENGTH_OFFSET":
-            tool = np.array(numbers[:3]) * unit
+            tool = [v * unit for v in numbers[:3]]
         elif name == "SELECT_PLANE":
             plane = re.search(r"CANON_PLANE_(\w+)", inner)[1]
         elif name in ("STRAIGHT_FEED", "STRAIGHT_TRAVERSE", "ARC_FEED"):
-            offset = np.concatenate([tool, np.zeros(3)])
-            start = nose - offset
+            start = [n - t for n, t in zip(nose, (*tool, 0.0, 0.0, 0.0), strict=True)]
             if name == "ARC_FEED":
                 e1, e2, c1, c2, turns, axis_end = numbers[:6]
                 order = {"XY": (0, 1, 2), "XZ": (2, 0, 1), "YZ": (1, 2, 0)}[plane]
-                p, c = np.zeros(6), np.zeros(6)
-                p[[*order]] = e1, e2, axis_end
+                p, c, normal = [0.0] * 6, [0.0] * 6, [0.0] * 3
+                p[order[0]], p[order[1]], p[order[2]] = e1, e2, axis_end
                 p[3:] = numbers[6:9]
-                c[[*order]] = c1, c2, axis_end
+                c[order[0]], c[order[1]], c[order[2]] = c1, c2, axis_end
                 end = world(p)
-                normal = np.eye(3)[order[2]]
+                normal[order[2]] = 1.0
                 if rotation:
-                    co, si = math.cos(rotation), math.sin(rotation)
-                    normal = np.array([co * normal[0] - si * normal[1], si * normal[0] + co * normal[1], normal[2]])
-                canon.moves.append(("arc", start, end, (world(c)[:3], normal, int(turns))))
+                    co, si = turned
+                    normal = [co * normal[0] - si * normal[1], si * normal[0] + co * normal[1], normal[2]]
+                moves.append(("arc", start, end, (np.array(world(c)[:3]), np.array(normal), int(turns))))
             else:
-                end = world(np.array(numbers[:6]))
-                kind = "feed" if name == "STRAIGHT_FEED" else "rapid"
-                if not np.allclose(start, end, atol=1e-9):
-                    canon.moves.append((kind, start, end, None))
-            nose = end + offset
-    return canon
+                end = world(numbers[:6])
+                moves.append(("feed" if name == "STRAIGHT_FEED" else "rapid", start, end, None))
+            nose = [e + t for e, t in zip(end, (*tool, 0.0, 0.0, 0.0), strict=True)]
+    return _canon(moves)
+
+
+def _canon(moves: list[tuple[str, list[float], list[float], tuple | None]]) -> Canon:
+    """Without straight moves of no length."""
+    if not moves:
+        return Canon()
+    starts, ends = (np.array([move[i] for move in moves]) for i in (1, 2))
+    still = np.isclose(starts, ends, atol=1e-9).all(axis=1)
+    kept = [i for i, (kind, *_) in enumerate(moves) if kind == "arc" or not still[i]]
+    return Canon([(moves[i][0], starts[i], ends[i], moves[i][3]) for i in kept])

@@ -26,41 +26,39 @@ TABLE_RS274 = "".join(f"T{n} P{n} Z{z / 25.4:.8f} D0.25 ;\n" for n, z in TOOLS.i
 TABLE_OURS = "".join(f"T{n} P{n} Z{z} D6.35 ;\n" for n, z in TOOLS.items())
 
 
-def our_moves(program: Program):
-    moves, origin = program.moves, np.array(program.origin[:3]) * 1e3
-    for i in range(len(moves)):
-        ends = []
-        for pose in (moves.start[i], moves.end[i]):
-            ends.append(np.concatenate([pose[:3] * 1e3 + origin, np.rad2deg(pose[3:])]))
-        arc = None
-        if moves.arc_sweep[i]:
-            arc = (moves.arc_center[i] * 1e3 + origin, moves.arc_normal[i], moves.arc_sweep[i])
-        kind = {"cycle": "feed"}.get(MOTION_NAMES[moves.motion[i]], MOTION_NAMES[moves.motion[i]])
-        yield kind, *ends, arc, int(moves.line[i])
-
-
 def assert_same_path(program: Program, canon: rs274.Canon) -> None:
     """Same kinds, ends, arc axes and senses, move by move; moves shorter than the printed digits are left out."""
+    moves, origin = program.moves, np.array(program.origin[:3]) * 1e3
+    start, end = (np.hstack([p[:, :3] * 1e3 + origin, np.rad2deg(p[:, 3:])]) for p in (moves.start, moves.end))
+    mine = np.flatnonzero((moves.arc_sweep != 0.0) | (np.abs(end - start).max(axis=1) > 2 * TOLERANCE_MM))
+    theirs = [m for m in canon.moves if m[3] is not None or np.abs(m[2] - m[1]).max() > 2 * TOLERANCE_MM]
+    both = min(len(mine), len(theirs))
+    kinds = np.array([{"cycle": "feed"}.get(name, name) for name in MOTION_NAMES])[moves.motion[mine]]
+    their_kinds, their_ends = [m[0] for m in theirs], np.array([m[2] for m in theirs]).reshape(-1, 6)
+    apart = np.abs(end[mine[:both]] - their_ends[:both]).max(axis=1)
+    other_kind = kinds[:both] != np.array(their_kinds[:both], dtype=str)
 
-    def long_enough(move) -> bool:
-        return move[3] is not None or np.abs(move[2] - move[1]).max() > 2 * TOLERANCE_MM
+    def where(i: int) -> str:
+        row = mine[i]
+        line = moves.line[row]
+        return (
+            f"line {line}: {program.source[line - 1]!r}\nours {kinds[i]} {start[row]} {end[row]} "
+            f"{moves.arc_sweep[row]}\ntheirs {theirs[i]}"
+        )
 
-    ours = [m for m in our_moves(program) if long_enough(m)]
-    theirs = [m for m in canon.moves if long_enough(m)]
-    for mine, other in zip(ours, theirs, strict=False):
-        where = f"line {mine[4]}: {program.source[mine[4] - 1]!r}\nours {mine}\ntheirs {other}"
-        assert mine[0] == other[0], where
-        np.testing.assert_allclose(mine[2], other[2], atol=TOLERANCE_MM, rtol=0, err_msg=where)
-        if mine[3] is not None:
-            center, normal, sweep = mine[3]
-            their_center, their_normal, turns = other[3]
-            np.testing.assert_allclose(normal, their_normal, atol=1e-6, err_msg=where)
-            apart = center - their_center
-            # A centre from R magnifies the printed digits where the chord is nearly a diameter.
-            assert np.linalg.norm(apart - (apart @ normal) * normal) < 50 * TOLERANCE_MM, where
-            assert np.sign(sweep) == np.sign(turns), where
-            assert math.ceil(abs(sweep) / math.tau - 1e-6) == abs(turns), where
-    assert len(ours) == len(theirs)
+    wrong = other_kind | ~(apart <= TOLERANCE_MM)
+    assert not wrong.any(), where(int(np.argmax(wrong)))
+    for i in np.flatnonzero(moves.arc_sweep[mine[:both]]):
+        row = mine[i]
+        center, normal, sweep = moves.arc_center[row] * 1e3 + origin, moves.arc_normal[row], moves.arc_sweep[row]
+        their_center, their_normal, turns = theirs[i][3]
+        assert np.allclose(normal, their_normal, rtol=1e-7, atol=1e-6), where(i)
+        off = center - their_center
+        # A centre from R magnifies the printed digits where the chord is nearly a diameter.
+        assert np.linalg.norm(off - (off @ normal) * normal) < 50 * TOLERANCE_MM, where(i)
+        assert np.sign(sweep) == np.sign(turns), where(i)
+        assert math.ceil(abs(sweep) / math.tau - 1e-6) == abs(turns), where(i)
+    assert len(mine) == len(theirs)
 
 
 class Writer:

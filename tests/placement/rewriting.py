@@ -13,14 +13,11 @@ from toolpath_stiff.path.rotations import rotation_matrices
 def cutting_moves(program: Program, origin) -> list[tuple]:
     """Start and end (m), their rotations, arc, line of every cutting move."""
     moves = place(program.moves, origin)
-    found = []
-    for i in np.flatnonzero(moves.motion != RAPID):
-        start, end = moves.start[i], moves.end[i]
-        turned = rotation_matrices(place_orientations(np.stack([start[3:], end[3:]]), origin))
-        found.append(
-            (start[:3], end[:3], turned, moves.arc_center[i], moves.arc_normal[i], moves.arc_sweep[i], moves.line[i])
-        )
-    return found
+    moves = moves.take(moves.motion != RAPID)
+    start, end = (place_orientations(ends[:, 3:], origin) for ends in (moves.start, moves.end))
+    turned = np.stack([rotation_matrices(start), rotation_matrices(end)], axis=1)
+    columns = (moves.start[:, :3], moves.end[:, :3], turned, moves.arc_center, moves.arc_normal, moves.arc_sweep)
+    return list(zip(*columns, moves.line, strict=True))
 
 
 def assert_same_path(program: Program, placement, written: Program, origin, unit_mm: float) -> None:
