@@ -232,15 +232,24 @@ def test_a_killed_process_is_a_failing_program(shop, capsys):
 
 def test_ctrl_c_leaves_whole_reports_and_nothing_else(shop):
     arguments = ["analyze", "jobs", "--jobs", "2", *trap(shop, 600.0), *SHORT]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "toolpath_stiff", *arguments],
-        cwd=shop, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
+    # A shell that runs this in the background ignores SIGINT, and children inherit that: this one shall not.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "toolpath_stiff", *arguments],
+            cwd=shop, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        )  # fmt: skip
+    finally:
+        signal.signal(signal.SIGINT, before)
     done = shop / "reports/a/part/summary.json"
-    while process.poll() is None and not (done.exists() and (shop / "reached").exists()):
-        time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes
-    _, error = process.communicate()
+    try:
+        while process.poll() is None and not (done.exists() and (shop / "reached").exists()):
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes
+        _, error = process.communicate(timeout=120)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert error == "tps: interrupted; no file is half-written\n"
     assert set(files_of(shop / "reports")) == {"a/part/samples.csv", "a/part/summary.json"}
