@@ -10,9 +10,10 @@ demo: $(VENV)/.run
 	$(BIN)/tps analyze $(PROGRAM) --out reports/demo
 	@echo "Report: $(CURDIR)/reports/demo/report.html"
 
-# One thread of linear algebra a process: the processes share the cores already.
+# One thread of linear algebra a process: the processes share the cores already. Each process takes a run of neighbouring
+# tests, so that what the tests of a module share is computed once; who is done takes over from the others.
 test: lint
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

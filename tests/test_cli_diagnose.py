@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import json
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -42,16 +45,34 @@ def files(tmp_path_factory):
     return folder
 
 
-def test_it_writes_a_report_and_says_what_it_found(files, tmp_path, capsys):
-    out = tmp_path / "found"
-    assert main(["diagnose", str(files / "strut.csv"), "--out", str(out)]) == 0
-    printed = capsys.readouterr()
-    assert "weak_strut" in printed.out and "IDENTIFIED" in printed.out
-    assert "Traceback" not in printed.err
+def diagnosed(measurements, out, *options):
+    """The folder that the command writes and what it prints, on stdout and stderr."""
+    said, told = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(told):
+        assert main(["diagnose", str(measurements), "--out", str(out), *options]) == 0
+    return out, said.getvalue(), told.getvalue()
+
+
+@pytest.fixture(scope="module")
+def strut(files, tmp_path_factory):
+    """With its pictures and page."""
+    return diagnosed(files / "strut.csv", tmp_path_factory.mktemp("strut") / "found")
+
+
+@pytest.fixture(scope="module")
+def spindle(files, tmp_path_factory):
+    """Figures alone; printed is the document."""
+    return diagnosed(files / "spindle.csv", tmp_path_factory.mktemp("spindle") / "o", "--json", "--no-plots")
+
+
+def test_it_writes_a_report_and_says_what_it_found(strut):
+    out, said, told = strut
+    assert "weak_strut" in said and "IDENTIFIED" in said
+    assert "Traceback" not in told
     written = {file.name for file in out.iterdir()}
     assert {"diagnose.json", "residuals.csv", "report.html"} <= written <= set(OWN_FILES)
     for name in written:
-        assert name in printed.out
+        assert name in said
     found = json.loads((out / "diagnose.json").read_text("utf-8"))
     assert found["verdict"] == "identified" and found["plausible"] == ["weak_strut"]
     page = (out / "report.html").read_text("utf-8")
@@ -60,10 +81,8 @@ def test_it_writes_a_report_and_says_what_it_found(files, tmp_path, capsys):
     assert not re.search(r"""(?:src|href)=["']https?:""", page)
 
 
-def test_residuals_are_those_of_the_measurements(files, tmp_path):
-    out = tmp_path / "found"
-    assert main(["diagnose", str(files / "strut.csv"), "--out", str(out), "--no-plots"]) == 0
-    assert {file.name for file in out.iterdir()} == {"diagnose.json", "residuals.csv"}
+def test_residuals_are_those_of_the_measurements(files, strut):
+    out = strut[0]
     with (out / "residuals.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     with (files / "strut.csv").open(newline="") as stream:
@@ -81,20 +100,22 @@ def test_residuals_are_those_of_the_measurements(files, tmp_path):
         assert shown == pytest.approx(100.0 * (modelled / np.array(measured) - 1.0), abs=2e-3)
 
 
-def test_the_same_command_writes_the_same_bytes(files, tmp_path, capsys):
-    """Twice into the same folder, once with another number of threads."""
-    texts = []
-    for options in ([], [], ["--jobs", "2"]):
-        out = tmp_path / "again"
-        assert main(["diagnose", str(files / "spindle.csv"), "--no-plots", "--out", str(out), *options]) == 0
-        texts.append([(out / name).read_bytes() for name in ("diagnose.json", "residuals.csv")])
-    assert texts[0] == texts[1] == texts[2]
-    capsys.readouterr()
+def test_the_same_command_writes_the_same_bytes(files, spindle, tmp_path):
+    """Twice more into the same folder, once with another number of threads."""
+
+    def contents(folder):
+        return [(folder / name).read_bytes() for name in ("diagnose.json", "residuals.csv")]
+
+    again = shutil.copytree(spindle[0], tmp_path / "again")
+    for options in ([], ["--jobs", "2"]):
+        diagnosed(files / "spindle.csv", again, "--no-plots", *options)
+        assert contents(again) == contents(spindle[0])
 
 
-def test_an_ambiguous_verdict_comes_with_what_to_measure_and_what_it_matters(files, tmp_path, capsys):
-    assert main(["diagnose", str(files / "spindle.csv"), "--json", "--no-plots", "--out", str(tmp_path / "o")]) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_an_ambiguous_verdict_comes_with_what_to_measure_and_what_it_matters(spindle):
+    out, said, _ = spindle
+    assert {file.name for file in out.iterdir()} == {"diagnose.json", "residuals.csv"}
+    found = json.loads(said)
     assert found["verdict"] == "ambiguous" and "spindle_compliance" in found["plausible"]
     assert found["why"] and found["next"]
     assert found["next_measurements"] and all(row["why"] for row in found["next_measurements"])
@@ -104,7 +125,7 @@ def test_an_ambiguous_verdict_comes_with_what_to_measure_and_what_it_matters(fil
     assert found["path"]["mean_spread_percent"] == pytest.approx(
         100.0 * (max(means) - min(means)) / np.mean(means), abs=0.01
     )
-    assert json.loads((tmp_path / "o" / "diagnose.json").read_text("utf-8")) == found
+    assert json.loads((out / "diagnose.json").read_text("utf-8")) == found
 
 
 def test_the_papers_table_by_its_name_gets_no_confident_name(tmp_path, capsys):

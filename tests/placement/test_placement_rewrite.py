@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -44,12 +45,17 @@ def reading(name: str, **more):
     return read_program(PROGRAMS / name, default_origin=MACHINE.default_origin, tool_table=table, **more)
 
 
+@lru_cache(maxsize=1)
+def placed_there(name: str, there):
+    """The program as it is read at a placement, its present zero, its analysis there."""
+    program = reading(name, origin=there)
+    return program, reading(name).origin, analyse(MACHINE, program, origin=there, step=2e-3)
+
+
 def differences(name: str, there, **options) -> dict[str, float]:
     """Relative differences of mean, range and minimum after a round trip."""
-    program = reading(name, origin=there)
-    origin = reading(name).origin
+    program, origin, placed = placed_there(name, there)
     rewritten = rewrite_program(program, there, origin, tools=tools_for(name), **options)
-    placed = analyse(MACHINE, program, origin=there, step=2e-3)
     return rewriting_differences(placed, rewritten, origin, tools=tools_for(name))
 
 
