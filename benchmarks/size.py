@@ -95,15 +95,15 @@ def reading(report: Report, lines: int, rounds: int) -> None:
 def one_by_one(text: str) -> None:
     """Our reader without its fast way."""
     from toolpath_stiff.nc.frames import Frames
-    from toolpath_stiff.nc.interpreter import Interpreter
     from toolpath_stiff.nc.reader import ZERO
     from toolpath_stiff.nc.source import split_lines
+    from toolpath_stiff.nc.state import State
     from toolpath_stiff.nc.subprograms import ProgramRun
     from toolpath_stiff.nc.tables import Offsets
 
-    interpreter = Interpreter("p", Frames(Offsets(), None, ZERO), None)
-    ProgramRun(interpreter, split_lines(text, "p"), "p", frozenset(), fast=False).run()
-    interpreter.recorder.moves()
+    state = State("p", Frames(Offsets(), None, ZERO), None)
+    ProgramRun(state, split_lines(text, "p"), "p", frozenset(), fast=False).run()
+    state.recorder.moves()
 
 
 def lengths(report: Report, longest: int, rounds: int) -> None:

@@ -24,6 +24,7 @@ RANK = {
     "tables": 2,
     "nc": 2,
     "path": 3,
+    "rewriting": 4,
     "machine": 4,
     "stiffness": 5,
     "analysis": 6,
@@ -149,3 +150,46 @@ def test_the_help_of_a_command_imports_nothing_heavy(command):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def module_imports() -> dict[str, set[str]]:
+    """Module -> the modules of the package that it imports, inside functions too."""
+    names = {
+        ".".join(("toolpath_stiff", *path.with_suffix("").parts)).removesuffix(".__init__"): path for path in modules()
+    }
+    found = {}
+    for name, path in names.items():
+        package = ".".join(("toolpath_stiff", *path.parts[:-1]))
+        wanted = set(imports((PACKAGE / path).read_text("utf-8"), package))
+        # `from a.b import c` imports a.b.c if that is a module, else a.b.
+        found[name] = {t if t in names else t.rsplit(".", 1)[0] for t in wanted} & names.keys() - {name}
+    return found
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """The modules that import each other in a ring, each ring once."""
+    from graphlib import CycleError, TopologicalSorter
+
+    found, left = [], {name: set(targets) for name, targets in graph.items()}
+    while True:
+        try:
+            TopologicalSorter(left).prepare()
+        except CycleError as error:
+            ring = error.args[1]
+            found.append(ring)
+            for name in ring:
+                left.pop(name, None)
+            left = {name: targets - set(ring) for name, targets in left.items()}
+        else:
+            return found
+
+
+@pytest.mark.parametrize("room", ["nc", "rewriting"])
+def test_no_import_circle_within(room):
+    graph = {name: targets for name, targets in module_imports().items() if room_of(name) == room}
+    assert len(graph) > 5
+    assert circles(graph) == []
+
+
+def test_the_search_for_circles_finds_one():
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) != []

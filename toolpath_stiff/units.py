@@ -10,10 +10,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import numpy as np
     from numpy.typing import NDArray
 
 T = TypeVar("T", float, "NDArray[np.float64]")
+Pose = tuple[float, float, float, float, float, float]  # x, y, z in m, roll, pitch, yaw (or A, B, C) in rad
+ShopPose = tuple[float, float, float, float, float, float]  # the same in mm and degrees
 
 MM_PER_INCH = 25.4  # exact: international inch, 1959
 PI = 3.141592653589793
@@ -68,3 +72,15 @@ def m_per_s_from_mm_per_min(feed: T) -> T:
 def mm_per_min_from_m_per_s(feed: T) -> T:
     """mm/min from m/s."""
     return feed * 60e3
+
+
+def pose_in_mm(pose: Iterable[float]) -> ShopPose:
+    """A pose in m and rad, in mm and degrees."""
+    x, y, z, a, b, c = pose
+    return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))
+
+
+def pose_in_si(pose: ShopPose) -> Pose:
+    """A pose in mm and degrees, in m and rad."""
+    x, y, z, a, b, c = pose
+    return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))

@@ -22,7 +22,7 @@ from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.path import move_lengths
 from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.placement.offset_blocks import offset_blocks
+from toolpath_stiff.rewriting import offset_blocks
 
 FOLDER = Path(__file__).parents[2] / "programs"
 SAMPLE = FOLDER / "conical_boss.apt"

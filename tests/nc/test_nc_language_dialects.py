@@ -12,7 +12,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.controller import Controller, read_controller
 from toolpath_stiff.nc.dialects import DIALECTS
-from toolpath_stiff.placement.rewrite import rewrite_program
+from toolpath_stiff.rewriting import rewrite_program
 
 PLAIN, LINUXCNC, FANUC, HAAS = (Controller(DIALECTS[name]) for name in ("generic", "linuxcnc", "fanuc", "haas"))
 

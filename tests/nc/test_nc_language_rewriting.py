@@ -9,7 +9,7 @@ import pytest
 from tests.placement.rewriting import assert_same_path
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import parse_program
-from toolpath_stiff.placement.rewrite import rewrite_program
+from toolpath_stiff.rewriting import rewrite_program
 
 HERE = (0.0,) * 6
 THERE = [

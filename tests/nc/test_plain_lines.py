@@ -10,13 +10,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import plain_moves, subprograms
+from toolpath_stiff.nc import arcs, frames, plain_moves, subprograms
 from toolpath_stiff.nc.checking import check_lines
+from toolpath_stiff.nc.codes import feeds as feed_rules
+from toolpath_stiff.nc.codes import numbers as number_rules
 from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.dialects import DIALECTS
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.source import read_lines, split_lines
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 
@@ -33,9 +35,9 @@ def _runs_of_any_length(monkeypatch):
 
 def outcome(lines, dialect, fast):
     """Everything that reading leaves behind, in comparable form, and how many lines were executed at once."""
-    frames = Frames(Offsets(), None, ZERO)
-    interpreter = Interpreter("p", frames, copy.deepcopy(TOOLS), DIALECTS[dialect])
-    run = ProgramRun(interpreter, lines, "p", frozenset(), fast=fast)
+    axes = Frames(Offsets(), None, ZERO)
+    control = State("p", axes, copy.deepcopy(TOOLS), DIALECTS[dialect])
+    run = ProgramRun(control, lines, "p", frozenset(), fast=fast)
     executed = []
     run._executed = lambda at, rows: executed.append(len(rows))
     error = None
@@ -43,14 +45,14 @@ def outcome(lines, dialect, fast):
         warnings = run.run()
     except InputError as found:
         error, warnings = str(found), []
-    interpreter.bare = interpreter.bare and (interpreter.bare[0], interpreter.bare[1].text)
+    control.bare = control.bare and (control.bare[0], control.bare[1].text)
     state = {
         name: repr(value)
-        for name, value in vars(interpreter).items()
-        if name not in ("recorder", "frames", "block", "values", "free", "tools", "dialect")
+        for name, value in vars(control).items()
+        if name not in ("recorder", "frames", "tools", "dialect")
     }
-    frame = {f.name: repr(getattr(frames, f.name)) for f in dataclasses.fields(frames)}
-    moves = interpreter.recorder.moves()
+    frame = {f.name: repr(getattr(axes, f.name)) for f in dataclasses.fields(axes)}
+    moves = control.recorder.moves()
     columns = {f.name: getattr(moves, f.name) for f in dataclasses.fields(moves)}
     return error, warnings, state if error is None else None, frame if error is None else None, columns, sum(executed)
 
@@ -157,3 +159,42 @@ def test_long_runs_across_chunks():
 def test_inverse_time_and_inches():
     lines = ["G20 G93", *(f"G1 X{i}.5 A{i} F{i + 1}.25" for i in range(50)), "G94 F10", *(f"B{i}" for i in range(9))]
     assert assert_same(lines) > 50
+
+
+def moved_by_a_rule(*rule):
+    """How the moves of both ways change when a rule of the interpreter does."""
+    program = [
+        "G21 G90 G17 F300.", "G0 X0. Y0. Z0.", "G92 X1", "G1 X5. F100", "X10", "A20.", "X10.", "G2 X14. Y0. R2.",
+        "G3 X18. I2.", "G1 X3. Y4. Z1", "X7.", "Y9.", "G20", "X1. F20.", "B5.", "Y2.", "Z1.", "X3.",
+    ]  # fmt: skip
+    slow, fast = outcome(program, "fanuc", fast=False), outcome(program, "fanuc", fast=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(*rule)
+        other_slow, other_fast = outcome(program, "fanuc", fast=False), outcome(program, "fanuc", fast=True)
+    assert fast[0] == slow[0] is None
+    assert fast[5] > 8  # lines many at a time
+    assert other_fast[0] == other_slow[0]
+    return slow[4], fast[4], other_slow[4], other_fast[4]
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        (frames, "shifted", lambda program, shift, offset: program + 2.0 * shift + offset + 1.0),
+        (frames, "shifted_back", lambda control, shift, offset: control - offset - shift / 2.0),
+        (arcs, "center_from_radius", lambda start, end, radius, clockwise: ((start[0] + end[0]) / 2.0, start[1])),
+        (arcs, "arc_sweep", lambda start, end, center, clockwise, turns: 0.25),
+        (number_rules, "INCREMENT_MM", 0.5),
+        (feed_rules, "MM_PER_INCH", 20.0),
+        (State, "feed_scale", property(lambda state: 3.0)),
+        (State, "length_scale", property(lambda state: 2.0)),
+    ],
+    ids=lambda rule: rule[1],
+)
+def test_both_ways_ask_the_same_rule(rule):
+    """Change a rule, and both ways change alike: it is not written down twice."""
+    slow, fast, other_slow, other_fast = moved_by_a_rule(*rule)
+    for name, column in other_slow.items():
+        np.testing.assert_array_equal(other_fast[name], column, err_msg=name)
+    for before, after in ((slow, other_slow), (fast, other_fast)):
+        assert any(before[name].shape != after[name].shape or (before[name] != after[name]).any() for name in before)

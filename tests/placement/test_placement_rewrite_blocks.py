@@ -16,7 +16,7 @@ from tests.placement.rewriting import assert_same_path, cutting_moves
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, WorkOffset
-from toolpath_stiff.placement.rewrite import rewrite_program
+from toolpath_stiff.rewriting import rewrite_program
 
 HERE = (0.0,) * 6
 TOOL_TABLE = {number: ToolEntry(number, length, 6.0) for number, length in TOOLS.items()}

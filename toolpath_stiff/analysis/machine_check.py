@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.poses import PoseReport, evaluate_poses
-from toolpath_stiff.machine.model import Machine, Pose
+from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 FloatArray = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from toolpath_stiff.analysis.evaluate import PoseStiffness, Progress, evaluate
 from toolpath_stiff.analysis.loads import RULES, Load, parse_load
 from toolpath_stiff.analysis.parameter_band import ParameterBand, parameter_band
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.machine.model import Machine, Pose
+from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
 from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path import place, sample_moves
@@ -22,7 +22,7 @@ from toolpath_stiff.path.samples import Samples
 from toolpath_stiff.stiffness.acting import acting_effects, condition_warnings, conditions_stated
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd

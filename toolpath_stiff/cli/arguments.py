@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import MACHINE
-from toolpath_stiff.units import m_from_mm, rad_from_deg
+from toolpath_stiff.units import Pose, m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.nc.controller import Controller
     from toolpath_stiff.stiffness.effects.contract import Conditions
     from toolpath_stiff.stiffness.model import StiffnessModel
-
-Pose = tuple[float, float, float, float, float, float]
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete

@@ -27,10 +27,10 @@ from toolpath_stiff.errors import InputError
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
     from toolpath_stiff.machine import Machine
-    from toolpath_stiff.machine.model import Pose
     from toolpath_stiff.nc import Program
     from toolpath_stiff.placement.batch import Keepout
     from toolpath_stiff.placement.search import Bounds
+    from toolpath_stiff.units import Pose
 
 EPILOG = """\
 examples:
@@ -129,8 +129,8 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.placement.batch import work_path
     from toolpath_stiff.placement.report_data import analyse_before, front_rows, placement_summary, pose_of
-    from toolpath_stiff.placement.rewrite import check_rewritable
     from toolpath_stiff.placement.search import search_placements
+    from toolpath_stiff.rewriting import check_rewritable
 
     if not 2 <= args.points <= 1000:
         raise InputError(f"--points {args.points}", expected="2 to 1000")
@@ -189,7 +189,7 @@ def _folder(args: argparse.Namespace) -> Path:
 
 def _check_write(args: argparse.Namespace) -> None:
     """What can be said of --write before the search."""
-    from toolpath_stiff.placement.rewrite import check_decimals
+    from toolpath_stiff.rewriting import check_decimals
 
     if not args.write:
         for option in ("decimals", "linearise"):
@@ -208,7 +208,8 @@ def _rewrite(
     import numpy as np
 
     from toolpath_stiff.placement.report_data import placement_row
-    from toolpath_stiff.placement.rewrite import rewrite_program, rewriting_differences
+    from toolpath_stiff.placement.written_path import rewriting_differences
+    from toolpath_stiff.rewriting import rewrite_program
 
     controller = controller_for(args)
     reading: dict[str, Any] = {

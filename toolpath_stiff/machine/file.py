@@ -20,10 +20,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.keys import INFINITY, OPTIONAL_SECTIONS, SECTIONS, Key, as_array, describe, shorten
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, Pose, StrutLaw
+from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, StrutLaw
 from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
 from toolpath_stiff.machine.uncertainty import read_uncertainty
-from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, mm_from_m, rad_from_deg
+from toolpath_stiff.units import Pose, m_from_mm, m_per_s_from_mm_per_min, mm_from_m, rad_from_deg
 
 DEFAULT_MACHINE = "nist"
 FloatArray = NDArray[np.float64]

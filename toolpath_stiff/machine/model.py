@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.units import Pose
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine.uncertainty import Uncertainty
 
 FloatArray = NDArray[np.float64]
-Pose = tuple[float, float, float, float, float, float]
 
 ORIGINS = ("published", "recovered", "assumed", "fitted")
 

@@ -14,6 +14,7 @@ SAME_POINT = 1e-12
 
 PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}  # first, second axis, normal: right-handed
 CENTER_WORDS = ("I", "J", "K")
+CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
 Point2 = tuple[float, float]
 

@@ -8,21 +8,22 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes import WORK_OFFSETS, code_meaning, would_change
+from toolpath_stiff.nc.blocks import Call, Flow
+from toolpath_stiff.nc.codes.registry import code_meaning, would_change
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
 from toolpath_stiff.nc.cutter_location import reading as cutter_location
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
-from toolpath_stiff.nc.frames import Frames, Pose, pose_in_mm, pose_in_si
-from toolpath_stiff.nc.interpreter import Interpreter
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Unsupported
 from toolpath_stiff.nc.plain_lines import G_COLUMN
 from toolpath_stiff.nc.posted.kinematics import PostedKinematics
 from toolpath_stiff.nc.reader import ZERO
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.subprograms import ProgramRun
-from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
 from toolpath_stiff.nc.words import Block
-from toolpath_stiff.units import m_from_mm
+from toolpath_stiff.units import Pose, m_from_mm, pose_in_mm, pose_in_si
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 NO_CHANGE = "nothing of the path"
@@ -109,8 +110,8 @@ class Checked:
 class _CheckingRun(ProgramRun):
     """A run that notes the codes of each block, and notes an error and goes on with the next block."""
 
-    def __init__(self, interpreter: Interpreter, lines: tuple[str, ...], name: str, switches: frozenset[int]) -> None:
-        super().__init__(interpreter, lines, name, switches)
+    def __init__(self, state: State, lines: tuple[str, ...], name: str, switches: frozenset[int]) -> None:
+        super().__init__(state, lines, name, switches)
         self.errors: list[InputError] = []
         self.first: dict[str, tuple[int, int]] = {}
         self.count: dict[str, int] = {}
@@ -132,7 +133,7 @@ class _CheckingRun(ProgramRun):
                 self.first[code] = (line + 1, column)
             self.count[code] = self.count.get(code, 0) + count
 
-    def _execute(self, block: Block) -> bool:
+    def _execute(self, block: Block) -> Flow | Call:
         for word in block.words:
             if word.letter in "GM":
                 code = f"{word.letter}{word.value:g}"
@@ -142,8 +143,7 @@ class _CheckingRun(ProgramRun):
             return super()._execute(block)
         except InputError as error:
             self._add(error)
-            self.interpreter.call, self.interpreter.returns = None, False
-            return True
+            return Flow.NEXT
 
     def _add(self, error: InputError) -> None:
         self.errors.append(error)
@@ -171,10 +171,34 @@ def check_lines(
         frames = Frames(copy.deepcopy(controller.offsets or Offsets()), place, default)
     else:  # first in the coordinates of the machine that the program was posted for
         frames = Frames(copy.deepcopy(controller.offsets or Offsets()), None, ZERO, posted=posted)
-    interpreter = Interpreter(name, frames, copy.deepcopy(controller.tools), controller.dialect)
-    run = _CheckingRun(interpreter, lines, name, switches_on(block_delete, controller))
-    start = modal_state(interpreter)
-    warnings: list[str] = []
+    state = State(name, frames, copy.deepcopy(controller.tools), controller.dialect)
+    run = _CheckingRun(state, lines, name, switches_on(block_delete, controller))
+    start = modal_state(state)
+    errors, warnings = _run_to_the_end(run)
+    warnings, assumptions = [*warnings, *state.warnings], list(state.assumptions)
+    moves = state.recorder.moves() if len(state.recorder) else None
+    at = frames.origin
+    if posted is not None:
+        at = default if place is None else place
+        moves, refused, more, assumed = _on_the_part(moves, posted, state, name)
+        errors, warnings, assumptions = [*errors, *refused], [*warnings, *more], [*assumptions, *assumed]
+    return Checked(
+        used=tuple(UsedCode(*run.first[code], code, code_meaning(code), NOTE, run.count[code]) for code in run.first),
+        unsupported=tuple(_of_unsupported(word) for word in state.unsupported),
+        findings=findings_of(errors, warnings, assumptions),
+        start=start,
+        end=modal_state(state),
+        moves=moves,
+        origin=pose_in_si(at),
+        complete=not errors,
+        remarks={tool.number: tool.remark for tool in state.used_tools.values()},
+        jumps=tuple(run.jumps) if posted is None else None,
+    )
+
+
+def _run_to_the_end(run: _CheckingRun) -> tuple[list[InputError], list[str]]:
+    """Run a program; its errors, and the warnings of its end. A file in another language has that one error alone."""
+    lines, name, warnings = run.lines, run.name, list[str]()
     foreign = foreign_program(lines, name)
     if foreign is None:
         try:
@@ -184,47 +208,26 @@ def check_lines(
                 run.errors.append(error)
         foreign = next((f for e in run.errors if (f := foreign_program(lines, name, e.line)) is not None), None)
     errors = run.errors if foreign is None else [foreign]
-    if not errors and not interpreter.recorder.cuts:
+    if not errors and not run.state.recorder.cuts:
         errors = [InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)]
-    warnings, assumptions = [*warnings, *interpreter.warnings], list(interpreter.assumptions)
-    moves = interpreter.recorder.moves() if len(interpreter.recorder) else None
-    at = frames.origin
-    if posted is not None:
-        at = default if place is None else place
-        moves, refused, more, assumed = _on_the_part(moves, posted, interpreter, name)
-        errors, warnings, assumptions = [*errors, *refused], [*warnings, *more], [*assumptions, *assumed]
-    findings = [finding_of(error) for error in errors]
-    findings += [Finding(line_in(text), 0, "warning", text, WARNING) for text in warnings]
-    findings += [Finding(0, 0, "assumption", text, NOTE) for text in assumptions]
-    return Checked(
-        used=tuple(UsedCode(*run.first[code], code, code_meaning(code), NOTE, run.count[code]) for code in run.first),
-        unsupported=tuple(_of_unsupported(word) for word in interpreter.unsupported),
-        findings=tuple(sorted(findings, key=lambda f: (f.line, f.column))),
-        start=start,
-        end=modal_state(interpreter),
-        moves=moves,
-        origin=pose_in_si(at),
-        complete=not errors,
-        remarks={tool.number: tool.remark for tool in interpreter.used_tools.values()},
-        jumps=tuple(run.jumps) if posted is None else None,
-    )
+    return errors, warnings
 
 
 def _on_the_part(
-    moves: Moves | None, kinematics: PostedKinematics, interpreter: Interpreter, name: str
+    moves: Moves | None, kinematics: PostedKinematics, state: State, name: str
 ) -> tuple[Moves | None, list[InputError], tuple[str, ...], tuple[str, ...]]:
     """Moves of the posted machine on the part, None where that is refused; errors, warnings, assumptions."""
     from toolpath_stiff.nc.posted.program import check_rotary_offsets, on_the_part
 
     if moves is None:
         return None, [], (), ()
-    frames = interpreter.frames
+    frames = state.frames
     x, y, z = (m_from_mm(v) for v in frames.origin[:3])
     zero = (x, y, z, 0.0, 0.0, 0.0) if frames.source == "program" else None
     try:
         check_rotary_offsets(frames.offsets, kinematics, name)
-        tools = interpreter.used_tools.values()
-        part = on_the_part(moves, kinematics, zero, tools, name, interpreter.tip_held)
+        tools = state.used_tools.values()
+        part = on_the_part(moves, kinematics, zero, tools, name, state.tip_held)
     except InputError as error:
         return None, [error], (), ()
     return part.moves, [], part.warnings, part.assumptions
@@ -237,9 +240,6 @@ def _check_cutter_location(
     state = checked.state
     offsets = controller.offsets is not None and any(offset.given for offset in controller.offsets.table)
     warnings = (*cutter_location.not_for(controller, offsets, block_delete), *state.warnings)
-    findings = [finding_of(error) for error in checked.errors]
-    findings += [Finding(line_in(text), 0, "warning", text, WARNING) for text in warnings]
-    findings += [Finding(0, 0, "assumption", text, NOTE) for text in state.assumptions]
     x, y, z, a, b, c = origin
     return Checked(
         used=tuple(UsedCode(line, 1, word, text, NOTE, count) for word, text, line, count in checked.meanings()),
@@ -253,7 +253,7 @@ def _check_cutter_location(
             )
             for word in cutter_location.unsupported(state)
         ),
-        findings=tuple(sorted(findings, key=lambda f: (f.line, f.column))),
+        findings=findings_of(checked.errors, warnings, state.assumptions),
         start=checked.start,
         end=checked.end,
         moves=state.recorder.moves() if len(state.recorder) else None,
@@ -262,6 +262,24 @@ def _check_cutter_location(
         dialect=CUTTER_LOCATION,
         marks=tuple(state.marks),
     )
+
+
+def findings_of(
+    errors: Iterable[InputError], warnings: Iterable[str], assumptions: Iterable[str]
+) -> tuple[Finding, ...]:
+    """All that is to be said of a program, in the order of lines."""
+    return in_order(
+        [
+            *(finding_of(error) for error in errors),
+            *(Finding(line_in(text), 0, "warning", text, WARNING) for text in warnings),
+            *(Finding(0, 0, "assumption", text, NOTE) for text in assumptions),
+        ]
+    )
+
+
+def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings in the order of lines."""
+    return tuple(sorted(findings, key=lambda finding: (finding.line, finding.column)))
 
 
 def finding_of(error: InputError) -> Finding:
@@ -285,25 +303,25 @@ def line_in(text: str) -> int:
     return int(digits) if found and digits else 0
 
 
-def modal_state(interpreter: Interpreter) -> dict[str, str]:
+def modal_state(state: State) -> dict[str, str]:
     """What is in force, as codes and words."""
-    frames, feed = interpreter.frames, interpreter.feed
+    frames, feed = state.frames, state.feed
     standard = len(WORK_OFFSETS)
     offset = WORK_OFFSETS[frames.active] if frames.active < standard else f"G54.1 P{frames.active - standard + 1}"
     return {
-        "motion": interpreter.motion or "none",
-        "plane": interpreter.plane,
-        "distance": "G90" if interpreter.absolute else "G91",
-        "arc centres": "G90.1" if interpreter.arc_absolute else "G91.1",
-        "units": "G20" if interpreter.inch else "G21",
-        "feed mode": interpreter.feed_mode,
-        "feed": "none" if feed is None else f"F{feed / interpreter.feed_scale:g}",
-        "spindle": f"S{interpreter.speed:g}",
-        "tool": f"T{interpreter.tool}",
-        "tool length": "G49" if interpreter.tool_length != interpreter.tool_length else f"{frames.tool:g} mm",
+        "motion": state.motion or "none",
+        "plane": state.plane,
+        "distance": "G90" if state.absolute else "G91",
+        "arc centres": "G90.1" if state.arc_absolute else "G91.1",
+        "units": "G20" if state.inch else "G21",
+        "feed mode": state.feed_mode,
+        "feed": "none" if feed is None else f"F{feed / state.feed_scale:g}",
+        "spindle": f"S{state.speed:g}",
+        "tool": f"T{state.tool}",
+        "tool length": "G49" if state.tool_length != state.tool_length else f"{frames.tool:g} mm",
         "work offset": offset,
-        "cycle return": interpreter.retract or "none",
-        "polar": "G15" if interpreter.polar is None else "G16",
+        "cycle return": state.retract or "none",
+        "polar": "G15" if state.polar is None else "G16",
         "rotation": "G69" if frames.rotation is None else f"G68 R{frames.rotation[2]:g}",
         "shift (G92, G52)": "none" if not any(frames.g92) else " ".join(f"{v:g}" for v in frames.g92),
     }

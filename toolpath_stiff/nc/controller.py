@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes import WORK_OFFSETS
 from toolpath_stiff.nc.dialects import DIALECTS, GENERIC, Dialect, dialect_named
 from toolpath_stiff.nc.posted.kinematics import PostedKinematics, read_kinematics
 from toolpath_stiff.nc.tables import (
     HOMES,
     LARGEST_MM,
+    WORK_OFFSETS,
     Offsets,
     ToolEntry,
     additional_offset,

@@ -9,14 +9,18 @@ motion) is zero; the machine frame places that at the origin.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar
 
 from toolpath_stiff.nc.posted.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.units import ShopPose
 
-Pose = tuple[float, float, float, float, float, float]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Numbers = TypeVar("Numbers", float, "NDArray[np.float64]")
 Rotation = tuple[float, float, float]  # of G68: centre X, Y in program coordinates, angle in degrees
 
 
@@ -51,8 +55,8 @@ class Frames:
     """
 
     offsets: Offsets
-    option: Pose | None
-    default: Pose
+    option: ShopPose | None
+    default: ShopPose
     active: int = 0
     g92: list[float] = field(default_factory=lambda: [0.0] * 6)
     g92_kept: list[float] = field(default_factory=lambda: [0.0] * 6)
@@ -76,19 +80,34 @@ class Frames:
         offset = self.offsets.at(self.active)
         if self.rotation is not None:
             program = _about(self.rotation, program, self.rotation[2])
+        if not offset.rotation:
+            return [shifted(p, g, o) for p, g, o in zip(program, self.g92, offset.axes, strict=True)]
         moved = [p + g for p, g in zip(program, self.g92, strict=True)]
-        if offset.rotation:
-            moved[0], moved[1] = _turned(moved[0], moved[1], offset.rotation)
+        moved[0], moved[1] = _turned(moved[0], moved[1], offset.rotation)
         return [m + o for m, o in zip(moved, offset.axes, strict=True)]
 
     def to_program(self, control: list[float]) -> list[float]:
         """Program coordinates of a point in control coordinates."""
         offset = self.offsets.at(self.active)
-        moved = [c - o for c, o in zip(control, offset.axes, strict=True)]
-        if offset.rotation:
+        if not offset.rotation:
+            program = [shifted_back(c, g, o) for c, g, o in zip(control, self.g92, offset.axes, strict=True)]
+        else:
+            moved = [c - o for c, o in zip(control, offset.axes, strict=True)]
             moved[0], moved[1] = _turned(moved[0], moved[1], -offset.rotation)
-        program = [m - g for m, g in zip(moved, self.g92, strict=True)]
+            program = [m - g for m, g in zip(moved, self.g92, strict=True)]
         return program if self.rotation is None else _about(self.rotation, program, -self.rotation[2])
+
+    def axis_to_control(self, axis: int, program: Numbers) -> Numbers:
+        """`to_control` of one axis of many points at once, where nothing is rotated."""
+        return shifted(program, self.g92[axis], self.offsets.at(self.active).axes[axis])
+
+    def axis_to_program(self, axis: int, control: Numbers) -> Numbers:
+        """`to_program` of one axis of many points at once, where nothing is rotated."""
+        return shifted_back(control, self.g92[axis], self.offsets.at(self.active).axes[axis])
+
+    def axis_to_setup(self, axis: int, control: Numbers) -> Numbers:
+        """`to_setup` of one axis of many points at once."""
+        return control - self.fix_reference()[axis] if axis < 3 else control
 
     @property
     def rotated(self) -> bool:
@@ -117,7 +136,7 @@ class Frames:
         return self.reference
 
     @property
-    def origin(self) -> Pose:
+    def origin(self) -> ShopPose:
         """Where G54's zero sits on the machine, mm and degrees."""
         x, y, z = self.fix_reference()
         if self.option is not None:
@@ -152,16 +171,14 @@ class Frames:
         self.tool = length
 
 
-def pose_in_mm(pose: Iterable[float]) -> Pose:
-    """A pose in m and rad, in mm and degrees."""
-    x, y, z, a, b, c = pose
-    return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))
+def shifted(program: Numbers, shift: float, offset: float) -> Numbers:
+    """A program coordinate in control coordinates: G92 or G52 first, then the work offset."""
+    return (program + shift) + offset
 
 
-def pose_in_si(pose: Pose) -> Pose:
-    """A pose in mm and degrees, in m and rad."""
-    x, y, z, a, b, c = pose
-    return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))
+def shifted_back(control: Numbers, shift: float, offset: float) -> Numbers:
+    """A control coordinate in program coordinates."""
+    return (control - offset) - shift
 
 
 def _turned(x: float, y: float, degrees: float) -> tuple[float, float]:
@@ -175,7 +192,7 @@ def _about(rotation: Rotation, point: list[float], degrees: float) -> list[float
     return [rotation[0] + x, rotation[1] + y, *point[2:]]
 
 
-def _matrix(origin: Pose) -> list[list[float]]:
+def _matrix(origin: ShopPose) -> list[list[float]]:
     """Q = Rz(C) Ry(B) Rx(A) of a placement; plain floats, so that reading a program needs no numpy."""
     (ca, sa), (cb, sb), (cc, sc) = (
         (math.cos(math.radians(v)), math.sin(math.radians(v))) if v else (1.0, 0.0) for v in origin[3:]

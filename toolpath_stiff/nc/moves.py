@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, NamedTuple
 
+from toolpath_stiff.units import Pose
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -151,7 +153,7 @@ class Program:
     path: str
     source: tuple[str, ...]
     moves: Moves
-    origin: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     origin_source: str = "default"
     unsupported: tuple[Unsupported, ...] = ()
     warnings: tuple[str, ...] = ()

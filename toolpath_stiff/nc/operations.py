@@ -223,26 +223,15 @@ def _beginnings(
 
     None at all if there are more than `most`.
     """
-    at = np.array([head.line for head in heads], dtype=np.int64)
-    seen: dict[int, Sequence[int]] = {}  # move -> headings (rows of `heads`) passed right before it
-    below, odd = np.searchsorted(at, way.line, side="right"), way.turns()
-    straight = np.flatnonzero(~odd & (np.diff(below) != 0))
-    for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
-        seen[move] = range(low, high)
-    for move in np.flatnonzero(odd).tolist() if heads else ():
-        spans = [np.searchsorted(at, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
-        between = [row for low, high in spans for row in range(low, high)]
-        if between:
-            seen[move] = between
+    seen = _headings_passed(way, heads)
     changes = set((np.flatnonzero(np.diff(moves.tool) != 0) + 1).tolist())
     events = sorted(changes.union(seen))
     next_cut = np.searchsorted(cuts, events)
     tool = int(moves.tool[cuts[0]])
     change = _tool_change(text, way.passed(-1, int(cuts[0]))) if tool else None
     found = [_Beginning(0, [], tool, change)]
-    current = gap = (
-        0  # cuts (rows of `cuts`) that the running operation, and what stands before the next cut, begin with
-    )
+    # Cuts (rows of `cuts`) that the running operation, and what stands before the next cut, begin with.
+    current = gap = 0
     said: set[int] = set()  # headings passed where the running operation began: passed again, they begin none
     before, passed = said, set[int]()
     for event, ordinal in zip(events, next_cut.tolist(), strict=True):
@@ -267,6 +256,22 @@ def _beginnings(
         found.append(_Beginning(event, fresh, tool, change))
         current, said = ordinal, passed
     return found if len(found) <= most else []
+
+
+def _headings_passed(way: _Way, heads: list[Heading]) -> dict[int, Sequence[int]]:
+    """Move -> headings (rows of `heads`) passed right before it."""
+    at = np.array([head.line for head in heads], dtype=np.int64)
+    seen: dict[int, Sequence[int]] = {}
+    below, odd = np.searchsorted(at, way.line, side="right"), way.turns()
+    straight = np.flatnonzero(~odd & (np.diff(below) != 0))
+    for move, low, high in zip(straight.tolist(), below[straight].tolist(), below[straight + 1].tolist(), strict=True):
+        seen[move] = range(low, high)
+    for move in np.flatnonzero(odd).tolist() if heads else ():
+        spans = [np.searchsorted(at, ends, side="right").tolist() for ends in way.passed(move - 1, move)]
+        between = [row for low, high in spans for row in range(low, high)]
+        if between:
+            seen[move] = between
+    return seen
 
 
 def _tool_change(text: _Text, stretches: list[tuple[int, int]]) -> tuple[int, str]:

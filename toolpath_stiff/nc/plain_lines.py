@@ -9,9 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from toolpath_stiff.nc.arcs import CENTER_LETTERS
+from toolpath_stiff.nc.words import AXES
+
 CHUNK = 8192  # lines: their words fit into a processor's cache
-AXIS_LETTERS, CENTER_LETTERS = "XYZABC", "IJKR"
-LETTERS = AXIS_LETTERS + CENTER_LETTERS
+LETTERS = AXES + CENTER_LETTERS
 LENGTH_LETTERS = "XYZIJKR"
 G_COLUMN, FIRST_F, FIRST_LETTER = 0, 1, 2
 LAST_F = FIRST_LETTER + len(LETTERS)

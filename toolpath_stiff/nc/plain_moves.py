@@ -1,23 +1,27 @@
-"""Plain lines to moves, many at a time: what `Interpreter` does with each of them, on arrays, digit for digit.
+"""Plain lines to moves, many at a time: the codes' own rules (`codes`, `frames`) on arrays, digit for digit.
 
-A line about which there is anything to say (a word that nothing takes, an arc that does not fit) ends the run before
-it: the interpreter then executes it and says so. mm, degrees, mm/min inside.
+Here is only what a mode does along lines: a word holds until the next one. What a number, a feed, a point, an arc means
+is asked of the functions that the interpreter asks. A line about which there is anything to say (a word that nothing
+takes, an arc that does not fit) ends the run before it: the interpreter then executes it and says so. mm, degrees,
+mm/min inside.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.nc import arcs
 from toolpath_stiff.nc.blocks import FARTHEST_MM
-from toolpath_stiff.nc.coordinates import INCREMENTS
-from toolpath_stiff.nc.dialects import GENERIC, INCREMENT_DEGREE, INCREMENT_INCH, INCREMENT_MM
-from toolpath_stiff.nc.motion import arc_length
+from toolpath_stiff.nc.codes.circular import ARCS, center_by_offsets, center_by_radius, normal_of, sweep_about
+from toolpath_stiff.nc.codes.feeds import bare_feed_is_open, length_of_move, rotary_feed
+from toolpath_stiff.nc.codes.moving import STILL, note_tool
+from toolpath_stiff.nc.codes.numbers import ANGLES, assume_increments, increment, warn_of_points, watches_points
+from toolpath_stiff.nc.codes.points import LINEAR, coordinate
+from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID
 from toolpath_stiff.nc.plain_lines import (
     FIRST_F,
@@ -33,61 +37,59 @@ from toolpath_stiff.nc.plain_lines import (
     is_bare,
 )
 from toolpath_stiff.nc.recorder import Arc, MovesInMm
-from toolpath_stiff.nc.words import read_block
-from toolpath_stiff.units import MM_PER_INCH
-
-if TYPE_CHECKING:
-    from toolpath_stiff.nc.interpreter import Interpreter
+from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.words import AXES, read_block
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 FEWEST = 8  # lines; below, one by one is as fast
-MODES = {"G0": 0, "G1": 1, "G2": 2, "G3": 3}
+MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_lines` reads
+MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
 NO_MODE = -1
-MODE_NAMES = tuple(MODES)
+CLOCKWISE = MODES[ARCS[0]]
 
 
 class PlainRun:
-    """Executes runs of plain lines of a program on its interpreter."""
+    """Executes runs of plain lines of a program on the state of a control."""
 
-    def __init__(self, interpreter: Interpreter, lines: Sequence[str], name: str) -> None:
-        self.interpreter, self.name = interpreter, name
-        self.lines = PlainLines(lines, interpreter.dialect.semicolon)
+    def __init__(self, state: State, lines: Sequence[str], name: str) -> None:
+        self.state, self.name = state, name
+        self.lines = PlainLines(lines, state.dialect.semicolon)
         self._pause = 0  # the line before which another run is not worth trying
 
     def execute(self, at: int) -> list[Row]:
         """Execute plain lines from `at` (from 0); returns their words. None may be executed."""
         count = self.lines.run(at)
-        if count < FEWEST or at < self._pause or not _suits(self.interpreter):
+        if count < FEWEST or at < self._pause or not _suits(self.state):
             return []
         rows = self.lines.rows(at, count)
-        if self.interpreter.motion not in MODES and not rows[0][G_COLUMN] and any(rows[0]):
+        if self.state.motion not in MODES and not rows[0][G_COLUMN] and any(rows[0]):
             return []
-        block = _Lines(self.interpreter, rows)
-        done = block.execute(at)
+        lines = _Lines(self.state, rows)
+        done = lines.execute(at)
         if done < FEWEST:
             self._pause = at + done + 4 * FEWEST
-        self._watch_points(at, block, done)
+        self._watch_points(at, lines, done)
         return rows[:done]
 
-    def _watch_points(self, at: int, block: _Lines, done: int) -> None:
-        """As `Coordinates._watch_points`, of all lines executed."""
-        state = self.interpreter
-        if state.dialect.name != GENERIC.name or not (state.bare is None or not state.pointed):
+    def _watch_points(self, at: int, lines: _Lines, done: int) -> None:
+        """As `numbers.read_numbers`, of all lines executed."""
+        state = self.state
+        if not watches_points(state):
             return
-        columns = [block.texts[letter][:done] for letter in LENGTH_LETTERS if letter in block.texts]
+        columns = [lines.texts[letter][:done] for letter in LENGTH_LETTERS if letter in lines.texts]
         state.pointed = state.pointed or any(has_pointed(column) for column in columns)
         row = first_bare(columns) if state.bare is None else None
         if row is not None:
             words = read_block(self.lines.lines[at + row], at + row + 1, self.name, state.dialect.semicolon).words
             word = next(w for w in words if w.letter in LENGTH_LETTERS and is_bare(w.text[1:].replace(" ", "")))
             state.bare = (at + row + 1, word)
-        state.warn_of_points()
+        warn_of_points(state)
 
 
-def _suits(state: Interpreter) -> bool:
+def _suits(state: State) -> bool:
     """Whether the modes in force leave plain words their plain meaning."""
     frames = state.frames
     return (
@@ -102,11 +104,11 @@ def _suits(state: Interpreter) -> bool:
 
 
 class _Lines:
-    """The words of lines in columns, and what they make of the interpreter's state."""
+    """The words of lines in columns, and what they make of the state; the line `end` is left to the interpreter."""
 
-    def __init__(self, state: Interpreter, rows: list[Row]) -> None:
+    def __init__(self, state: State, rows: list[Row]) -> None:
         self.state = state
-        self.n = len(rows)
+        self.n = self.end = len(rows)
         columns = list(zip(*rows, strict=True))
         self.codes: Sequence[str] = columns[G_COLUMN]
         self.feeds = (columns[FIRST_F], columns[LAST_F])
@@ -118,9 +120,8 @@ class _Lines:
             for letter, column in self.texts.items()
         }
         self.given = {letter: ~np.isnan(values) for letter, values in self.values.items()}
-        self.counted = np.zeros(self.n, dtype=bool)
-        self.end = self.n  # the first line that is left to the interpreter
-        for letter in "XYZABC":
+        self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
+        for letter in AXES:
             if letter in self.values:
                 self._stop(np.abs(self.values[letter]) > FARTHEST_MM)
         if state.dialect.increments:
@@ -132,37 +133,42 @@ class _Lines:
             self.end = min(self.end, int(np.argmax(where)))
 
     def _count_increments(self) -> None:
-        units = dict.fromkeys(LENGTH_LETTERS, INCREMENT_INCH if self.state.inch else INCREMENT_MM)
-        units.update(dict.fromkeys("ABC", INCREMENT_DEGREE))
         for letter, column in self.texts.items():
             bare = np.array([text != "" and "." not in text for text in column]) & (self.values[letter] != 0.0)
-            self.values[letter] = np.where(bare, self.values[letter] * units[letter], self.values[letter])
+            unit = increment(letter in ANGLES, self.state.inch)
+            self.values[letter] = np.where(bare, self.values[letter] * unit, self.values[letter])
             self.counted |= bare
 
     def execute(self, at: int) -> int:
-        """Move; returns how many lines were executed."""
-        state = self.state
+        """Move; returns how many lines were executed. `at`: the first one's number, from 0."""
         self._modes()
-        axes = self._any("XYZABC")
-        centers = self._any("IJKR")
-        straight = (self.mode <= 1) & axes
-        arc = (self.mode > 1) & (axes | centers | self.coded)
-        self._stop((self.mode <= 1) & centers)
+        axes, centers = self._any(AXES), self._any(arcs.CENTER_LETTERS)
+        is_arc = self.mode >= CLOCKWISE
+        self._stop(~is_arc & centers)
         self._stop((self.mode == NO_MODE) & axes)
+        arc = is_arc & (axes | centers | self.coded)
+        moving = (axes & (self.mode != NO_MODE)) | arc
+        self.cutting = moving & (self.mode != MODES["G0"])
         self._feed_words()
-        self.cutting = ((self.mode == 1) & axes) | arc
-        self._stop(self._no_feed(self.cutting))
-        if not (straight | arc)[: self.end].any():
+        self._stop(self._no_feed())
+        if not moving[: self.end].any():
             return self._leave(None)
         control = self._control()
         start, end = self._set_up(control)
         found = self._arcs(np.flatnonzero(arc[: self.end]), control)
-        moving = (straight | arc)[: self.end]
-        start, end = start[: self.end], end[: self.end]
-        kept = moving & ((start != end).any(axis=1) | arc[: self.end])
+        done = slice(self.end)
+        self._record(at, start[done], end[done], found, moving[done], arc[done])
+        return self._leave(control if moving[done].any() else None)
+
+    def _record(
+        self, at: int, start: FloatArray, end: FloatArray, found: dict[int, Arc], moving: BoolArray, arc: BoolArray
+    ) -> None:
+        """Hand over the moves of the lines that are done, those that go anywhere."""
+        state = self.state
+        kept = moving & ((start != end).any(axis=1) | arc)
         feed = self._feeds(start, end, found, moving)
         rows = np.flatnonzero(kept)
-        motion = np.where(arc[: self.end], ARC, np.where(self.mode[: self.end] == 1, FEED, RAPID))[rows]
+        motion = np.where(arc, ARC, np.where(self.mode[: self.end] == MODES["G1"], FEED, RAPID))[rows]
         place = np.cumsum(kept) - 1
         state.recorder.add_many(
             MovesInMm(
@@ -180,8 +186,7 @@ class _Lines:
             )
         )
         if len(rows):
-            state.note_tool()
-        return self._leave(control if moving.any() else None)
+            note_tool(state)
 
     # -- modes -----------------------------------------------------------------------------------------------------
 
@@ -215,15 +220,14 @@ class _Lines:
         before = math.nan if state.feed is None else state.feed
         self.feed = np.concatenate([[before], values * state.feed_scale])[order]
         self._stop(self.feed == 0.0)
-        units = "inch" if state.inch else "mm"
-        if units in state.dialect.feed_needs_point and state.feed_mode != "G93":
+        if bare_feed_is_open(state):
             self._stop(np.array([text != "" and "." not in text for text in texts]))
 
-    def _no_feed(self, cutting: BoolArray) -> BoolArray:
+    def _no_feed(self) -> BoolArray:
         """Cutting lines without a feed."""
         if self.state.feed_mode == "G94":
-            return np.asarray(cutting & np.isnan(self.feed))
-        rows = np.flatnonzero(cutting)  # G93: each needs its own
+            return np.asarray(self.cutting & np.isnan(self.feed))
+        rows = np.flatnonzero(self.cutting)  # G93: each needs its own
         missing = np.zeros(self.n, dtype=bool)
         used = np.concatenate([[-2], rows[:-1]])
         missing[rows] = (self.feed_row[rows] <= used) | np.isnan(self.feed[rows])
@@ -232,100 +236,115 @@ class _Lines:
     # -- points ----------------------------------------------------------------------------------------------------
 
     def _control(self) -> FloatArray:
-        """(n + 1, 6) control coordinates before the first line and after each."""
-        state = self.state
-        frames = state.frames
-        offset = frames.offsets.at(frames.active).axes
+        """(n + 1, 6) control coordinates before the first line and after each (`points.control_point`)."""
+        state, frames = self.state, self.state.frames
         control = np.empty((self.n + 1, 6))
-        for axis, letter in enumerate("XYZABC"):
+        for axis, letter in enumerate(AXES):
+            here = frames.position[axis]
             if letter not in self.values:
-                control[:, axis] = frames.position[axis]
+                control[:, axis] = here
                 continue
-            scaled = self.values[letter] * (state.length_scale if axis < 3 else 1.0)
+            scaled = self.values[letter] * (state.length_scale if letter in LINEAR else 1.0)
             given = self.given[letter]
             if state.absolute:
-                named = (scaled[given] + frames.g92[axis]) + offset[axis]
-                control[0, axis] = frames.position[axis]
-                control[1:, axis] = np.concatenate([[frames.position[axis]], named])[np.cumsum(given)]
+                named = frames.axis_to_control(axis, scaled[given])
+                control[0, axis] = here
+                control[1:, axis] = np.concatenate([[here], named])[np.cumsum(given)]
             else:
-                steps = np.concatenate([[frames.position[axis]], np.where(given, scaled, 0.0)])
-                control[:, axis] = np.cumsum(steps)
+                control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
         return control
 
     def _set_up(self, control: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Set-up coordinates of each line's start and end; an axis that stands keeps its number (`Mover._record`)."""
-        setup = control.copy()
-        setup[:, :3] -= self.state.frames.fix_reference()
+        """Set-up coordinates of each line's start and end; an axis that stands keeps its number (`moving.record`)."""
+        setup = np.empty_like(control)
+        for axis in range(6):
+            setup[:, axis] = self.state.frames.axis_to_setup(axis, control[:, axis])
         start, end = setup[:-1], setup[1:]
-        still = np.abs(end - start) < 1e-12 * np.maximum(1.0, np.abs(start))
+        still = np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start))
         return start, np.where(still, start, end)
 
     def _arcs(self, rows: IntArray, control: FloatArray) -> dict[int, Arc]:
         """The arcs of some lines, one by one; the first that is not right ends the run."""
+        if not len(rows):
+            return {}
         state = self.state
-        frames = state.frames
         first, second, normal = arcs.PLANES[state.plane]
-        vector = (float(normal == 0), float(normal == 1), float(normal == 2))
-        scale = state.length_scale
-        offset, shift, reference = frames.offsets.at(frames.active).axes, frames.g92, frames.fix_reference()
-        letters = ("XYZ"[first], "XYZ"[second], "IJK"[first], "IJK"[second], "R", "IJK"[normal])
+        letters = (
+            AXES[first],
+            AXES[second],
+            arcs.CENTER_LETTERS[first],
+            arcs.CENTER_LETTERS[second],
+            "R",
+            arcs.CENTER_LETTERS[normal],
+        )
         nothing = np.full(self.n, math.nan)
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
-        found: dict[int, Arc] = {}
-        for row, here, word in zip(rows.tolist(), control[rows, :3].tolist(), words, strict=True):
-            x, y, i, j, radius, off_plane = word
-            point = [(c - o) - g for c, o, g in zip(here, offset, shift, strict=False)]
-            start = (point[first], point[second])
-            named = (x * scale, y * scale)
-            end = (
-                start[0] if math.isnan(x) else named[0] if state.absolute else start[0] + named[0],
-                start[1] if math.isnan(y) else named[1] if state.absolute else start[1] + named[1],
-            )
-            clockwise = bool(self.mode[row] == 2)
-            by_radius = not math.isnan(radius)
-            no_center = math.isnan(i) and math.isnan(j)
-            no_end = math.isnan(x) and math.isnan(y)
-            if not math.isnan(off_plane) or by_radius != no_center or (by_radius and no_end):
-                self.end = row
-                break
+        points = np.stack([state.frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
+        starts = points[:, [first, second]].tolist()
+        middles, sweeps = list[arcs.Point2](), list[float]()
+        for row, start, word in zip(rows.tolist(), starts, words, strict=True):
             try:
-                if by_radius:
-                    center = arcs.center_from_radius(start, end, radius * scale, clockwise)
-                else:
-                    i, j = (0.0 if math.isnan(value) else value for value in (i, j))
-                    center = (start[0] + i * scale, start[1] + j * scale)
-                arcs.check_radii(start, end, center)
+                center, sweep = self._arc(row, start, *word)
             except arcs.ArcError:
                 self.end = row
                 break
-            point[first], point[second] = center
-            a, b, c = (((p + g) + o) - r for p, g, o, r in zip(point, shift, offset, reference, strict=False))
-            found[row] = Arc((a, b, c), vector, arcs.arc_sweep(start, end, center, clockwise, 1))
-        return found
+            middles.append(center)
+            sweeps.append(sweep)
+        frames, found = state.frames, points[: len(sweeps)]
+        found[:, [first, second]] = np.array(middles).reshape(-1, 2)
+        centers = np.stack(
+            [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
+        )
+        vector = normal_of(state.plane)
+        done = zip(rows.tolist(), centers.tolist(), sweeps, strict=False)
+        return {row: Arc((x, y, z), vector, sweep) for row, (x, y, z), sweep in done}
+
+    def _arc(
+        self, row: int, here: list[float], x: float, y: float, i: float, j: float, radius: float, off_plane: float
+    ) -> tuple[arcs.Point2, float]:
+        """Centre (program coordinates) and sweep of an arc from the words of its plane, nan where there is none.
+
+        Raises `ArcError` for what the interpreter has to look at.
+        """
+        state = self.state
+        scale = state.length_scale
+        start = (here[0], here[1])
+        end = (
+            start[0] if math.isnan(x) else coordinate(state, start[0], x * scale),
+            start[1] if math.isnan(y) else coordinate(state, start[1], y * scale),
+        )
+        clockwise = bool(self.mode[row] == CLOCKWISE)
+        by_radius, by_center = not math.isnan(radius), not (math.isnan(i) and math.isnan(j))
+        no_end = math.isnan(x) and math.isnan(y)
+        if not math.isnan(off_plane) or by_radius == by_center or (by_radius and no_end):
+            raise arcs.ArcError("words that do not fit", "")
+        if by_radius:
+            center = center_by_radius(start, end, radius, scale, clockwise)
+        else:
+            center = center_by_offsets(start, (0.0 if math.isnan(i) else i, 0.0 if math.isnan(j) else j), scale)
+        return center, sweep_about(center, start, end, clockwise)
 
     # -- feeds -----------------------------------------------------------------------------------------------------
 
     def _feeds(self, start: FloatArray, end: FloatArray, found: dict[int, Arc], moving: BoolArray) -> FloatArray:
-        """Feed of each line's move as `Mover._feed_of` has it."""
-        feed = self.feed[: self.end]
-        standing = (start[:, :3] == end[:, :3]).all(axis=1)
-        standing[list(found)] = False
+        """Feed of each line's move (`feeds.feed_of_move`); rapids are none."""
+        feed: FloatArray = self.feed[: self.end].copy()
         if self.state.feed_mode == "G94":
-            # Degrees are degrees in inch programs too.
-            return np.asarray(np.where(standing, feed / (MM_PER_INCH if self.state.inch else 1.0), feed))
-        length = np.abs(end[:, 3:] - start[:, 3:]).max(axis=1)
-        for row in np.flatnonzero(moving & ~standing & (self.mode[: self.end] != RAPID)).tolist():
-            ends = start[row].tolist(), end[row].tolist()
-            length[row] = arc_length(found[row], *ends) if row in found else math.dist(ends[0][:3], ends[1][:3])
-        return np.asarray(feed * length)
+            standing = (start[:, :3] == end[:, :3]).all(axis=1)
+            standing[list(found)] = False
+            feed[standing] = rotary_feed(self.state, feed[standing])
+            return feed
+        for row in np.flatnonzero(moving & (self.mode[: self.end] != MODES["G0"])).tolist():
+            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), found.get(row))
+        return feed
 
     def _leave(self, control: FloatArray | None) -> int:
-        """Set the interpreter's state as the lines executed leave it."""
+        """Set the state as the lines executed leave it; their number."""
         state, last = self.state, self.end - 1
         if last < 0:
             return 0
         if state.dialect.increments and self.counted[: self.end].any():
-            state.assume(INCREMENTS.format(state.dialect.name))
+            assume_increments(state)
         if self.mode[last] != NO_MODE:
             state.motion = MODE_NAMES[self.mode[last]]
         if state.feed_mode == "G93":
@@ -336,5 +355,4 @@ class _Lines:
         if control is not None:
             state.frames.position = control[self.end].tolist()
             state.length_changed = state.rotation_changed = False
-        state.call, state.returns = None, False
         return self.end

@@ -12,17 +12,17 @@ from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, 
 from toolpath_stiff.nc.cutter_location import reading as cutter_location
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.foreign import foreign_program
-from toolpath_stiff.nc.frames import Frames, Pose, pose_in_mm, pose_in_si
-from toolpath_stiff.nc.interpreter import Interpreter
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.nc.posted.kinematics import PostedKinematics
 from toolpath_stiff.nc.source import read_lines, split_lines
+from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
+from toolpath_stiff.units import Pose, ShopPose, pose_in_mm, pose_in_si
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
 
 def read_program(
@@ -139,7 +139,7 @@ class _Request:
         return switches_on(self.block_delete, self.controller)
 
     @property
-    def zero(self) -> tuple[Pose | None, Pose]:
+    def zero(self) -> tuple[ShopPose | None, ShopPose]:
         """Where G54's zero sits, mm and degrees, as the caller says, and unless anyone says.
 
         A program that was posted for another machine is read in that one's coordinates first.
@@ -245,10 +245,10 @@ def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
 def _read_built_in(asked: _Request) -> Program:
     posted = asked.posted
     frames = Frames(copy.deepcopy(asked.offsets), *asked.zero, posted=posted)
-    interpreter = Interpreter(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)
-    run = ProgramRun(interpreter, asked.lines, asked.name, asked.switches)
+    state = State(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)
+    run = ProgramRun(state, asked.lines, asked.name, asked.switches)
     warnings = run.run()
-    if not interpreter.recorder.cuts:
+    if not state.recorder.cuts:
         raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=asked.name)
     g54 = asked.offsets.table[0].given or frames.offsets.table[0].given
     if frames.source == "option" and g54:
@@ -259,19 +259,19 @@ def _read_built_in(asked: _Request) -> Program:
         name=asked.name,
         path=asked.path,
         source=asked.lines,
-        moves=interpreter.recorder.moves(),
+        moves=state.recorder.moves(),
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
-        unsupported=tuple(interpreter.unsupported),
-        warnings=(*warnings, *interpreter.warnings),
-        assumptions=(START, *interpreter.assumptions),
-        tools=tuple(interpreter.used_tools.values()),
+        unsupported=tuple(state.unsupported),
+        warnings=(*warnings, *state.warnings),
+        assumptions=(START, *state.assumptions),
+        tools=tuple(state.used_tools.values()),
         dialect=asked.controller.label,
         jumps=tuple(run.jumps),
     )
     if posted is None:
         return program
-    return _on_the_part(program, asked, posted, interpreter.tip_held, frames.offsets)
+    return _on_the_part(program, asked, posted, state.tip_held, frames.offsets)
 
 
 def _on_the_part(

@@ -11,19 +11,22 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import (
     ERROR,
     NOTE,
-    WARNING,
     Checked,
     Finding,
     UsedCode,
     check_lines,
     finding_of,
-    line_in,
+    findings_of,
+    in_order,
 )
-from toolpath_stiff.nc.codes import code_meaning, code_name
+from toolpath_stiff.nc.codes.contract import code_name
+from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.linuxcnc.copy import split
+from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.nc.reader import INTERPRETERS, ZERO, parse_program
+from toolpath_stiff.units import Pose
 
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
 
@@ -58,28 +61,36 @@ def check_by(
             "\n".join([*lines, ""]), name, controller=controller, interpreter="linuxcnc", rs274=rs274, **options
         )
     except InputError as error:
-        if ours is None and error.file is None:
+        if ours is not None:
+            return _refused_by_both(ours, error), "builtin"
+        if error.file is None:
             raise
-        refused = finding_of(error)
-        if ours is None:
-            return Checked(_used(lines, name), (), (refused,), {}, {}, None, _pose(origin, default_origin), False), (
-                "linuxcnc"
-            )
-        said = Finding(refused.line, refused.column, "not read", f"nor by LinuxCNC: {refused.text}", ERROR)
-        return replace(ours, findings=_sorted([*ours.findings, said])), "builtin"
-    findings = [Finding(line_in(text), 0, "warning", text, WARNING) for text in program.warnings]
-    findings += [Finding(0, 0, "assumption", text, NOTE) for text in program.assumptions]
+        at = _pose(origin, default_origin)
+        return Checked(_used(lines, name), (), (finding_of(error),), {}, {}, None, at, False), "linuxcnc"
+    return _checked(program, lines, ours), "linuxcnc"
+
+
+def _refused_by_both(ours: Checked, error: InputError) -> Checked:
+    """The built-in check, with what LinuxCNC's interpreter refuses."""
+    refused = finding_of(error)
+    said = Finding(refused.line, refused.column, "not read", f"nor by LinuxCNC: {refused.text}", ERROR)
+    return replace(ours, findings=in_order([*ours.findings, said]))
+
+
+def _checked(program: Program, lines: tuple[str, ...], ours: Checked | None) -> Checked:
+    """What LinuxCNC's interpreter made of a program, and why the built-in one did not read it (`ours`)."""
+    findings = findings_of((), program.warnings, program.assumptions)
     if ours is not None:
         why = next(finding for finding in ours.findings if finding.severity == ERROR)
         text = f"the built-in interpreter says: {why.text.partition('; ')[0]}"
-        findings.append(Finding(why.line, why.column, "interpreter", text, NOTE))
-    checked = Checked(
-        used=_used(lines, name),
+        findings = in_order([*findings, Finding(why.line, why.column, "interpreter", text, NOTE)])
+    return Checked(
+        used=_used(lines, program.name),
         unsupported=tuple(
             Finding(word.line, word.column, word.word, f"{word.reason}; not acted upon", NOTE)
             for word in program.unsupported
         ),
-        findings=_sorted(findings),
+        findings=findings,
         start={},
         end={},
         moves=program.moves,
@@ -89,14 +100,9 @@ def check_by(
         remarks={tool.number: tool.remark for tool in program.tools},
         marks=program.marks,
     )
-    return checked, "linuxcnc"
 
 
-def _sorted(findings: list[Finding]) -> tuple[Finding, ...]:
-    return tuple(sorted(findings, key=lambda finding: (finding.line, finding.column)))
-
-
-def _pose(origin: Iterable[float] | None, default: Iterable[float]) -> tuple[float, float, float, float, float, float]:
+def _pose(origin: Iterable[float] | None, default: Iterable[float]) -> Pose:
     x, y, z, a, b, c = default if origin is None else origin
     return (x, y, z, a, b, c)
 

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.interpreter import Call, Interpreter
+from toolpath_stiff.nc.blocks import Call, Flow
+from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.moves import Jump
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.words import Block, read_block
 
 if TYPE_CHECKING:
@@ -40,12 +42,12 @@ class _Level:
 
 
 class ProgramRun:
-    """Runs the blocks of a file on an interpreter.
+    """Runs the blocks of a file on a control.
 
     Parameters
     ----------
-    interpreter
-        Executes them.
+    state
+        Of the control at the start; the blocks change it.
     lines, name
         The file.
     switches
@@ -55,14 +57,14 @@ class ProgramRun:
     """
 
     def __init__(
-        self, interpreter: Interpreter, lines: tuple[str, ...], name: str, switches: frozenset[int], fast: bool = True
+        self, state: State, lines: tuple[str, ...], name: str, switches: frozenset[int], fast: bool = True
     ) -> None:
-        self.interpreter, self.lines, self.name = interpreter, lines, name
+        self.state, self.lines, self.name = state, lines, name
         self._plain: PlainRun | None = None
         if fast and len(lines) >= FEWEST_LINES:
             from toolpath_stiff.nc.plain_moves import PlainRun
 
-            self._plain = PlainRun(interpreter, lines, name)
+            self._plain = PlainRun(state, lines, name)
         self.switches = switches
         self._levels: list[_Level] = []
         self._programs: dict[int, int] | None = None
@@ -93,12 +95,13 @@ class ProgramRun:
                     self._check_head(block, numbered)
                     numbered = True
                 if not (block.optional and block.switch in self.switches):
-                    if not self._execute(block):
+                    flow = self._execute(block)
+                    if flow is Flow.END:
                         return self._end(at, "the program's end", ended=True)
-                    if self.interpreter.call is not None:
-                        at = self._jump(at, self._enter(at, self.interpreter.call))
+                    if isinstance(flow, Call):
+                        at = self._jump(at, self._enter(at, flow))
                         continue
-                    if self.interpreter.returns:
+                    if flow is Flow.RETURN:
                         if not self._levels:
                             return [
                                 f"M99 in line {at + 1}, outside any subprogram, makes the control start the program "
@@ -121,14 +124,14 @@ class ProgramRun:
             block = self._called[at] = self._read(at)
         return block
 
-    def _execute(self, block: Block) -> bool:
-        return self.interpreter.execute(block)
+    def _execute(self, block: Block) -> Flow | Call:
+        return execute(self.state, block)
 
     def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
         """Plain lines from `at` were executed; `rows` are their words (`plain_lines.PlainLines.rows`)."""
 
     def _read(self, at: int) -> Block:
-        return read_block(self.lines[at], at + 1, self.name, self.interpreter.dialect.semicolon)
+        return read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)
 
     def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
         return InputError(found, expected=expected, hint=hint, file=self.name, line=at + 1, column=column)
@@ -137,7 +140,7 @@ class ProgramRun:
         """A program number within a program: the next one begins where this one did not end."""
         if self._levels:
             raise self._unended(block.line - 1)
-        if (numbered or len(self.interpreter.recorder)) and self.interpreter.dialect.name != "linuxcnc":
+        if (numbered or len(self.state.recorder)) and self.state.dialect.name != "linuxcnc":
             raise self._fail(
                 block.line - 1,
                 f"{block.words[0].text} begins another program before the first one has ended",
@@ -184,7 +187,7 @@ class ProgramRun:
         return first
 
     def _jump(self, at: int, to: int) -> int:
-        self.jumps.append(Jump(len(self.interpreter.recorder), at + 1, to))
+        self.jumps.append(Jump(len(self.state.recorder), at + 1, to))
         return to
 
     def _block_numbered(self, at: int, call: Call) -> int:
@@ -220,7 +223,7 @@ class ProgramRun:
         """Program number and repeats of a call."""
         heads = self._heads()
         meanings = {(call.number, call.repeats or 1)}
-        style = self.interpreter.dialect.repeats_in_p
+        style = self.state.dialect.repeats_in_p
         if call.repeats is None and call.number >= REPEATS_IN_P and style is not False:
             repeats, number = divmod(call.number, REPEATS_IN_P)
             meanings = {(number, repeats)} if style else meanings | {(number, repeats)}

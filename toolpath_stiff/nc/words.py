@@ -19,6 +19,7 @@ from toolpath_stiff.errors import InputError
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 # ASCII digits alone: the digits of other scripts are no numbers to any control.
 WORD = re.compile(rf"([A-Z@^])({NUMBER})(E[+-]?\d+)?", re.ASCII)
+AXES = "XYZABC"
 POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
 LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTUVWXYZ" + POLAR)
 COMMENT = re.compile("[();]")

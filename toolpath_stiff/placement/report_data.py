@@ -11,12 +11,11 @@ from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.path_analysis import assumptions
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
 from toolpath_stiff.errors import UnreachableError
-from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.placement.offset_blocks import offset_blocks
 from toolpath_stiff.placement.search import PlacementResult
+from toolpath_stiff.rewriting import offset_blocks
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FloatArray = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import State
 from toolpath_stiff.nc.cutter_location.statements import Statement, frame_in_comment, plain_point, read_statement
 from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
-from toolpath_stiff.nc.frames import Pose
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.units import Pose
 
 NO_CUT = "no cutting move"
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.arcs import arc_sweep
-from toolpath_stiff.nc.blocks import AXES
 from toolpath_stiff.nc.linuxcnc.copy import Line
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID
 from toolpath_stiff.nc.recorder import Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH
 
 CALL = re.compile(r"^ *\d+ +N(?:\.+|(\d+)) *([A-Z][A-Z0-9_]*)\((.*)\) *$", re.MULTILINE)

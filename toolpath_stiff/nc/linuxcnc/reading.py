@@ -8,27 +8,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes import G_HARMLESS, M_HARMLESS, code_name
-from toolpath_stiff.nc.frames import Pose
+from toolpath_stiff.nc.codes.contract import code_name
+from toolpath_stiff.nc.codes.registry import LISTED
 from toolpath_stiff.nc.linuxcnc import fence
 from toolpath_stiff.nc.linuxcnc.canon import Follower
 from toolpath_stiff.nc.linuxcnc.copy import Line, needs_tags, numbered, split
 from toolpath_stiff.nc.linuxcnc.runner import Limits, Run, StoppedError, find_rs274, message_and_line, run_rs274
 from toolpath_stiff.nc.linuxcnc.tables import first_offset, parameter_file, tool_file, tool_numbers
 from toolpath_stiff.nc.moves import Moves, ToolUse, Unsupported
+from toolpath_stiff.nc.state import START
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
-from toolpath_stiff.units import m_from_mm
+from toolpath_stiff.units import ShopPose, m_from_mm
 
 MACHINE_CODES = re.compile(r"G0*(?:53|28|30)(?!\d)")
 OFFSET_CODES = re.compile(r"G0*10(?!\d)")
 SETS_G54 = re.compile(r"L0*20?(?!\d).*P0*[01](?!\d)|P0*[01](?!\d).*L0*20?(?!\d)")
-HARMLESS = {**G_HARMLESS, **M_HARMLESS}
 HARMLESS_WORD = re.compile(r"([GM])([0-9]+\.?[0-9]*)")
 FILES = re.compile(r"\s*(logopen|logappend|probeopen)\b", re.IGNORECASE)
 LOOPS = re.compile(r"O(?:<[^<>]*>|\d+|[#\[].*)(?:WHILE|REPEAT|DO)")
 MOST_NAMED = 5  # loops, in a message
 WAITS = re.compile(r"M0*66(?!\d)")
-START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class Reading:
     """What the second interpreter found; see `Program` for the fields."""
 
     moves: Moves
-    origin: Pose
+    origin: ShopPose
     source: str
     unsupported: tuple[Unsupported, ...]
     warnings: tuple[str, ...]
@@ -47,8 +46,8 @@ class Reading:
 def read(
     source: Sequence[str],
     name: str,
-    origin: Pose | None,
-    default_origin: Pose,
+    origin: ShopPose | None,
+    default_origin: ShopPose,
     offsets: Offsets,
     tools: dict[int, ToolEntry] | None,
     block_delete: bool,
@@ -93,7 +92,7 @@ class _Session:
     limits: Limits | None
     posted: bool
 
-    def read(self, origin: Pose | None, default_origin: Pose) -> Reading:
+    def read(self, origin: ShopPose | None, default_origin: ShopPose) -> Reading:
         offsets = copying.deepcopy(self.offsets)
         shift = self._shift(origin, default_origin)
         run, follower = self._run(offsets, shift)
@@ -125,7 +124,7 @@ class _Session:
     def _uses(self, codes: re.Pattern[str]) -> bool:
         return any(codes.search(line.plain) for line in self.lines)
 
-    def _shift(self, origin: Pose | None, default_origin: Pose) -> tuple[float, float, float]:
+    def _shift(self, origin: ShopPose | None, default_origin: ShopPose) -> tuple[float, float, float]:
         """How far all work offsets must be moved for machine coordinates to be those of the machine; mm.
 
         Only G53, G28 and G30 can tell. G10 writes offsets that are machine coordinates already: then none.
@@ -253,7 +252,7 @@ class _Session:
         for line in self.lines:
             if "G" in line.words or "M" in line.words:
                 for letter, digits in HARMLESS_WORD.findall(line.plain):
-                    reason = HARMLESS.get(code_name(letter, float(digits)))
+                    reason = LISTED.get(code_name(letter, float(digits)))
                     if reason:
                         column = self._column(line, letter + digits)
                         found.append(Unsupported(line.number, column, letter + digits, reason))

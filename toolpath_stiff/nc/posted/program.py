@@ -15,9 +15,8 @@ from toolpath_stiff.nc.posted.chain import tool_poses
 from toolpath_stiff.nc.posted.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis
 from toolpath_stiff.nc.posted.moves import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
-Pose = tuple[float, float, float, float, float, float]
 BoolArray = NDArray[np.bool_]
 MOST_LINES = 5  # named in one sentence
 OWN_ZERO = (

@@ -20,8 +20,8 @@ from toolpath_stiff.updating.planning.plan_files import plan_rows
 from toolpath_stiff.updating.planning.plan_menu import Costs, Menu
 
 if TYPE_CHECKING:
-    from toolpath_stiff.machine.model import Pose
     from toolpath_stiff.nc import Program
+    from toolpath_stiff.units import Pose
 
 POSES = 6
 PATH_STEP = 5e-3  # m between samples: the mean of a path needs no more

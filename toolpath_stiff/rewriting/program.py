@@ -12,29 +12,22 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from toolpath_stiff.analysis.path_analysis import Analysis, analyse
-from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
-from toolpath_stiff.nc.frames import Frames, pose_in_mm
-from toolpath_stiff.nc.frames import Pose as ShopPose
-from toolpath_stiff.nc.interpreter import Interpreter
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
-from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.source import split_lines
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
 from toolpath_stiff.nc.words import read_block
-from toolpath_stiff.placement.rewrite_blocks import Rewriter
-from toolpath_stiff.placement.rewrite_trace import Tracer
-from toolpath_stiff.placement.rewrite_turn import Turn
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.rewriting.blocks import rewrite_block
+from toolpath_stiff.rewriting.controls import Controls
+from toolpath_stiff.rewriting.turn import Turn
+from toolpath_stiff.units import Pose, ShopPose, mm_from_m, pose_in_mm
 
 LINE_END = re.compile("\r\n|\n|\r")
 FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # 0.01 mm is no machining; beyond nine a double has no more to say
-FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_per_mm"}
 PLAIN_DIALECTS = ("generic", "linuxcnc")
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
@@ -108,16 +101,16 @@ def rewrite_program(
     def frames(origin: ShopPose) -> Frames:
         return Frames(copy.deepcopy(offsets or Offsets()), origin, origin)
 
-    rewriter = Rewriter(
-        Tracer(program.name, frames(placement), copy.deepcopy(tools)),
-        Interpreter(program.name, frames(original), copy.deepcopy(tools)),
+    controls = Controls(
+        State(program.name, frames(placement), copy.deepcopy(tools)),
+        State(program.name, frames(original), copy.deepcopy(tools)),
         Turn(placement, original),
         decimals,
         None if linearise is None else mm_from_m(linearise),
     )
     switches = switches_on(block_delete, UNKNOWN_CONTROL)
-    pieces = list(_rewritten_lines(rewriter, text, program.name, switches))
-    return Rewritten("".join(pieces), encoding, tuple(rewriter.notes))
+    pieces = list(_rewritten_lines(controls, text, program.name, switches))
+    return Rewritten("".join(pieces), encoding, tuple(controls.notes))
 
 
 def check_rewritable(program: Program) -> None:
@@ -143,7 +136,7 @@ def check_decimals(decimals: int | None) -> None:
         raise InputError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
 
 
-def _rewritten_lines(rewriter: Rewriter, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
+def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
     """Lines with their ends; what follows the program's end stays as it is."""
     lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), LINE_END.findall(text)
     ends += [""] * (len(lines) - len(ends))
@@ -161,9 +154,9 @@ def _rewritten_lines(rewriter: Rewriter, text: str, name: str, switches: frozens
             _refuse_left_out(bool(block.words), number, name)
         else:
             started = started or bool(block.words)
-            written, running = rewriter.block(block, line)
-            if block.optional and written != [line] and SLASHED not in rewriter.notes:
-                rewriter.notes.append(SLASHED)
+            written, running = rewrite_block(controls, block, line)
+            if block.optional and written != [line] and SLASHED not in controls.notes:
+                controls.notes.append(SLASHED)
         yield raw + end if written == [line] else (end or between).join(written) + end
 
 
@@ -176,31 +169,6 @@ def _refuse_left_out(words: bool, number: int, name: str) -> None:
             file=name,
             line=number,
         )
-
-
-def rewriting_differences(
-    placed: Analysis, rewritten: Rewritten, original_origin: Pose, **reading: Any
-) -> dict[str, float]:
-    """Relative differences of mean, range and smallest stiffness: the rewritten program against the placed one.
-
-    Parameters
-    ----------
-    placed
-        The untouched program, analysed at the placement.
-    rewritten
-        Is read and analysed at the original origin with the same load, force and step.
-    original_origin
-        m and rad, as it was given to `rewrite_program`.
-    **reading
-        `offsets`, `tools`, `block_delete`, as for `parse_program`.
-    """
-    program = parse_program(rewritten.text, placed.program.name, origin=original_origin, **reading)
-    again = analyse(
-        placed.model, program, origin=original_origin, load=placed.load, step=placed.step, force=placed.force
-    )
-    wanted, found = (stiffness_figures(analysis, analysis.counted) for analysis in (placed, again))
-    scale = {"range": wanted["range_N_per_mm"] or wanted["mean_N_per_mm"]}  # a path of one point has no range
-    return {name: abs(found[key] - wanted[key]) / scale.get(name, wanted[key]) for name, key in FIGURES.items()}
 
 
 def _text_of(program: Program) -> tuple[str, str]:

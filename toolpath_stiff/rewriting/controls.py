@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import arcs
-from toolpath_stiff.nc.blocks import AXES, Codes
-from toolpath_stiff.nc.codes import MOTION, PLANE
-from toolpath_stiff.nc.interpreter import Interpreter
-from toolpath_stiff.nc.words import read_block
-from toolpath_stiff.placement.rewrite_trace import Tracer, cutting_rows, differences
-from toolpath_stiff.placement.rewrite_turn import Turn
-from toolpath_stiff.placement.rewrite_words import LineEdit
+from toolpath_stiff.nc.blocks import CurrentBlock
+from toolpath_stiff.nc.codes.contract import MOTION, PLANE
+from toolpath_stiff.nc.interpreter import execute
+from toolpath_stiff.nc.state import Segment, State
+from toolpath_stiff.nc.words import AXES, Block, read_block
+from toolpath_stiff.rewriting.comparing import cutting_rows, differences
+from toolpath_stiff.rewriting.line_edit import LineEdit
+from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import MM_PER_INCH
 
 FloatArray = NDArray[np.float64]
@@ -37,52 +38,59 @@ class Controls:
     ----------
     known
         Axes that the program has put somewhere; of the others only the control knows where they stand.
+    block
+        The one in hand.
+    trace
+        The moves of that block as the untouched program makes them.
     notes
         What the user should hear of, each once.
     """
 
-    def __init__(
-        self, source: Tracer, out: Interpreter, turn: Turn, decimals: int | None, linearise: float | None
-    ) -> None:
+    def __init__(self, source: State, out: State, turn: Turn, decimals: int | None, linearise: float | None) -> None:
         self.source, self.out, self.turn = source, out, turn
         self.decimals, self.linearise = decimals, linearise
         self.known = [False, False, False, True, True, True]
         self.notes: list[str] = []
+        self.block = Block(0, ())
+        self.trace: list[Segment] = []
+        source.trace = self.trace
         self._coarsest = 0.0  # mm, the last decimal of any block so far: inches round coarser than mm
 
-    def _note(self, sentence: str) -> None:
+    def note(self, sentence: str) -> None:
+        """Say a sentence, once."""
         if sentence not in self.notes:
             self.notes.append(sentence)
 
-    def _refusal(self, found: str, hint: str = "") -> InputError:
-        block = self.source.block
-        return InputError(found, hint=hint, file=self.source.name, line=block.line)
+    def refusal(self, found: str, hint: str = "") -> InputError:
+        """Why the block in hand cannot be rewritten."""
+        return InputError(found, hint=hint, file=self.source.name, line=self.block.line)
 
     # -- units and axes --------------------------------------------------------------------------------------------
 
     @property
-    def _digits(self) -> int:
+    def digits(self) -> int:
+        """Decimals of the numbers written."""
         if self.decimals is not None:
             return self.decimals
         return DECIMALS_INCH if self.out.inch else DECIMALS_MM
 
     @property
-    def _unit(self) -> float:
+    def unit(self) -> float:
         """The last decimal in mm."""
-        return 10.0**-self._digits * self._scale(0)
+        return 10.0**-self.digits * self.scale(0)
 
-    def _scale(self, axis: int) -> float:
+    def scale(self, axis: int) -> float:
         """Millimetres (or degrees) of a word's unit."""
         return MM_PER_INCH if self.out.inch and axis < 3 else 1.0
 
     @property
-    def _matrix(self) -> FloatArray:
+    def matrix(self) -> FloatArray:
         """The turn in the program axes in force."""
         return self.turn.in_program(self.out.frames.turned)
 
-    def _image(self, plane: str) -> tuple[str, float] | None:
+    def image(self, plane: str) -> tuple[str, float] | None:
         """The plane that a plane is turned into, and the sign of its normal; None if it is none of the three."""
-        column = self._matrix[:, arcs.PLANES[plane][2]]
+        column = self.matrix[:, arcs.PLANES[plane][2]]
         for name, (_, _, normal) in arcs.PLANES.items():
             if abs(column[normal]) == 1.0:
                 return name, float(column[normal])
@@ -95,37 +103,37 @@ class Controls:
 
     # -- words -----------------------------------------------------------------------------------------------------
 
-    def _plane_word(self, codes: Codes, edit: LineEdit, before: str) -> str:
+    def plane_word(self, current: CurrentBlock | None, edit: LineEdit, before: str) -> str:
         """Turn the plane word of the block, if it has one; the plane that will be in force."""
-        given = codes.groups.get(PLANE)
+        given = None if current is None else current.code(PLANE)
         if given is None:
             return before
-        image = self._image(given[0])
+        image = self.image(given[0])
         plane = image[0] if image else given[0]
         if plane != given[0]:
             edit.replace(given[1], given[1].text[0] + plane[1:])
         return plane
 
-    def _motion_word(self, codes: Codes, edit: LineEdit, wanted: str) -> None:
+    def motion_word(self, current: CurrentBlock | None, edit: LineEdit, wanted: str) -> None:
         """See to it that the block is executed in the motion mode wanted."""
-        given = codes.groups.get(MOTION)
+        given = None if current is None else current.code(MOTION)
         if given is None:
             if self.out.motion != wanted:
                 edit.add_code(wanted)
         elif given[0] != wanted:
             edit.replace(given[1], given[1].text[0] + wanted[1:])
 
-    def _target(self, control: Sequence[float]) -> list[float]:
+    def target(self, control: Sequence[float]) -> list[float]:
         """Control coordinates of `out` for a point of `source` in its control coordinates."""
-        return self._of_setup(self.source.frames.to_setup(list(control)))
+        return self.of_setup(self.source.frames.to_setup(list(control)))
 
-    def _of_setup(self, setup: Sequence[float]) -> list[float]:
+    def of_setup(self, setup: Sequence[float]) -> list[float]:
         """Control coordinates of `out` for a point of the untouched program's set-up frame."""
         reference = self.out.frames.fix_reference()
         point = [p + r for p, r in zip(self.turn.point(setup[:3]), reference, strict=True)]
         return [*point, *self.turn.angles(setup[3:], self.out.frames.position[3:])]
 
-    def _go(
+    def go(
         self, edit: LineEdit, target: list[float], axes: Sequence[str], only: Sequence[int] = range(6), parts: int = 1
     ) -> None:
         """Words of the axes `only`, so that `out` goes to a point in control coordinates, in `parts` equal steps.
@@ -135,12 +143,12 @@ class Controls:
         out = self.out
         there, here = out.frames.to_program(target), out.frames.to_program(out.frames.position)
         named = [AXES.index(letter) for letter in axes if letter in "XYZ"]
-        matrix = self._matrix if named and not all(self.known) else None
+        matrix = self.matrix if named and not all(self.known) else None
         for axis in only:
-            letter, scale = AXES[axis], self._scale(axis)
+            letter, scale = AXES[axis], self.scale(axis)
             if letter not in axes:
                 coupled = axis < 3 and matrix is not None and matrix[axis, named].any()
-                off = abs(there[axis] - here[axis]) > OFF * 10.0**-self._digits * scale
+                off = abs(there[axis] - here[axis]) > OFF * 10.0**-self.digits * scale
                 if not off or not (self.known[axis] or coupled):
                     continue
             goal = there[axis] if out.absolute else (there[axis] - here[axis]) / parts
@@ -148,33 +156,33 @@ class Controls:
 
     # -- execute and check -----------------------------------------------------------------------------------------
 
-    def _emit(self, edit: LineEdit) -> str:
+    def emit(self, edit: LineEdit) -> str:
         """Have `out` execute the edited line; its text."""
         text = edit.render()
         try:
-            block = read_block(text, self.source.block.line, self.source.name)
-            self.out.execute(block)
+            block = read_block(text, self.block.line, self.source.name)
+            execute(self.out, block)
         except InputError as error:
-            raise self._refusal(
+            raise self.refusal(
                 f"the block, rewritten as {text.strip()!r}, would be refused: {error.found}", "give more --decimals"
             ) from None
-        if self.source.segments:
+        if self.trace:
             self._know([word.letter for word in block.words])
         return text
 
-    def _check(self, first: int, first_out: int, pieces: bool) -> None:
+    def check(self, first: int, first_out: int, pieces: bool) -> None:
         """Every cutting move of the block must be the placed one to within the rounding; of `pieces` the two ends."""
-        self._coarsest = unit = max(self._coarsest, self._unit)
+        self._coarsest = unit = max(self._coarsest, self.unit)
         wanted = cutting_rows(self.source.recorder, first)
         found = cutting_rows(self.out.recorder, first_out)
         if pieces and wanted and found:
             wanted = [wanted[0]._replace(end=wanted[-1].end, arc=None)]
             found = [found[0]._replace(end=found[-1].end)]
         # The steps of a cycle with L in G91 repeat one rounding.
-        repeats = next((word.value for word in self.source.block.words if word.letter == "L"), 1.0)
+        repeats = next((word.value for word in self.block.words if word.letter == "L"), 1.0)
         what = differences(self.turn, wanted, found, unit * max(repeats, 1.0))
         if what:
-            raise self._refusal(f"the block cannot be rewritten: its cutting move {what}", self._remedy(what))
+            raise self.refusal(f"the block cannot be rewritten: its cutting move {what}", self._remedy(what))
 
     def _remedy(self, what: str) -> str:
         unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])

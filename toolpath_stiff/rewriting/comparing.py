@@ -7,37 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolpath_stiff.nc.interpreter import Interpreter
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.recorder import Arc, Recorder
 from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.placement.rewrite_pieces import angle_between
-from toolpath_stiff.placement.rewrite_turn import Turn
+from toolpath_stiff.rewriting.turn import Turn, angle_between
 
 # In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start; a centre
-# given by I, J, K adds that of its own words, one given by R what `rewrite_blocks.NEAR` allows.
+# given by I, J, K adds that of its own words, one given by R what `blocks.NEAR` allows.
 END_UNITS, CENTER_UNITS = 2.0, 6.0
 SHORTEST_UNITS = 4.0
-
-
-class Segment(NamedTuple):
-    """One move of a block, those of no length too: control coordinates of its ends, and its arc."""
-
-    motion: int
-    start: list[float]
-    end: list[float]
-    arc: Arc | None
-
-
-class Tracer(Interpreter):
-    """Executes the untouched program; `segments` are those of the block in hand."""
-
-    segments: list[Segment]
-
-    def _record(self, motion: int, control: list[float], work: set[int], machine: set[int], arc: Arc | None) -> None:
-        start = list(self.frames.position)
-        super()._record(motion, control, work, machine, arc)
-        self.segments.append(Segment(motion, start, list(control), arc))
 
 
 class Row(NamedTuple):

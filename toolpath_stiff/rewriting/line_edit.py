@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from toolpath_stiff.nc.blocks import AXES
-from toolpath_stiff.nc.words import Block, Word
+from toolpath_stiff.nc.words import AXES, Block, Word
 
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
 FEED_DECIMALS = 6

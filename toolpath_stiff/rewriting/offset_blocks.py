@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import Pose
-from toolpath_stiff.nc.codes import ADDITIONAL_OFFSETS, WORK_OFFSETS, code_name
+from toolpath_stiff.nc.codes.contract import code_name
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
+from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
 from toolpath_stiff.nc.words import read_block
-from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m
 
 OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions

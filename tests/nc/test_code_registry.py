@@ -1,0 +1,119 @@
+"""The table of codes: every row has its function, meaning and source, and the documentation is made from it."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import pytest
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc import parse_program
+from toolpath_stiff.nc.codes.contract import EVERYWHERE, MOTION, ONCE, STEPS, Code, holds_anyway
+from toolpath_stiff.nc.codes.document import BEGIN, END, codes_table
+from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED, code_meaning, table
+from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.dialects import DIALECTS
+from toolpath_stiff.nc.plain_moves import MODE_NAMES
+from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
+
+PAGE = Path(__file__).parents[2] / "docs" / "nc.md"
+
+
+@pytest.mark.parametrize("name", CODES)
+def test_every_code_has_function_meaning_and_source(name):
+    code = CODES[name]
+    assert list(inspect.signature(code.act).parameters) == ["state", "block", "code"]
+    assert inspect.getdoc(code.act), "a function of a code says what the code does"
+    assert code.meaning
+    assert any(manual in code.source for manual in ("LinuxCNC", "Fanuc", "Haas"))
+    assert code.when in STEPS
+    assert code_meaning(name)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_every_refused_code_says_what_it_is_and_what_to_do(name):
+    code = REFUSED[name]
+    assert name not in CODES
+    assert code.hint
+    assert code.source
+    with pytest.raises(InputError) as refusal:
+        parse_program(f"G21 F100\nG1 X1\n{name}\nM2\n")
+    assert (refusal.value.line, refusal.value.column) == (3, 1)
+    assert refusal.value.found == f"{name} is {code.what}, which is not supported"
+    assert refusal.value.hint == code.hint
+
+
+def test_a_code_without_a_function_is_refused():
+    with pytest.raises(TypeError, match="G1 has no function"):
+        Code("G1", MOTION, None, "feed", "LinuxCNC")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        (("G01", MOTION, holds_anyway, "feed", "LinuxCNC"), "no name of a code"),
+        (("X", MOTION, holds_anyway, "feed", "LinuxCNC"), "no name of a code"),
+        (("G1", "no such group", holds_anyway, "feed", "LinuxCNC"), "no step"),
+        (("G1", MOTION, holds_anyway, "", "LinuxCNC"), "its meaning and its source"),
+        (("G1", MOTION, holds_anyway, "feed", ""), "its meaning and its source"),
+        (("G1", MOTION, holds_anyway, "feed", "LinuxCNC", ()), "controls"),
+        (("G1", MOTION, holds_anyway, "feed", "LinuxCNC", ("siemens",)), "controls"),
+    ],
+)
+def test_a_row_that_is_not_complete_is_refused(row, message):
+    with pytest.raises(ValueError, match=message):
+        Code(*row)
+
+
+def test_a_code_that_is_there_twice_is_refused():
+    row = Code("G1", MOTION, holds_anyway, "feed", "LinuxCNC")
+    with pytest.raises(ValueError, match="twice"):
+        table([row, row])
+
+
+@pytest.mark.parametrize("code", ["G1.7", "G60", "G100", "G5.4"])
+def test_a_code_that_is_not_in_the_table_is_refused(code):
+    with pytest.raises(InputError, match="not a G code that is known") as refusal:
+        parse_program(f"G21 F100\nG1 X1\n  {code}\nM2\n")
+    assert (refusal.value.line, refusal.value.column) == (3, 3)
+
+
+def test_the_controls_of_a_row_are_those_of_the_dialects():
+    assert set(EVERYWHERE) == set(DIALECTS)
+    for name in ADDITIONAL_OFFSETS:
+        assert set(CODES[name].controls) == {d.name for d in DIALECTS.values() if name in d.additional}
+    assert set(CODES["M97"].controls) == {d.name for d in DIALECTS.values() if d.local_calls}
+    assert set(ALIASES["G70"].controls) == {d.name for d in DIALECTS.values() if d.inch_metric}
+    assert set(ALIASES["G234"].controls) == {d.name for d in DIALECTS.values() if d.holds_tip == "G234"}
+    assert set(CODES["G43.4"].controls) == {d.name for d in DIALECTS.values() if d.holds_tip == "G43.4"}
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("name", ["G54.1", "G154", "M97"])
+def test_a_control_without_a_code_refuses_it(name, dialect):
+    program = f"G21 F100.\nG1 X1.\n{name} P1\nM2\n"
+    with pytest.raises(InputError) as refusal:
+        parse_program(program, controller=Controller(DIALECTS[dialect]))
+    of_the_control = "nothing defines" in str(refusal.value) or "no such block" in str(refusal.value)
+    assert of_the_control == (dialect in CODES[name].controls)
+
+
+def test_groups_that_other_modules_name():
+    assert {name for name, code in CODES.items() if code.group == "work offset"} == {*WORK_OFFSETS, *ADDITIONAL_OFFSETS}
+    assert MODE_NAMES == ("G0", "G1", "G2", "G3")  # the digits that the pattern of plain lines reads
+    assert {name for name, code in CODES.items() if code.takes_axes and code.group == ONCE} == {
+        "G10", "G28", "G30", "G52", "G92",
+    }  # fmt: skip
+
+
+def test_the_page_holds_the_table_as_it_is():
+    page = PAGE.read_text("utf-8")
+    written = page[page.index(BEGIN) : page.index(END)].removeprefix(BEGIN).strip()
+    assert written == codes_table().strip(), "make it again: python -m toolpath_stiff.nc.codes.document docs/nc.md"
+
+
+def test_the_table_names_every_code_once():
+    cells = [line.split("|")[1] for line in codes_table().splitlines() if line.startswith("| ")]
+    names = [name for cell in cells for name in cell.split() if name != "code" and not set(name) <= {"-"}]
+    assert sorted(names) == sorted([*CODES, *REFUSED, *ALIASES])

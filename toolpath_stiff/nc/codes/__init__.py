@@ -1,0 +1,1 @@
+"""The codes: one file a group, each with its functions and their rows in the table (`registry`)."""

@@ -1,0 +1,329 @@
+"""One block of a program, written for another placement: straight moves, homes, arcs, cycles, moves cut into pieces."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from toolpath_stiff.nc import arcs
+from toolpath_stiff.nc.blocks import CurrentBlock, Flow
+from toolpath_stiff.nc.codes.circular import ARCS
+from toolpath_stiff.nc.codes.contract import M_STOP, ONCE
+from toolpath_stiff.nc.codes.drilling import CYCLES
+from toolpath_stiff.nc.codes.registry import CODES
+from toolpath_stiff.nc.interpreter import begin, finish
+from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.recorder import Arc
+from toolpath_stiff.nc.words import AXES, POLAR, Block, read_block
+from toolpath_stiff.rewriting.controls import OFF, Controls
+from toolpath_stiff.rewriting.line_edit import FEED_DECIMALS, SAME, LineEdit
+from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_between
+
+HALF_CIRCLE = 0.999  # chord over diameter, from which R magnifies a rounded end more than twenty times
+NEAR = 2.0  # units by which the centre of an arc given by R may miss its place; beyond, I, J, K are written
+SLASH = re.compile(r"\s*/\d*")
+LINEARISE = "give --linearise MM to have straight moves within MM of it, or place the work without that turn"
+
+
+def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str], bool]:
+    """The lines that take a block's place, and whether the program goes on."""
+    if not block.words:
+        return [text], True
+    source, out = controls.source, controls.out
+    controls.block = block
+    controls.trace.clear()
+    first, first_out = len(source.recorder.line), len(out.recorder.line)
+    current = begin(source, block)
+    if current.flow is not Flow.NEXT:
+        raise controls.refusal(
+            "a subprogram (M98, M99) cannot be rewritten: it may run at several places",
+            "expand subprograms before",
+        )
+    axes = [letter for letter in AXES if current.has(letter)]
+    plane_before = out.plane
+    begin(out, block)
+    goes_on = finish(source, current) is Flow.NEXT
+    edit = LineEdit(text, block, controls.digits)
+    plane = controls.plane_word(current, edit, plane_before)
+    lines, pieces = _lines(controls, current, edit, axes, plane, first)
+    controls.check(first, first_out, pieces)
+    return lines, goes_on
+
+
+def _lines(
+    controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str, first: int
+) -> tuple[list[str], bool]:
+    """The lines, and whether they are one move cut into pieces."""
+    source = controls.source
+    once = current.groups.get(ONCE)
+    if not controls.trace:
+        return [controls.emit(edit)], False
+    last = controls.trace[-1]
+    if source.polar is not None or any(word.letter in POLAR for word in controls.block.words):
+        raise controls.refusal(
+            "polar words (G16, @, ^) cannot be rewritten", "post the program in Cartesian coordinates"
+        )
+    if once == "G53":
+        controls.note("moves of G53 keep their machine coordinates")
+    elif once is not None and CODES[once].takes_axes:
+        controls.note("the reference points of G28 and G30 stay where they are; intermediate points move with the work")
+        _home(controls, edit, axes)
+    elif source.motion in CYCLES:
+        if controls.matrix[arcs.PLANES[source.plane][2], arcs.PLANES[source.plane][2]] != 1.0:
+            return _cycle_in_moves(controls, current, edit, axes, first), False
+        _cycle(controls, current, edit, axes, plane)
+    else:
+        count = _piece_count(controls, last.motion, last.start, last.end, last.arc)
+        if count > 1:
+            return _in_pieces(controls, current, edit, axes, count), True
+        if last.arc is None:
+            controls.motion_word(current, edit, source.motion or "")
+            controls.go(edit, controls.target(last.end), axes)
+        else:
+            _arc(controls, current, edit, axes, plane)
+    return [controls.emit(edit)], False
+
+
+# -- homes -----------------------------------------------------------------------------------------------------
+
+
+def _home(controls: Controls, edit: LineEdit, axes: list[str]) -> None:
+    """G28, G30: the intermediate point moves with the work, the reference point does not."""
+    if not axes:
+        return
+    mixed = controls.matrix != 0.0
+    named = [AXES.index(letter) for letter in axes]
+    missing = [
+        AXES[other]
+        for other in range(3)
+        if other not in named and any(axis < 3 and (mixed[axis, other] or mixed[other, axis]) for axis in named)
+    ]
+    if missing:
+        raise controls.refusal(
+            f"G28 or G30 of {', '.join(axes)} without {', '.join(missing)}: the turned work has no such axis alone",
+            f"name {', '.join(missing)} too",
+        )
+    controls.go(edit, controls.target(controls.trace[0].end), axes, only=named)
+
+
+# -- arcs ------------------------------------------------------------------------------------------------------
+
+
+def _arc(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str) -> None:
+    source = controls.source
+    image, last = controls.image(source.plane), controls.trace[-1]
+    assert image is not None
+    assert last.arc is not None
+    name, sign = image
+    if name != plane:
+        edit.add_code(name)
+    code = source.motion or ""
+    code = code if sign > 0.0 else ARCS[1 - ARCS.index(code)]
+    controls.motion_word(current, edit, code)
+    first, second, normal = arcs.PLANES[name]
+    target = controls.target(last.end)
+    start, end = (source.frames.to_program(point) for point in (last.start, last.end))
+    chord = math.dist(*([point[axis] for axis in arcs.PLANES[source.plane][:2]] for point in (start, end)))
+    if chord < SAME:
+        _full_circle(controls, edit, target, axes, normal)
+    else:
+        controls.go(edit, target, axes)
+    _center(controls, edit, last.arc.center, code == "G2", (first, second), chord)
+
+
+def _full_circle(controls: Controls, edit: LineEdit, target: list[float], axes: list[str], normal: int) -> None:
+    """A circle ends on its own start to the last digit, or it is none: words that cannot say so are left out."""
+    here = controls.out.frames.to_program(controls.out.frames.position)
+    for axis in range(3):
+        place = here[axis] / controls.scale(axis)
+        if axis == normal or AXES[axis] not in axes:
+            continue
+        if controls.out.absolute and abs(round(place, controls.digits) - place) > SAME:
+            edit.remove(AXES[axis])
+        else:
+            edit.write(AXES[axis], place if controls.out.absolute else 0.0)
+    along = [normal, 3, 4, 5]
+    controls.go(edit, target, [letter for letter in axes if AXES.index(letter) in along], only=along)
+
+
+def _center(
+    controls: Controls,
+    edit: LineEdit,
+    center: Sequence[float],
+    clockwise: bool,
+    plane: tuple[int, int],
+    exact_chord: float,
+) -> None:
+    """I, J, K of a centre (set-up frame of the untouched program); R stays where it says the same."""
+    out = controls.out
+    there = out.frames.to_program(controls.of_setup([*center, 0.0, 0.0, 0.0]))
+    here = out.frames.to_program(out.frames.position)
+    if edit.word("R") is not None:
+        if _radius_says(controls, edit, here, there, clockwise, plane, exact_chord):
+            return
+        edit.remove("R")
+    letters = [arcs.CENTER_WORDS[axis] for axis in plane]
+    edit.remove(letter for letter in arcs.CENTER_WORDS if letter not in letters)
+    for axis, letter in zip(plane, letters, strict=True):
+        value = (there[axis] if out.arc_absolute else there[axis] - here[axis]) / controls.scale(axis)
+        if edit.word(letter) is not None or out.arc_absolute or abs(value) > OFF * 10.0**-controls.digits:
+            edit.write(letter, value)
+
+
+def _radius_says(
+    controls: Controls,
+    edit: LineEdit,
+    here: Sequence[float],
+    center: Sequence[float],
+    clockwise: bool,
+    plane: tuple[int, int],
+    exact_chord: float,
+) -> bool:
+    """Whether R with the rounded ends puts the centre where it belongs; near half circles it does not."""
+    radius = edit.word("R")
+    assert radius is not None
+    end = list(here)
+    for word in read_block(edit.render(), controls.block.line, controls.source.name).words:
+        if word.letter in AXES:
+            axis = AXES.index(word.letter)
+            value = word.value * controls.scale(axis)
+            end[axis] = value if controls.out.absolute else here[axis] + value
+    first, second = plane
+    size = radius.value * controls.scale(first)
+    chord = math.dist((here[first], here[second]), (end[first], end[second]))
+    if abs(chord - exact_chord) > SAME and chord > HALF_CIRCLE * 2.0 * abs(size):
+        return False
+    try:
+        found = arcs.center_from_radius((here[first], here[second]), (end[first], end[second]), size, clockwise)
+    except arcs.ArcError:
+        return False
+    return math.dist(found, (center[first], center[second])) <= NEAR * controls.unit
+
+
+# -- cycles ----------------------------------------------------------------------------------------------------
+
+
+def _cycle(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str) -> None:
+    """The hole's place turns and moves, bottom and R plane (in G90) move along the drilling axis."""
+    source, out = controls.source, controls.out
+    first, second, normal = arcs.PLANES[source.plane]
+    if source.plane != plane:
+        edit.add_code(source.plane)
+    controls.motion_word(current, edit, source.motion or "")
+    repeats = edit.word("L")
+    holes = [letter for letter in axes if AXES.index(letter) != normal]
+    target = controls.target(controls.trace[-1].end)
+    controls.go(edit, target, holes, only=[first, second], parts=int(repeats.value) if repeats else 1)
+    for key, letter in (("Z", AXES[normal]), ("R", "R")):
+        height = source.sticky[key]
+        if source.absolute:
+            place = source.frames.to_program(source.frames.position)
+            place[normal] = height
+            height = out.frames.to_program(controls.target(source.frames.to_control(place)))[normal]
+        if edit.word(letter) or abs(height - out.sticky.get(key, math.inf)) > OFF * controls.unit:
+            edit.write(letter, height / controls.scale(normal))
+
+
+def _cycle_in_moves(
+    controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], first: int
+) -> list[str]:
+    """A cycle along an axis that is none any more: its moves, rapids and dwells, one a line."""
+    source = controls.source
+    if controls.linearise is None:
+        axis = AXES[arcs.PLANES[source.plane][2]]
+        raise controls.refusal(
+            f"{source.motion} drills along {axis}, and the placement turns the work out of it", LINEARISE
+        )
+    controls.note("drilling cycles are written as their single moves")
+    rows = source.recorder
+    pieces = [
+        ("G0" if rows.motion[i] == RAPID else "G1", rows.end[i], rows.dwell[i]) for i in range(first, len(rows.line))
+    ]
+    return _one_by_one(controls, current, edit, axes, pieces)
+
+
+# -- pieces ----------------------------------------------------------------------------------------------------
+
+
+def _piece_count(controls: Controls, motion: int, start: list[float], end: list[float], arc: Arc | None) -> int:
+    """Into how many pieces a move must be cut; those that must be are refused, unless it was asked for."""
+    off_plane = arc is not None and controls.image(controls.source.plane) is None
+    leaning = 0.0
+    if motion != RAPID and controls.turn.turns and start[3:] != end[3:]:
+        written = controls.out.frames.position[3:], controls.target(end)[3:]
+        leaning = lean(controls.turn, (start[3:], end[3:]), written)
+    if not off_plane and leaning == 0.0:
+        return 1
+    if controls.linearise is None:
+        _refuse_to_cut(controls, off_plane, leaning)
+        return 1
+    tolerance = controls.linearise - controls.unit
+    if tolerance < controls.unit:
+        raise controls.refusal(
+            f"--linearise {controls.linearise:g} mm is no more than the rounding to {controls.digits} decimals",
+            "give more of it, or more --decimals",
+        )
+    count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
+    if arc is not None and (off_plane or count > 1):
+        controls.note(
+            f"arcs that the turn takes out of the planes are written as chords within {controls.linearise:g} mm"
+        )
+        frames = controls.source.frames
+        count = max(count, chords(arc, frames.to_setup(start), frames.to_setup(end), tolerance), 2)
+    return count
+
+
+def _refuse_to_cut(controls: Controls, off_plane: bool, leaning: float) -> None:
+    if off_plane:
+        raise controls.refusal(
+            f"an arc of {controls.source.plane}, turned with the work, lies in none of the planes G17, G18, G19",
+            LINEARISE,
+        )
+    if leaning > LEAN:
+        raise controls.refusal(
+            f"between its ends the tool would lean {leaning:.3g} degrees otherwise than placed, as a control "
+            "interpolates A, B and C",
+            LINEARISE,
+        )
+
+
+def _in_pieces(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], count: int) -> list[str]:
+    """A cutting move as `count` straight ones."""
+    source = controls.source
+    last = controls.trace[-1]
+    start, end = (source.frames.to_setup(point) for point in (last.start, last.end))
+    points = points_between(start, end, last.arc, count)
+    return _one_by_one(controls, current, edit, axes, [("G1", point, 0.0) for point in points])
+
+
+def _one_by_one(
+    controls: Controls,
+    current: CurrentBlock,
+    edit: LineEdit,
+    axes: list[str],
+    pieces: Sequence[tuple[str, list[float], float]],
+) -> list[str]:
+    """Straight moves (code, end in the set-up frame, dwell after it in s), the first in the block's own line."""
+    stop = current.code(M_STOP)
+    if stop is not None:
+        raise controls.refusal(f"{stop[0]} in a block that is written as several", "give it a block of its own")
+    edit.remove("IJKRPLQ")
+    feed = edit.word("F") if controls.out.feed_mode == "G93" else None
+    slash = SLASH.match(edit.render()) if edit.block.optional else None
+    lines = []
+    for number, (code, point, dwell) in enumerate(pieces):
+        if number:
+            edit = edit.next_line(slash[0] if slash else "")
+        controls.motion_word(None if number else current, edit, code)
+        controls.go(edit, controls.of_setup(point), [] if number else axes)
+        if feed is not None:  # of each piece, as G93 counts the moves
+            edit.write("F", feed.value * len(pieces), FEED_DECIMALS)
+        if number == 0 or edit.moves:
+            lines.append(controls.emit(edit))
+        if dwell:
+            pause = edit.next_line(slash[0] if slash else "")
+            pause.add_code("G4")
+            pause.write("P", dwell, FEED_DECIMALS)
+            lines.append(controls.emit(pause))
+    return lines
