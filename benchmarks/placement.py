@@ -1,8 +1,11 @@
-"""`python -m benchmarks.placement`: the placement search against a brute-force grid of 20,000 placements.
+"""`python -m benchmarks.placement`: what a recommended placement keeps, and whether a dense grid finds a better one.
 
-A path of 10,000 samples, four free variables (x, y, z, rotation). Bars: no placement of the grid better by more than
-0.1 % in the recommended objective; hypervolume of the front at least that of the grid's front; at least 30 points on
-the front; at least 10 times fewer pose evaluations than the grid; 20 s of CPU.
+Every program of `programs/` and 50 random ones (seeded) are placed; bars: none of mean, range and weakest place worse
+than at the present placement, unless it is said; no rapid out of reach. Some are held against a grid of 20,000
+placements whose best are polished by scipy's simplex search, which shares nothing with the linear programmes; bars: no
+placement of the grid dominates the recommended one (no worse in all three, better by more than 1 % in one);
+`programs/pocket.nc` in the README's bounds takes at most 6 s of CPU and at least 4 times fewer evaluations than 6.3
+million, which it took before.
 """
 
 from __future__ import annotations
@@ -15,101 +18,171 @@ from pathlib import Path
 import numpy as np
 
 from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc import read_program
-from toolpath_stiff.path import move_lengths
-from toolpath_stiff.placement.batch import Evaluator, WorkPath, work_path
-from toolpath_stiff.placement.search import OBJECTIVES, Bounds, score, search_placements
+from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.nc.controller import read_controller
+from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.placement.batch import Evaluator
+from toolpath_stiff.placement.climb import Bounds, Rules
+from toolpath_stiff.placement.placing import Placed, Task, place_program
+from toolpath_stiff.placement.search import SearchRules
+from toolpath_stiff.placement.work_path import telling_path, work_path
 from toolpath_stiff.stiffness.model import build_model
 
-SAMPLES = 10_000
-GRID = (11, 11, 11, 15)  # 19,965 placements; with 35 at random beside: 20,000
+PROGRAMS = Path(__file__).parent.parent / "programs"
 BOUNDS = Bounds(np.array([-0.3, -0.3, 0.4, 0.0, 0.0, 0.0]), np.array([0.3, 0.3, 1.25, 0.0, 0.0, 2.0 * np.pi]))
-PROGRAMS = ("case_study", "pocket", "arcs_in_planes")
-BETTER, FEWER, POINTS, CPU_SECONDS = 1e-3, 10.0, 30, 20.0
+GRID = (11, 11, 11, 15)  # 19,965 placements
+GRID_SAMPLES, POLISHED, POLISH_EVALUATIONS = 200, 12, 300
+AGAINST_GRID = ("pocket.nc", "case_study.nc", "inch_bracket.nc", "arcs_in_planes.nc")
+DOMINATED, CPU_SECONDS, POSES_BEFORE, FEWER = 0.01, 6.0, 6_300_000, 4.0
+MODEL, LOAD = build_model(load_machine("nist")), parse_load("tangential")
 
 
-def ten_thousand(name: str) -> WorkPath:
-    """A program sampled to about 10,000 samples."""
-    program = read_program(Path(__file__).parent.parent / "programs" / f"{name}.nc")
-    length = move_lengths(program.moves)[program.moves.motion != 0].sum()
-    return work_path(program, float(length) / (SAMPLES - program.moves.motion.size))
+def shipped(name: str) -> Program:
+    """A program of `programs/`."""
+    controller = PROGRAMS / f"{Path(name).stem}.toml"
+    reading = {"controller": read_controller(controller, None)} if controller.exists() else {}
+    if not reading:
+        reading = {"tool_table": PROGRAMS / "tools.tbl"}
+    return read_program(PROGRAMS / name, default_origin=MODEL.machine.default_origin, **reading)
+
+
+def random_program(seed: int) -> Program:
+    """A small program: rapids at some height, plunges, straight cuts, arcs, ramps, now and then a retract high up."""
+    rng = np.random.default_rng(seed)
+    size, lines = rng.uniform(20.0, 220.0), ["G21 G90 G17 F600"]
+    for _ in range(int(rng.integers(2, 6))):
+        x, y = rng.uniform(-size, size, 2)
+        lines += [f"G0 X{x:.3f} Y{y:.3f}", f"G0 Z{rng.uniform(3, 30):.3f}", f"G1 Z{rng.uniform(-15, 0):.3f}"]
+        for _ in range(int(rng.integers(2, 8))):
+            x, y = rng.uniform(-size, size, 2)
+            height = f" Z{rng.uniform(-15, 0):.3f}" if rng.uniform() < 0.3 else ""
+            lines.append(f"G1 X{x:.3f} Y{y:.3f}{height}")
+            if rng.uniform() < 0.3:
+                lines.append(f"G{2 + int(rng.integers(2))} X{x:.3f} Y{y:.3f} I{rng.uniform(3, 25):.3f} J0")
+        lines.append(f"G0 Z{rng.choice([20.0, 50.0, 250.0]):.0f}")
+    return parse_program("\n".join([*lines, "M2", ""]), f"random {seed}", default_origin=MODEL.machine.default_origin)
+
+
+def placed(program: Program, step: float = 2e-3) -> Placed:
+    """The program placed as the README's command places it."""
+
+    def read(origin: tuple[float, ...]) -> Program:
+        raise AssertionError("no program here goes to machine coordinates")
+
+    present = program.origin
+    return place_program(Task(MODEL, program, present, read, BOUNDS, SearchRules(), LOAD, step, 1000.0))
+
+
+def kept(program: Program) -> tuple[str, bool]:
+    """A row of the first table."""
+    try:
+        found = placed(program)
+    except UnreachableError as error:
+        return f"| {program.name} | refused: {error} | | | | | yes |", True
+    now, before = found.summary["chosen"], found.summary["before"]
+    samples = found.best.samples
+    rapids = int((~samples.cutting & ~found.best.at.reachable).sum())
+    if before is None:
+        return f"| {program.name} | out of reach | | | {rapids} | said | {'no' if rapids else 'yes'} |", not rapids
+    change = [100.0 * (now[key] / before[key] - 1.0) for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")]
+    worse = change[0] < -1e-7 or change[1] > 1e-7 or change[2] < -1e-7
+    said = bool(found.summary["worse"]) and found.summary["warnings"][0].startswith("WORSE")
+    passed = (not worse or said) and rapids == 0
+    cells = " | ".join(f"{value:+.2f}" for value in change)
+    return f"| {program.name} | {cells} | {rapids} | {'said' if said else '-'} | {'yes' if passed else 'NO'} |", passed
 
 
 def grid_placements() -> np.ndarray:
-    """20,000 placements over the bounds."""
+    """The grid over the bounds."""
     axes = [np.linspace(BOUNDS.low[i], BOUNDS.high[i], n) for i, n in zip((0, 1, 2), GRID[:3], strict=True)]
     axes.append(np.linspace(0.0, 2.0 * np.pi, GRID[3], endpoint=False))
     x, y, z, c = (g.ravel() for g in np.meshgrid(*axes, indexing="ij"))
-    placements = np.column_stack([x, y, z, np.zeros_like(x), np.zeros_like(x), c])
-    more = BOUNDS.placements(np.random.default_rng(0).uniform(size=(20_000 - len(placements), 4)))
-    return np.vstack([placements, more])
+    return np.column_stack([x, y, z, np.zeros_like(x), np.zeros_like(x), c])
 
 
-def hypervolume(mean: np.ndarray, spread: np.ndarray, reference: tuple[float, float]) -> float:
-    """Area that a front dominates up to a reference (low mean, wide range); both in N/um."""
-    order = np.argsort(-mean)
-    area, widest = 0.0, reference[1]
-    for i in order:
-        if mean[i] > reference[0] and spread[i] < widest:
-            area += (mean[i] - reference[0]) * (widest - spread[i])
-            widest = spread[i]
-    return area
+def dominance(objectives: np.ndarray, ours: np.ndarray) -> np.ndarray:
+    """(k,) by what share placements beat ours in their best figure, where they are no worse in any; else 0."""
+    no_worse = (objectives >= ours).all(axis=1)
+    return np.where(no_worse, ((objectives - ours) / np.abs(ours)).max(axis=1), 0.0)
 
 
-def measure(name: str, objective: str) -> tuple[str, bool]:
-    """One row of the table."""
-    model, load, path = build_model(load_machine("nist")), parse_load("tangential"), ten_thousand(name)
-    grid = grid_placements()
-    evaluator = Evaluator(model, path, load, 1000.0)
-    brute = evaluator.figures(grid)
+def against_grid(name: str) -> tuple[str, bool]:
+    """A row of the second table."""
+    from scipy.optimize import minimize
+
+    program = shipped(name)
     start = time.process_time()
-    found = search_placements(model, path, load, BOUNDS, objective=objective)
+    found = placed(program, 1e-3)
     cpu = time.process_time() - start
-    best_of_grid = float(score(brute, objective).max())
-    ours = float(score(found.best_figures, objective)[0])
-    gap = (best_of_grid - ours) / abs(best_of_grid)
-    fewer = evaluator.poses / found.pose_evaluations
-    feasible = brute.margin >= 0.0
-    reference = (
-        1e-6 * min(float(brute.mean[feasible].min()), float(found.figures.mean.min())),
-        1e-6 * max(float(brute.spread[feasible].max()), float(found.figures.spread.max())),
-    )
-    volumes = [
-        hypervolume(1e-6 * m, 1e-6 * s, reference)
-        for m, s in ((found.figures.mean, found.figures.spread), (brute.mean[feasible], brute.spread[feasible]))
+    path = work_path(program, 1e-3, LOAD, program.origin)
+    whole, few = (Evaluator(MODEL, part, LOAD, 1000.0) for part in (path, telling_path(path, GRID_SAMPLES)))
+    best = np.array(found.best.origin)
+    now = whole.figures(np.array([program.origin]))
+    rules = Rules(0.01, float(now.extrapolated[0]))
+    ours, ours_few = (evaluator.figures(best[None]).objectives[0] for evaluator in (whole, few))
+    grid = grid_placements()
+    figures = few.figures(grid)
+
+    def shortfall(objectives: np.ndarray) -> np.ndarray:
+        """How far below ours the worst of the three is, as a share; a polish climbs from the nearest."""
+        return np.nan_to_num(((ours_few - objectives) / np.abs(ours_few)).max(axis=1), nan=1e9)
+
+    def loss(unit: np.ndarray) -> float:
+        at = few.figures(BOUNDS.placements(unit[None]))
+        gain = at.objectives[0] @ np.array([1.0, 1.0, 0.0]) - ours_few @ np.array([1.0, 1.0, 0.0])
+        worse = max(float(shortfall(at.objectives)[0]), 0.0) + float(rules.violation(at)[0])
+        return float(np.nan_to_num(-gain / ours_few[0] + 10.0 * worse, nan=1e9))
+
+    nearest = np.argsort(shortfall(figures.objectives) + 1e3 * rules.violation(figures), kind="stable")[:POLISHED]
+    polished = [
+        minimize(loss, BOUNDS.unit(grid[i][None])[0], method="Nelder-Mead", options={"maxfev": POLISH_EVALUATIONS}).x
+        for i in nearest
     ]
-    passed = gap <= BETTER and volumes[0] >= volumes[1] and fewer >= FEWER and cpu <= CPU_SECONDS
-    passed &= len(found.front) >= POINTS
-    row = (
-        f"| {name} | {objective} | {len(path)} | {ours / 1e3:,.0f} | {best_of_grid / 1e3:,.0f} | {100 * gap:+.3f} % | "
-        f"{volumes[0] / volumes[1]:.4f} | {len(found.front)} | {fewer:.1f} | {cpu:.1f} | {'yes' if passed else 'NO'} |"
-    )
+    final = whole.figures(np.vstack([grid[nearest], BOUNDS.placements(np.array(polished))]))
+    allowed = rules.violation(final) == 0.0
+    by = float(np.where(allowed, dominance(final.objectives, ours), 0.0).max())
+    poses = found.summary["search"]["pose_evaluations"]
+    passed = by <= DOMINATED
+    if name == "pocket.nc":
+        passed &= cpu <= CPU_SECONDS and poses * FEWER <= POSES_BEFORE
+    row = f"| {name} | {len(path)} | {100.0 * by:.3f} % | {poses:,} | {cpu:.1f} | {'yes' if passed else 'NO'} |"
     return row, passed
 
 
 def main() -> int:
-    """Print the table; `--out FILE` writes it too."""
+    """Print the tables; `--out FILE` writes them too."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.placement", description=__doc__)
-    parser.add_argument("--out", help="write the table to this file as well")
+    parser.add_argument("--out", help="write the tables to this file as well")
+    parser.add_argument("--random", type=int, default=50, metavar="N", help="random programs (default: 50)")
     args = parser.parse_args()
-    lines = [
-        "| program | objective | samples | search, N/mm | grid, N/mm | grid better by | hypervolume over grid's | "
-        "front | fewer pose evaluations | CPU s | bars cleared |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- |",
+    lines = ["# Placement: never worse than before, and not beaten by a grid", ""]
+    lines += [
+        "Bounds: `--x -300:300 --y -300:300 --z 400:1250`, objective `balanced`. Changes in per cent of the present",
+        "figure; a narrower range is better. Polished are the grid's placements that come nearest to dominating.",
+        "",
+        "| program | samples | dominated by | poses | CPU s | bars cleared |",
+        "| --- | ---: | ---: | ---: | ---: | --- |",
     ]
     passed = True
-    for name in PROGRAMS:
-        for objective in OBJECTIVES if name == PROGRAMS[0] else OBJECTIVES[:1]:
-            row, clears = measure(name, objective)
-            lines.append(row)
-            passed &= clears
-            print(row, flush=True)
-    text = "\n".join(["# Placement search against a grid of 20,000", "", *lines, ""])
+    for name in AGAINST_GRID:
+        row, clears = against_grid(name)
+        print(row, flush=True)
+        lines.append(row)
+        passed &= clears
+    lines += ["", "| program | mean, % | range, % | weakest, % | rapids out of reach | worse | bars cleared |"]
+    lines += ["| --- | ---: | ---: | ---: | ---: | --- | --- |"]
+    names = sorted(path.name for path in PROGRAMS.iterdir() if path.suffix in (".nc", ".apt"))
+    programs = [*(shipped(name) for name in names), *(random_program(seed) for seed in range(args.random))]
+    for program in programs:
+        row, clears = kept(program)
+        print(row, flush=True)
+        lines.append(row)
+        passed &= clears
     if args.out:
-        Path(args.out).write_text(
-            f"{text}\nMade by `python -m benchmarks.placement --out {args.out}`.\n", encoding="utf-8"
-        )
+        text = "\n".join([*lines, "", f"Made by `python -m benchmarks.placement --out {args.out}`.", ""])
+        Path(args.out).write_text(text, encoding="utf-8")
     return 0 if passed else 1
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.placement.test_placement_search import headline_figures
 from toolpath_stiff.analysis import analyse
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine
@@ -54,6 +55,14 @@ def tilted(tmp_path_factory):
     return folder, placed(folder, "tilted_five_axis", *TILTS)[1]
 
 
+def test_plunges_set_neither_the_axis_nor_the_colours(tmp_path, capsys):
+    data = placed(tmp_path, "pocket")[1]
+    values, plunge = np.array(data["stiffness"]), np.array(data["plunge"])
+    assert plunge.any() and values[:, plunge].min() > 1.5 * values[:, ~plunge].max()
+    assert data["scale"][1] <= values[:, ~plunge].max()
+    assert data["beyond"][1]  # the plunges, which the key says
+
+
 @pytest.mark.parametrize("name", ["pocket", "tilted_five_axis"])
 def test_page_tells_what_analysis_finds(tmp_path, capsys, name, request):
     data = request.getfixturevalue("tilted")[1] if name == "tilted_five_axis" else placed(tmp_path, name)[1]
@@ -62,10 +71,10 @@ def test_page_tells_what_analysis_finds(tmp_path, capsys, name, request):
     for i in (0, len(data["front"]) // 2, data["recommended"]):
         row = data["front"][i]
         found = analyse(NIST, program, origin=pose_of(row), step=STEP)
-        for key, value in found.summary().items():
-            if key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "mean_deflection_um"):
-                # placement.json holds mm to the last digit; the range is a difference of large numbers
-                assert row[key] == pytest.approx(value, rel=1e-7)
+        figures = headline_figures(found)
+        for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "mean_deflection_um"):
+            # placement.json holds mm to the last digit; the range is a difference of large numbers
+            assert row[key] == pytest.approx(figures[key], rel=1e-7)
         # Each drawn point is a sample of the analysis, with its stiffness to the whole N/mm.
         samples = found.samples
         position = turned(row, np.array(data["position"]))
@@ -73,7 +82,7 @@ def test_page_tells_what_analysis_finds(tmp_path, capsys, name, request):
             near = np.linalg.norm(1e3 * samples.position - position[k], axis=1) < 2e-3
             near &= samples.cutting & (np.abs(1e3 * samples.s - data["s"][k]) < 2e-2)
             assert np.abs(found.at.stiffness[near] / 1e3 - data["stiffness"][i][k]).min() <= 0.5 + 1e-6
-    original = analyse(NIST, program, step=STEP).summary()
+    original = headline_figures(analyse(NIST, program, step=STEP))
     assert data["before"]["mean_N_per_mm"] == pytest.approx(original["mean_N_per_mm"], rel=1e-12)
 
 

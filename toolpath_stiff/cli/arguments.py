@@ -299,13 +299,18 @@ def controller_for(args: argparse.Namespace) -> Controller:
     return controller
 
 
-def read_program_for(args: argparse.Namespace, file: str, machine: Machine | None) -> Program:
-    """Read a program with the options of `add_program_options`; without a machine the default origin is 0."""
+def read_program_for(
+    args: argparse.Namespace, file: str, machine: Machine | None, origin: Pose | None = None
+) -> Program:
+    """Read a program with the options of `add_program_options`, for another `origin` if one is given.
+
+    Without a machine the default origin is 0.
+    """
     from toolpath_stiff.nc import read_program
 
     return read_program(
         file,
-        origin=args.origin,
+        origin=origin or args.origin,
         default_origin=machine.default_origin if machine else (0.0,) * 6,
         block_delete=args.block_delete,
         interpreter=args.interpreter,

@@ -25,12 +25,10 @@ from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis import Analysis
     from toolpath_stiff.machine import Machine
-    from toolpath_stiff.nc import Program
     from toolpath_stiff.placement.batch import Keepout
-    from toolpath_stiff.placement.search import Bounds
-    from toolpath_stiff.units import Pose
+    from toolpath_stiff.placement.climb import Bounds
+    from toolpath_stiff.placement.placing import Placed, Task
 
 EPILOG = """\
 examples:
@@ -38,6 +36,9 @@ examples:
   tps place programs/pocket.nc --z-values 400,600,800 --rotate 0 --objective mean
   tps place programs/pocket.nc --keep-out vice:100,100,0,300,300,900
   tps place programs/pocket.nc --rotate 0 --write placed.nc
+  tps place programs/pocket.nc --rotate 0 --pick 7 --write placed.nc
+
+The recommended placement is never worse than the present one in mean, range or weakest place, if one such can be found.
 
 A placement is where program zero sits and how the work is turned about it: the numbers of --origin. Files written to
 --out: placements.csv (the front), placement.json, front.png, profiles.png, map.png, setup.pdf,
@@ -48,7 +49,7 @@ FARTHEST_TURN = 720.0
 OWN_FILES = (
     "placements.csv", "placement.json", "report.html", "front.png", "profiles.png", "map.png", "setup.pdf",
 )  # fmt: skip
-OBJECTIVES = ("balanced", "mean", "range", "min")
+OBJECTIVES = ("balanced", "mean", "range", "weakest")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,9 +78,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         )
     group.add_argument(
         "--keep-out", action="append", default=[], type=_keep_out, metavar="NAME:X0,Y0,Z0,X1,Y1,Z1",
-        help="box that the tool tip must stay out of, machine coordinates, mm",
+        help="box that the tool tip must stay out of, rapids included, machine coordinates, mm",
     )  # fmt: skip
-    parser.add_argument("--objective", choices=OBJECTIVES, default="balanced", help="balanced: mean - range (default)")
+    group.add_argument(
+        "--margin",
+        type=_percent,
+        default=1.0,
+        metavar="PERCENT",
+        help="of a limit's span that cuts and rapids keep from it (default: 1)",
+    )
+    group.add_argument(
+        "--allow-extrapolation",
+        action="store_true",
+        help="let struts leave the lengths of their law at more samples than now",
+    )
+    parser.add_argument(
+        "--objective",
+        type=_objective,
+        choices=OBJECTIVES,
+        default="balanced",
+        help="balanced: mean - range (default); whatever it is, none of mean, range, weakest gets worse where that "
+        "can be avoided",
+    )
+    parser.add_argument(
+        "--pick",
+        type=int,
+        metavar="N",
+        help="take point N of the front in --out (number in placements.csv) instead of the recommended one, without "
+        "searching again; the other options as they were",
+    )
     parser.add_argument("--points", type=int, default=60, metavar="N", help="most points of the front (default: 60)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the search (default: 1)")
     parser.add_argument("--out", metavar="DIR", help="folder (default: reports/<program>-place)")
@@ -106,6 +133,19 @@ def _add_write_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _percent(text: str) -> float:
+    value = finite_number(text)
+    if not 0.0 <= value < 50.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected 0 to less than 50 (per cent)")
+    return value
+
+
+def _objective(text: str) -> str:
+    if text == "min":
+        raise argparse.ArgumentTypeError("'min' is called 'weakest' now")
+    return text
+
+
 def _heights(text: str) -> list[float]:
     return sorted({finite_number(part) for part in text.split(",")})
 
@@ -122,116 +162,103 @@ def _keep_out(text: str) -> tuple[str, list[float]]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Search, analyse the recommended placement, write the files."""
-    from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.analysis.path_analysis import analyse
+    """Search, or take another point of an earlier search; write the files."""
     from toolpath_stiff.cli.progress import progress_bar
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.placement.batch import work_path
-    from toolpath_stiff.placement.report_data import analyse_before, front_rows, placement_summary, pose_of
-    from toolpath_stiff.placement.search import search_placements
-    from toolpath_stiff.rewriting import check_rewritable
+    from toolpath_stiff.placement.placing import place_again, place_program
+    from toolpath_stiff.report.place_text import placement_text
 
     if not 2 <= args.points <= 1000:
         raise InputError(f"--points {args.points}", expected="2 to 1000")
     check_seed(args.seed)
     _check_write(args)
-    replaced = check_written(args, [args.write, *(_folder(args) / name for name in OWN_FILES)])
-    model = model_for(args)
-    program = read_program_for(args, args.program, model.machine)
-    if args.write:
-        check_rewritable(program)
-    if args.write and program.interpreter != "builtin":
-        raise InputError(
-            f"--write {args.write}: {program.name} was read by LinuxCNC's interpreter; its blocks cannot be rewritten",
-            hint="leave --write out and set the work offset",
-        )
-    load = parse_load(args.load)
-    origin = args.origin or (program.origin if program.origin_source == "program" else model.machine.default_origin)
-    options = {"load": load, "step": args.step, "force": args.force}
-    before, reason = analyse_before(model, program, origin, **options)
-    with progress_bar(f"{program.name}: search", quiet=args.json) as progress:
-        found = search_placements(
-            model,
-            work_path(program, args.step),
-            load,
-            _bounds(args, model.machine),
-            objective=args.objective,
-            keepouts=_keepouts(args),
-            seed=args.seed,
-            points=args.points,
-            force=args.force,
-            progress=progress,
-        )
-    again = read_program_for(
-        argparse.Namespace(**{**vars(args), "origin": pose_of(found.best)}), args.program, model.machine
-    )
-    best = analyse(model, again, origin=pose_of(found.best), **options)
-    front = front_rows(model, again, found, args.step, args.force)
-    summary = placement_summary(program, found, best, before, reason, front, args.objective, args.seed)
-    rewritten, summary["written"] = _rewrite(args, again, best, origin)
+    out = Path(args.out) if args.out else Path("reports") / f"{Path(args.program).stem}-place"
+    replaced = check_written(args, [args.write, *(out / name for name in OWN_FILES)])
+    earlier = _earlier(out) if args.pick is not None else None
+    task = _task(args)
+    if earlier is not None:
+        placed = place_again(task, earlier, args.pick)
+    else:
+        with progress_bar(f"{task.program.name}: search", quiet=args.json) as progress:
+            placed = place_program(task, progress)
     keep(replaced, quiet=args.json)
-    files = _write(args, _folder(args), summary, best, before, program)
-    if rewritten is not None:
-        files.append(write_atomically(args.write, rewritten))
+    files = _write(args, out, placed)
+    if placed.rewritten is not None:
+        files.append(write_atomically(args.write, placed.rewritten))
     if args.json:
-        json.dump(summary, sys.stdout, indent=2)
+        json.dump(placed.summary, sys.stdout, indent=2)
         print()
     else:
-        print(_table(summary))
+        print(placement_text(placed.summary))
         print("\n".join(["written:", *(f"  {file}" for file in files)]))
     return 0
 
 
-def _folder(args: argparse.Namespace) -> Path:
-    return Path(args.out) if args.out else Path("reports") / f"{Path(args.program).stem}-place"
+def _earlier(out: Path) -> dict[str, Any]:
+    """placement.json of an earlier search."""
+    from toolpath_stiff.files import read_text
+
+    file = out / "placement.json"
+    if not file.exists():
+        raise InputError(
+            f"--pick: there is no earlier search in {out} (no placement.json)",
+            hint="search first, without --pick, or name the search's folder with --out",
+        )
+    try:
+        found = json.loads(read_text(file, "the earlier search"))
+    except ValueError as error:
+        raise InputError(f"--pick: {file} is no JSON: {error}", hint="search again, without --pick") from None
+    if not isinstance(found, dict):
+        raise InputError(f"--pick: {file} is no result of a search", hint="search again, without --pick")
+    return found
+
+
+def _task(args: argparse.Namespace) -> Task:
+    """The options in SI, the program read."""
+    from toolpath_stiff.analysis.loads import parse_load
+    from toolpath_stiff.placement.placing import Rewriting, Task
+    from toolpath_stiff.placement.search import SearchRules
+
+    model = model_for(args)
+    program = read_program_for(args, args.program, model.machine)
+    rewriting = None
+    if args.write:
+        controller = controller_for(args)
+        reading = {"offsets": controller.offsets, "tools": controller.tools, "block_delete": args.block_delete}
+        rewriting = Rewriting(args.write, args.decimals, args.linearise, reading)
+    return Task(
+        model=model,
+        program=program,
+        present=args.origin or (program.origin if program.origin_source == "program" else model.machine.default_origin),
+        read=lambda origin: read_program_for(args, args.program, model.machine, origin),
+        bounds=_bounds(args, model.machine),
+        rules=SearchRules(
+            objective=args.objective,
+            margin=args.margin / 100.0,
+            allow_extrapolation=args.allow_extrapolation,
+            keepouts=_keepouts(args),
+            seed=args.seed,
+            points=args.points,
+        ),
+        load=parse_load(args.load),
+        step=args.step,
+        force=args.force,
+        rewriting=rewriting,
+    )
 
 
 def _check_write(args: argparse.Namespace) -> None:
-    """What can be said of --write before the search."""
-    from toolpath_stiff.rewriting import check_decimals
-
+    """What can be said of --write before the program is read."""
     if not args.write:
         for option in ("decimals", "linearise"):
             if getattr(args, option) is not None:
                 raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
-        return
-    check_decimals(args.decimals)
-
-
-def _rewrite(
-    args: argparse.Namespace, program: Program, placed: Analysis, origin: Pose
-) -> tuple[bytes | None, dict[str, Any] | None]:
-    """The transformed program's bytes, and what `placement.json` says of it; None, None unless asked for."""
-    if not args.write:
-        return None, None
-    import numpy as np
-
-    from toolpath_stiff.placement.report_data import placement_row
-    from toolpath_stiff.placement.written_path import rewriting_differences
-    from toolpath_stiff.rewriting import rewrite_program
-
-    controller = controller_for(args)
-    reading: dict[str, Any] = {
-        "offsets": controller.offsets,
-        "tools": controller.tools,
-        "block_delete": args.block_delete,
-    }
-    rewritten = rewrite_program(
-        program, placed.origin, origin, decimals=args.decimals, linearise=args.linearise, **reading
-    )
-    return rewritten.content, {
-        "file": args.write,
-        "analysed_at": placement_row(np.array(origin)),
-        "relative_difference": rewriting_differences(placed, rewritten, origin, **reading),
-        "notes": list(rewritten.notes),
-    }
 
 
 def _bounds(args: argparse.Namespace, machine: Machine) -> Bounds:
     import numpy as np
 
-    from toolpath_stiff.placement.search import Bounds
+    from toolpath_stiff.placement.climb import Bounds
     from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
     low, high = (mm_from_m(corner) for corner in machine.limits.workspace)
@@ -264,78 +291,31 @@ def _keepouts(args: argparse.Namespace) -> tuple[Keepout, ...]:
     return tuple(boxes)
 
 
-def _write(
-    args: argparse.Namespace,
-    out: Path,
-    summary: dict[str, Any],
-    best: Analysis,
-    before: Analysis | None,
-    program: Program,
-) -> list[Path]:
+def _write(args: argparse.Namespace, out: Path, placed: Placed) -> list[Path]:
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.placement.report_data import COLUMNS
 
-    rows = [",".join(f"{row[name]:.6f}" for name in COLUMNS) for row in summary["front"]]
+    summary = placed.summary
+    rows = [",".join(_cell(row[name]) for name in COLUMNS) for row in summary["front"]]
     contents: dict[str, str | bytes] = {
         "placements.csv": "\n".join([",".join(COLUMNS), *rows, ""]),
         "placement.json": json.dumps(summary, indent=2) + "\n",
     }
     if not args.no_plots:
         from toolpath_stiff.report.place_page import place_page
-        from toolpath_stiff.report.place_picture import front_picture, profiles_picture, setup_sheet, workspace_picture
+        from toolpath_stiff.report.place_picture import front_picture, profiles_picture, workspace_picture
+        from toolpath_stiff.report.setup_sheet import setup_sheet
 
-        contents["report.html"] = place_page(summary, best, program, _keepouts(args))
+        contents["report.html"] = place_page(summary, placed.best, placed.program, placed.task.rules.keepouts)
         contents["front.png"] = front_picture(summary)
-        contents["profiles.png"] = profiles_picture(best, before)
-        contents["map.png"] = workspace_picture(best, before)
-        contents["setup.pdf"] = setup_sheet(summary, best)
+        contents["profiles.png"] = profiles_picture(placed.best, placed.before)
+        contents["map.png"] = workspace_picture(placed.best, placed.before)
+        contents["setup.pdf"] = setup_sheet(summary, placed.best)
     return [write_atomically(out / name, content) for name, content in contents.items()]
 
 
-def _table(summary: dict[str, Any]) -> str:
-    """Recommended placement, what it brings, what it costs."""
-    best, before = summary["recommended"], summary["before"]
-    lines = [
-        f"program         {summary['program']} on {summary['machine']}, load {summary['load']}",
-        f"recommended     X{best['x_mm']:.3f} Y{best['y_mm']:.3f} Z{best['z_mm']:.3f}, turned by "
-        f"{best['rotation_deg']:.3f} degrees (objective {summary['objective']})",
-    ]
-    if best["a_deg"] or best["b_deg"]:
-        lines.append(f"                set-up tilted by A{best['a_deg']:.3f} B{best['b_deg']:.3f} degrees")
-    for name, row in (("  stiffness", best), ("  before", before)):
-        if row is None:
-            lines.append(f"{name:<16}not feasible: {summary['before_reason']}")
-            continue
-        lines.append(
-            f"{name:<16}mean {row['mean_N_per_mm']:.0f}, range {row['range_N_per_mm']:.0f}, "
-            f"min {row['min_N_per_mm']:.0f} N/mm, deflection {row['mean_deflection_um']:.1f} um"
-        )
-    if best["extrapolated_share"]:
-        lines.append(
-            f"  strut law     extrapolated at {100.0 * best['extrapolated_share']:.0f} % of the samples: outside the "
-            "lengths that it was measured at"
-        )
-    for goal, cost in summary["costs"].items():
-        lines.append(
-            f"  best {goal:<9} {cost['best_on_front_N_per_mm']:.0f} on the front, "
-            f"{cost['recommended_N_per_mm']:.0f} here, N/mm"
-        )
-    blocks = summary["offset_blocks"]
-    lines.append(f"LinuxCNC        {blocks['linuxcnc'] or blocks['linuxcnc_reason']}")
-    fanuc = (blocks["fanuc"] or blocks["fanuc_reason"]).replace("\n", "\n                ")
-    lines.append(f"Fanuc-style     {fanuc}")
-    lines.append(f"front           {len(summary['front'])} placements, {summary['pose_evaluations']} poses evaluated")
-    lines += _written(summary["written"]) if summary["written"] else []
-    lines += [f"warning         {text}" for text in summary["warnings"]]
-    return "\n".join(lines)
-
-
-def _written(written: dict[str, Any]) -> list[str]:
-    """What became of the transformed program."""
-    at, apart = written["analysed_at"], written["relative_difference"]
-    figures = ", ".join(f"{name} {value:.1e}" for name, value in apart.items())
-    lines = [
-        f"rewritten       {written['file']}; at X{at['x_mm']:g} Y{at['y_mm']:g} Z{at['z_mm']:g}, "
-        f"{at['rotation_deg']:g} degrees it differs from the placed program by (relative) {figures}"
-    ]
-    return lines + [f"                {note}" for note in written["notes"]]
+def _cell(value: float | None) -> str:
+    """A number of placements.csv; nothing where there is none."""
+    if value is None:
+        return ""
+    return str(value) if isinstance(value, int) else f"{value:.6f}"

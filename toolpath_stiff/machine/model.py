@@ -51,12 +51,16 @@ class StrutLaw:
         """Stiffness k(L) in N/m, of any shape. At or below 0 the law has been carried too far."""
         return self.intercept + self.slope * length
 
-    def extrapolates(self, length: FloatArray) -> NDArray[np.bool_]:
-        """Whether a length lies outside the range that the law was given for."""
+    def room(self, length: FloatArray) -> FloatArray:
+        """How far lengths lie inside the range that the law was given for, m; negative outside."""
         # Half a micrometre: a pose that lands on an end of the range by construction is not outside it.
         slack = 5e-7
         low, high = sorted((self.length_1, self.length_2))
-        return np.asarray((length < low - slack) | (length > high + slack))
+        return np.asarray(np.minimum(length - (low - slack), (high + slack) - length))
+
+    def extrapolates(self, length: FloatArray) -> NDArray[np.bool_]:
+        """Whether a length lies outside the range that the law was given for."""
+        return np.asarray(self.room(length) < 0.0)
 
 
 @dataclass(frozen=True)

@@ -1,68 +1,38 @@
 """Many placements of one path at once: mean, range, smallest stiffness, and how far from the limits.
 
-The path is sampled once, in the set-up frame; a placement (x, y, z, A, B, C; the numbers of `--origin`) turns and moves
-the samples rigidly, as `path.turns`. Vertical spindles on a machine of linear struts and a rigid platform take the
-compiled loops, where numba is there; everything else goes through `analysis.evaluate`, which is slower and the same.
+The path is sampled once, in the set-up frame; a placement turns and moves the samples rigidly. Limits come from strut
+lengths and determinants that the closed form computes on its way; so does the stiffness of linear struts on a rigid
+platform under a load that the geometry alone directs. Everything else asks `analysis.evaluate` for the stiffness.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.evaluate import evaluate
-from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.kinematics import neutral_axes, solve_struts_at
-from toolpath_stiff.machine.limits import machine_limits
-from toolpath_stiff.nc.moves import RAPID, Program
-from toolpath_stiff.path import place_orientations, sample_moves
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.analysis.loads import Load, load_directions
+from toolpath_stiff.machine.kinematics import neutral_axes, solve_struts, solve_struts_at
+from toolpath_stiff.machine.limits import machine_limits, reach
+from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
+from toolpath_stiff.placement.work_path import WorkPath
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
-POSES_AT_A_TIME = 200_000
-
-
-@dataclass(frozen=True)
-class WorkPath:
-    """Cutting samples of a program in the set-up frame. SI.
-
-    Attributes
-    ----------
-    position, tangent, abc
-        (m, 3) m, unit vectors (0: no motion), rad.
-    weight
-        (m,) m, length that each sample stands for.
-    line
-        (m,) of the program.
-    tool_length
-        (m,) m; nan: the reference tool.
-    """
-
-    position: FloatArray
-    tangent: FloatArray
-    abc: FloatArray
-    weight: FloatArray
-    line: IntArray
-    tool_length: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.line)
-
-    def take(self, rows: IntArray) -> WorkPath:
-        """Some of the samples."""
-        return WorkPath(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+POSES_AT_A_TIME = 30_000  # fits the processor's cache
+# Evaluations of the whole path in a search, about: says whether numba's half a second is earned back.
+EVALUATIONS = 300
 
 
 @dataclass(frozen=True)
 class Keepout:
-    """A box (m, machine coordinates) that the tool tip's path must stay out of."""
+    """A box (m, machine coordinates) that the tool tip's path must stay out of, rapids included."""
 
     name: str
     low: tuple[float, float, float]
@@ -71,10 +41,20 @@ class Keepout:
 
 @dataclass(frozen=True)
 class PlacementFigures:
-    """Figures of k placements. SI; nan where a placement is infeasible.
+    """Figures of k placements. SI; the stiffnesses are nan where a cut is out of reach.
 
-    `compliance` is the mean (by length) of 1/stiffness, m/N: times a force, the mean deflection. `margin` is the
-    smallest margin of any sample to any limit or keep-out, negative where infeasible.
+    Attributes
+    ----------
+    mean, spread, lowest
+        (k,) N/m, of the headline samples; the mean by length.
+    compliance
+        (k,) m/N, mean (by length) of 1/stiffness: times a force, the mean deflection.
+    margin, rapid_margin
+        (k,) smallest margin of a cut, of a rapid, to any limit, as a share of the limit's span.
+    clearance
+        (k,) m, smallest distance to a keep-out, negative inside; inf without keep-outs.
+    extrapolated
+        (k,) share of the cutting samples at which a strut is outside the lengths that its law was given for.
     """
 
     mean: FloatArray
@@ -82,136 +62,204 @@ class PlacementFigures:
     lowest: FloatArray
     compliance: FloatArray
     margin: FloatArray
+    rapid_margin: FloatArray
+    clearance: FloatArray
+    extrapolated: FloatArray
 
+    def __len__(self) -> int:
+        return len(self.mean)
 
-def work_path(program: Program, step: float) -> WorkPath:
-    """Sample the cutting moves of a program.
+    def take(self, rows: IntArray | BoolArray | slice) -> PlacementFigures:
+        """Some of the placements."""
+        return PlacementFigures(*(getattr(self, f.name)[rows] for f in fields(self)))
 
-    Raises
-    ------
-    InputError
-        A cutting move has an end in machine coordinates (G53): it does not move with the work.
-    """
-    moves = program.moves
-    fixed = (moves.motion != RAPID) & moves.from_machine.any(axis=1)
-    if fixed.any():
-        raise InputError(
-            "a cutting move from or to machine coordinates (G53, G28) does not move with the work",
-            hint="end it in work coordinates before placing the program",
-            file=program.name,
-            line=int(moves.line[np.argmax(fixed)]),
+    @staticmethod
+    def joined(parts: list[PlacementFigures]) -> PlacementFigures:
+        """One after the other."""
+        return PlacementFigures(
+            *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(PlacementFigures))
         )
-    samples = sample_moves(moves, step)
-    rows = np.flatnonzero(samples.cutting)
-    s = samples.take(rows)
-    return WorkPath(s.position, s.tangent, s.abc, s.weight, s.line, s.tool_length)
+
+    @property
+    def objectives(self) -> FloatArray:
+        """(k, 3) N/m, all to be raised: mean, minus range, weakest."""
+        return np.stack([self.mean, -self.spread, self.lowest], axis=1)
 
 
-def telling_path(path: WorkPath, count: int) -> WorkPath:
-    """A path of `count` samples that stands for the whole: spread over position and direction, extremes first.
+@dataclass(frozen=True)
+class PlacedRows:
+    """What k placements do at each sample: rigid samples first (m), then the anchored rapids (q). SI.
 
-    Farthest-point sampling: each next sample is the one least like those chosen, position counted in units of the
-    path's size. Each chosen sample takes over the weights of those that are most like it.
+    `stiffness` (k, m), nan but at headline samples; `law` (k, m) m, how far the struts are inside the lengths of their
+    law; `margin` (k, m + q); `clearance` (k, m + q) m, inf without keep-outs.
     """
-    if len(path) <= count:
-        return path
-    size = max(float(np.ptp(path.position, axis=0).max()), 1e-9)
-    features = np.concatenate([path.position / size, 0.5 * path.tangent, path.abc], axis=1)
-    chosen = [int(np.argmax(np.linalg.norm(features - features.mean(axis=0), axis=1)))]
-    distance, nearest = np.full(len(path), np.inf), np.zeros(len(path), dtype=np.int64)
-    for i in range(count):
-        step = features - features[chosen[-1]]
-        apart = np.einsum("ij,ij->i", step, step)
-        closer = apart < distance
-        distance[closer], nearest[closer] = apart[closer], i
-        if i + 1 < count:
-            chosen.append(int(np.argmax(distance)))
-    few = path.take(np.array(chosen))
-    weight = np.bincount(nearest, weights=path.weight, minlength=count).astype(float)
-    return replace(few, weight=weight)
+
+    stiffness: FloatArray
+    law: FloatArray
+    margin: FloatArray
+    clearance: FloatArray
 
 
 class Evaluator:
     """Evaluates placements of one path and counts the poses that this took."""
 
     def __init__(
-        self, model: StiffnessModel, path: WorkPath, load: Load, force: float, keepouts: tuple[Keepout, ...] = ()
+        self,
+        model: StiffnessModel,
+        path: WorkPath,
+        load: Load,
+        force: float,
+        keepouts: tuple[Keepout, ...] = (),
+        whole: int | None = None,
     ) -> None:
+        """`whole`: samples of the whole path, where `path` is only some of it."""
         self.model, self.path, self.load, self.force, self.keepouts = model, path, load, force, keepouts
         self.poses = 0
-        tools = np.unique(path.tool_length)
-        vertical = not path.abc.any()
-        self.fast = (
-            core.is_closed_form(model)
-            and compiled.available()
-            and vertical
-            and len(tools) == 1
-            and load.kind == "tangential"
-            and bool(path.tangent.any(axis=1).all())
-        )
-        if self.fast:
-            self._prepare(float(tools[0]))
-
-    def _prepare(self, tool_length: float) -> None:
-        machine = self.model.machine
-        self.kernel = closed_form.prepare(machine, tool_length)
+        machine = model.machine
+        self.compiled = EVALUATIONS * (whole or len(path)) > core.COMPILED_FROM and compiled.available()
+        # These two ask the compliance for a direction, the second at plunges.
+        self.direct = core.is_closed_form(model) and load.kind not in ("softest", "normal")
+        # A still sample has no direction; none of them is a headline sample, so any direction does.
+        still = ~np.asarray(path.tangent.any(axis=1))
+        self.tangent = np.where(still[:, None], np.array([0.0, 0.0, 1.0]), path.tangent)
+        self.abc = np.concatenate([path.abc, path.anchored.abc])
+        self.turned = rotation_matrices(self.abc) if self.abc.any() else None
+        self.tool_length = np.concatenate([path.tool_length, path.anchored.tool_length])
+        self.kernels = [
+            (rows, float(self.tool_length[rows[0]]), closed_form.prepare(machine, float(self.tool_length[rows[0]])))
+            for rows in _groups(self.tool_length)
+        ]
+        self.spans = {limit.name: limit.span for limit in machine_limits(machine)}
+        self.axes = neutral_axes(machine)
         neutral = solve_struts_at(machine, machine.limits.neutral_pose)
         self.neutral_determinant = float(np.abs(np.linalg.det(neutral.jacobian[0])))
-        self.axes = neutral_axes(machine)
-        arms = machine.platform_joints_for(tool_length) - machine.frame_joints
-        # A strut's component along a joint's neutral axis is linear in the tip's position.
-        self.along = [(axes, np.einsum("ij,ij->i", arms, axes)) for axes in self.axes]
 
     def figures(self, placements: FloatArray) -> PlacementFigures:
         """Figures of placements (k, 6) m and rad."""
-        path = self.path
-        self.poses += len(placements) * len(path)
-        parts = []
-        group = max(1, POSES_AT_A_TIME // max(len(path), 1))
-        for start in range(0, len(placements), group):
-            some = placements[start : start + group]
-            tilted = bool(some[:, 3:5].any())
-            parts.append(self._fast(path, some) if self.fast and not tilted else self._plain(path, some))
-        return PlacementFigures(
-            *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(PlacementFigures))
+        group = max(1, POSES_AT_A_TIME // max(len(self.abc), 1))
+        return PlacementFigures.joined(
+            [
+                self.summary(self.rows(placements[start : start + group]))
+                for start in range(0, max(len(placements), 1), group)
+            ]
         )
 
-    def _fast(self, path: WorkPath, placements: FloatArray) -> PlacementFigures:
-        """Vertical spindle, linear struts: compiled, poses last."""
-        k, m = len(placements), len(path)
-        cos, sin = np.cos(placements[:, 5])[:, None], np.sin(placements[:, 5])[:, None]
+    def rows(self, placements: FloatArray) -> PlacedRows:
+        """What each sample does at placements (k, 6) m and rad; all in memory at once."""
+        path, k = self.path, len(placements)
+        m = len(path)
+        self.poses += k * len(self.abc)
+        turn = rotation_matrices(placements[:, 3:])
+        position = np.concatenate(
+            [
+                path.position @ np.swapaxes(turn, 1, 2) + placements[:, None, :3],
+                path.anchored.placed(turn, placements[:, :3]),
+            ],
+            axis=1,
+        )
+        tangent = self.tangent @ np.swapaxes(turn, 1, 2)
+        rotation = self._orientations(placements, turn)
+        along, margin, law = (np.full(position.shape[:2], np.nan) for _ in range(3))
+        for rows, tool, kernel in self.kernels:
+            some = None if rotation is None else rotation[:, rows].reshape(-1, 3, 3)
+            tip = position[:, rows].reshape(-1, 3)
+            motion = np.zeros((k, len(rows), 3))
+            rigid = rows < m
+            motion[:, rigid] = tangent[:, rows[rigid]]
+            motion[:, ~rigid, 2] = 1.0
+            found = self._kernel_rows(kernel, tool, tip, motion.reshape(-1, 3), some)
+            for target, values in zip((along, margin, law), found, strict=True):
+                target[:, rows] = values.reshape(k, -1)
+        stiffness = np.full((k, m), np.nan)
+        head = path.headline
+        if self.direct:
+            with np.errstate(divide="ignore"):
+                stiffness[:, head] = 1.0 / along[:, :m][:, head]
+        else:
+            stiffness[:, head] = self._asked(position[:, :m][:, head], tangent[:, head], rotation, margin[:, :m])
+        clearance = np.full(position.shape[:2], np.inf)
+        for box in self.keepouts:
+            np.minimum(clearance, clearances(box, position), out=clearance)
+        return PlacedRows(stiffness, law[:, :m], margin, clearance)
 
-        def turned(vectors: FloatArray) -> FloatArray:
-            x, y, z = vectors.T
-            return np.stack([cos * x - sin * y, sin * x + cos * y, np.broadcast_to(z, (k, m))])
+    def summary(self, rows: PlacedRows) -> PlacementFigures:
+        """Figures of placements from what each of their samples does."""
+        path, m, k = self.path, len(self.path), len(rows.margin)
+        cutting = np.concatenate([path.cutting, np.zeros(len(path.anchored), dtype=bool)])
+        margin = rows.margin[:, cutting].min(axis=1, initial=np.inf)
+        rapid = rows.margin[:, ~cutting].min(axis=1, initial=np.inf)
+        within = margin >= 0.0
+        values, weight = rows.stiffness[:, path.headline], path.weight[path.headline]
+        length = max(float(weight.sum()), 1e-300)
+        low = values.min(axis=1, initial=np.inf)
+        high = values.max(axis=1, initial=-np.inf)
+        outside = (rows.law[:, cutting[:m]] < 0.0).mean(axis=1) if path.cutting.any() else np.zeros(k)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            compliance = (1.0 / values) @ weight / length
+        return PlacementFigures(
+            mean=np.where(within, values @ weight / length, np.nan),
+            spread=np.where(within, high - low, np.nan),
+            lowest=np.where(within, low, np.nan),
+            compliance=np.where(within, compliance, np.nan),
+            margin=margin,
+            rapid_margin=rapid,
+            clearance=rows.clearance.min(axis=1, initial=np.inf),
+            extrapolated=outside,
+        )
 
-        position = np.ascontiguousarray((turned(path.position) + placements[:, :3].T[:, :, None]).reshape(3, -1))
-        direction = np.ascontiguousarray(turned(path.tangent).reshape(3, -1))
-        along, determinant, lengths, good = compiled.compliance_along_columns(self.kernel, position, direction)
-        margin = self._margins(position, lengths, determinant / self.neutral_determinant)
-        found = self._summary(1.0 / along.reshape(k, m), margin.reshape(k, m), position.reshape(3, k, m), path)
-        doubtful = np.flatnonzero(~good.reshape(k, m).all(axis=1) & (found.margin >= 0.0))
-        if len(doubtful):  # within reach, but ill-conditioned for the closed form: the pivoted route decides
-            pivoted = self._plain(path, placements[doubtful])
-            for column in fields(PlacementFigures):
-                getattr(found, column.name)[doubtful] = getattr(pivoted, column.name)
-        return found
+    def _orientations(self, placements: FloatArray, turn: FloatArray) -> FloatArray | None:
+        """(k, m + q, 3, 3) R' = Q R Rz(-C), the rule of `path.turns`; None: all vertical."""
+        if self.turned is None and not placements[:, 3:5].any():
+            return None
+        own = np.broadcast_to(np.eye(3), (len(self.abc), 3, 3)) if self.turned is None else self.turned
+        back = rotation_about_z(-placements[:, 5])
+        return np.asarray(turn[:, None] @ own[None] @ back[:, None])
 
-    def _margins(self, position: FloatArray, lengths: FloatArray, index: FloatArray) -> FloatArray:
-        """(n,) smallest margin to any limit, as `machine.limits.reach` has it, for vertical poses with poses last."""
+    def _kernel_rows(
+        self,
+        kernel: closed_form.ClosedForm,
+        tool: float,
+        tip: FloatArray,
+        motion: FloatArray,
+        rotation: FloatArray | None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Compliance along the load, margin and law of n poses with one tool."""
         machine = self.model.machine
+        direction = load_directions(self.load, np.empty((0, 3, 3)), tip, rotation, motion)[0] if self.direct else motion
+        columns = np.ascontiguousarray(tip.T)
+        if self.compiled:
+            turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
+            towards = np.ascontiguousarray(direction.T)
+            along, determinant, lengths, good = compiled.compliance_along_columns(kernel, columns, towards, turns)
+        else:
+            along, determinant, by_pose, good = closed_form.compliance_along(kernel, tip, direction, rotation)
+            lengths = np.ascontiguousarray(by_pose.T)
+        margin = self._margins(columns, rotation, lengths, determinant / self.neutral_determinant, tool)
+        law = machine.strut_law.room(lengths).min(axis=0)
+        doubtful = np.flatnonzero(~good & ~(margin < 0.0))  # ill-conditioned for the closed form: pivot
+        if len(doubtful):
+            turns = None if rotation is None else rotation[doubtful]
+            struts = solve_struts(machine, tip[doubtful], turns, tool)
+            margin[doubtful] = reach(machine, tip[doubtful], struts, turns).margin
+            if self.direct:
+                along[doubtful] = 1.0 / self._evaluated(tip[doubtful], motion[doubtful], turns, tool)
+        return along, margin, law
+
+    def _margins(
+        self, position: FloatArray, rotation: FloatArray | None, lengths: FloatArray, index: FloatArray, tool: float
+    ) -> FloatArray:
+        """(n,) smallest margin to any limit, as `machine.limits.reach` has it; poses last: (3, n), (6, n), (n,)."""
+        machine, spans = self.model.machine, self.spans
         limits = machine.limits
         margin = np.full(lengths.shape[1], np.inf)
-        spans = {limit.name: limit.span for limit in machine_limits(machine)}
         low, high = limits.strut_length
         np.minimum(margin, (lengths.min(axis=0) - low) / spans["strut1 min length"], out=margin)
         if np.isfinite(high):
             np.minimum(margin, (high - lengths.max(axis=0)) / spans["strut1 max length"], out=margin)
-        for bound, (axes, offset) in zip(
-            (limits.frame_joint_angle, limits.platform_joint_angle), self.along, strict=True
-        ):
+        bounds = (limits.frame_joint_angle, limits.platform_joint_angle)
+        for of_platform, bound in enumerate(bounds):
             if np.isfinite(bound):
-                cosine = ((axes @ position + offset[:, None]) / lengths).min(axis=0)
+                cosine = (self._along_axes(bool(of_platform), position, rotation, tool) / lengths).min(axis=0)
                 np.minimum(margin, (bound - np.arccos(np.clip(cosine, -1.0, 1.0))) / bound, out=margin)
         lower, upper = limits.workspace
         for axis, name in enumerate("xyz"):
@@ -222,45 +270,48 @@ class Evaluator:
         np.minimum(margin, (index - limits.singularity) / (1.0 - limits.singularity), out=margin)
         return margin
 
-    def _plain(self, path: WorkPath, placements: FloatArray) -> PlacementFigures:
-        """Any machine, load and tilt, one placement at a time."""
-        parts = []
-        for placement in placements:
-            position, tangent, abc = placed_path(path, placement)
-            found = evaluate(self.model, position, abc, tangent, path.tool_length, self.load, self.force)
-            part = self._summary(
-                found.stiffness[None], found.margin[None], np.ascontiguousarray(position.T)[:, None], path
-            )
-            parts.append(part)
-        return PlacementFigures(
-            *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(PlacementFigures))
-        )
+    def _along_axes(
+        self, of_platform: bool, position: FloatArray, rotation: FloatArray | None, tool: float
+    ) -> FloatArray:
+        """(6, n) m, components of the struts R p + tip - b along the joints' neutral axes."""
+        machine = self.model.machine
+        arms, frame, axes = machine.platform_joints_for(tool), machine.frame_joints, self.axes[of_platform]
+        if rotation is None:
+            return np.asarray(axes @ position + np.einsum("id,id->i", arms - frame, axes)[:, None])
+        turns = rotation.reshape(-1, 9).T
+        if of_platform:  # the axes turn with the platform: (R a) . (R p + tip - b)
+            local = np.einsum("ncd,cn->dn", rotation, position)
+            fixed = np.einsum("ic,id->icd", frame, axes).reshape(6, 9) @ turns
+            return np.asarray(axes @ local - fixed + np.einsum("id,id->i", axes, arms)[:, None])
+        turned = np.einsum("ic,id->icd", axes, arms).reshape(6, 9) @ turns
+        return np.asarray(axes @ position + turned - np.einsum("id,id->i", axes, frame)[:, None])
 
-    def _summary(
-        self, stiffness: FloatArray, margin: FloatArray, position: FloatArray, path: WorkPath
-    ) -> PlacementFigures:
-        """Length-weighted mean, range and minimum per placement from (k, m) stiffnesses and margins."""
-        worst = margin.min(axis=1)
-        for box in self.keepouts:
-            worst = np.minimum(worst, clearances(box, np.moveaxis(position, 0, -1)).min(axis=-1))
-        counted = path.weight > 0.0
-        values, weight = stiffness[:, counted], path.weight[counted]
-        feasible = worst >= 0.0
-        length = max(float(weight.sum()), 1e-300)
-        mean = np.where(feasible, values @ weight / length, np.nan)
-        compliance = np.where(feasible, (1.0 / values) @ weight / length, np.nan)
-        low = np.where(feasible, values.min(axis=1, initial=np.inf), np.nan)
-        high = np.where(feasible, values.max(axis=1, initial=-np.inf), np.nan)
-        return PlacementFigures(mean, high - low, low, compliance, worst)
+    def _asked(
+        self, position: FloatArray, tangent: FloatArray, rotation: FloatArray | None, margin: FloatArray
+    ) -> FloatArray:
+        """(k, h) stiffness at the headline samples by `analysis.evaluate`, where all cuts are within reach."""
+        found = np.full(position.shape[:2], np.nan)
+        possible = np.flatnonzero((margin[:, self.path.cutting] >= 0.0).all(axis=1))
+        if len(possible):
+            turns = None
+            if rotation is not None:
+                turns = rotation[possible][:, : len(self.path)][:, self.path.headline].reshape(-1, 3, 3)
+            tools = np.tile(self.path.tool_length[self.path.headline], len(possible))
+            tip, motion = (values[possible].reshape(-1, 3) for values in (position, tangent))
+            found[possible] = self._evaluated(tip, motion, turns, tools).reshape(len(possible), -1)
+        return found
+
+    def _evaluated(
+        self, tip: FloatArray, motion: FloatArray, rotation: FloatArray | None, tool: FloatArray | float
+    ) -> FloatArray:
+        abc = np.zeros((len(tip), 3)) if rotation is None else roll_pitch_yaw(rotation)
+        return evaluate(self.model, tip, abc, motion, tool, self.load, self.force).stiffness
 
 
-def placed_path(path: WorkPath, placement: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Positions, tangents and orientations of a path at one placement (6,)."""
-    turn = rotation_matrices(placement[3:])
-    if not placement[3:].any():
-        return path.position + placement[:3], path.tangent, path.abc
-    position = path.position @ turn.T + placement[:3]
-    return position, path.tangent @ turn.T, place_orientations(path.abc, placement)
+def _groups(tool_length: FloatArray) -> list[IntArray]:
+    """Rows of each tool length; nan counts as one."""
+    number = np.unique(tool_length, return_inverse=True)[1].ravel()
+    return [np.flatnonzero(number == i) for i in range(number.max(initial=-1) + 1)]
 
 
 def clearances(box: Keepout, position: FloatArray) -> FloatArray:

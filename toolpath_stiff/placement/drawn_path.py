@@ -11,17 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.analysis.cut_classes import headline_rows, plunging_rows
 from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.path import sample_moves
 from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.path.samples import Samples
-from toolpath_stiff.placement.batch import WorkPath, placed_path
+from toolpath_stiff.placement.work_path import placed_path
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 CORNER = np.deg2rad(10.0)  # a sharper one is kept before samples along straight cuts are
 SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
@@ -39,6 +41,8 @@ class DrawnPath:
         (m,) m along the path, rapids included.
     cut
         (m,) number of the cut: samples of different cuts have a rapid between them.
+    plunge
+        (m,) plunges along the tool axis, where they stand beside the headline figures.
     stiffness
         (k, m) N/m along the load; nan out of reach.
     samples
@@ -49,6 +53,7 @@ class DrawnPath:
     axis: FloatArray
     s: FloatArray
     cut: IntArray
+    plunge: BoolArray
     stiffness: FloatArray
     samples: int
 
@@ -73,14 +78,15 @@ def drawn_path(
     cut = np.unique(np.cumsum(~samples.cutting)[rows], return_inverse=True)[1]
     chosen = thinned_rows(samples.take(rows), cut, points)
     few = samples.take(rows[chosen])
-    path = WorkPath(few.position, few.tangent, few.abc, few.weight, few.line, few.tool_length)
     stiffness = []
     for placement in placements:
-        position, tangent, abc = placed_path(path, placement)
+        position, tangent, abc = placed_path(few, placement)
         stiffness.append(evaluate(model, position, abc, tangent, few.tool_length, load, force).stiffness)
-    return DrawnPath(
-        few.position, rotation_matrices(few.abc)[:, :, 2], few.s, cut[chosen], np.array(stiffness), len(rows)
-    )
+    counting = few.weight > 0.0
+    beside = plunging_rows(load, few.tangent, few.abc, counting)
+    beside &= ~headline_rows(load, few.tangent, few.abc, counting)
+    axis = rotation_matrices(few.abc)[:, :, 2]
+    return DrawnPath(few.position, axis, few.s, cut[chosen], beside, np.array(stiffness), len(rows))
 
 
 def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:

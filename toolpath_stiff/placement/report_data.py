@@ -1,4 +1,4 @@
-"""What a placement search hands to tables, JSON and pictures: everything in the shop's units."""
+"""What a placement hands to tables, JSON and pictures: everything in the shop's units."""
 
 from __future__ import annotations
 
@@ -7,31 +7,43 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis import Analysis, analyse
+from toolpath_stiff.analysis import Analysis
+from toolpath_stiff.analysis.cut_classes import plunging_rows
+from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.path_analysis import assumptions
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
-from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.placement.batch import Evaluator, PlacementFigures
 from toolpath_stiff.placement.search import PlacementResult
+from toolpath_stiff.placement.work_path import WorkPath
 from toolpath_stiff.rewriting import offset_blocks
+from toolpath_stiff.stiffness.acting import effects_stated
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import (
+    Pose,
+    deg_from_rad,
+    m_from_mm,
+    mm_from_m,
+    n_per_mm_from_n_per_m,
+    rad_from_deg,
+    um_from_m,
+)
 
 FloatArray = NDArray[np.float64]
 
+PLACEMENT = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "rotation_deg")
+# The three objectives and where their values stand.
+FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "weakest": "min_N_per_mm"}
 COLUMNS = (
-    "x_mm",
-    "y_mm",
-    "z_mm",
-    "a_deg",
-    "b_deg",
-    "rotation_deg",
-    "mean_N_per_mm",
-    "range_N_per_mm",
-    "min_N_per_mm",
+    "number",
+    *PLACEMENT,
+    *FIGURES.values(),
     "mean_deflection_um",
+    "plunge_mean_N_per_mm",
+    "plunge_min_N_per_mm",
     "extrapolated_share",
     "margin",
+    "rapid_margin",
 )
 
 
@@ -54,94 +66,124 @@ def placement_row(placement: FloatArray) -> dict[str, float]:
     }
 
 
+def placement_of(row: dict[str, Any]) -> FloatArray:
+    """(6,) m and rad of a row in mm and degrees."""
+    values = np.array([row[key] for key in PLACEMENT], dtype=float)
+    return np.concatenate([m_from_mm(values[:3]), rad_from_deg(values[3:])])
+
+
 def front_rows(
-    model: StiffnessModel, program: Program, found: PlacementResult, step: float, force: float
-) -> list[dict[str, float]]:
-    """Rows of `placements.csv`, by rising mean; deflections under `force` in N."""
+    model: StiffnessModel, path: WorkPath, load: Load, found: PlacementResult, force: float
+) -> list[dict[str, Any]]:
+    """Rows of `placements.csv`, numbered from 1 by rising mean; deflections under `force` in N."""
+    plunges = _plunge_figures(model, path, load, found.front, force)
     rows = []
     for i, placement in enumerate(found.front):
-        row = placement_row(placement)
-        row["mean_N_per_mm"] = n_per_mm_from_n_per_m(float(found.figures.mean[i]))
-        row["range_N_per_mm"] = n_per_mm_from_n_per_m(float(found.figures.spread[i]))
-        row["min_N_per_mm"] = n_per_mm_from_n_per_m(float(found.figures.lowest[i]))
-        row["mean_deflection_um"] = um_from_m(force * float(found.figures.compliance[i]))
-        row["extrapolated_share"] = _extrapolated(model, program, placement, step)
-        row["margin"] = float(found.figures.margin[i])
-        rows.append(row)
+        figures = found.figures.take(slice(i, i + 1))
+        values = (figures.mean[0], figures.spread[0], figures.lowest[0])
+        beside = (None, None) if plunges is None else (plunges.mean[i], plunges.lowest[i])
+        mean, lowest = (None if v is None or np.isnan(v) else n_per_mm_from_n_per_m(float(v)) for v in beside)
+        rows.append(
+            {
+                "number": i + 1,
+                **placement_row(placement),
+                **{k: n_per_mm_from_n_per_m(float(v)) for k, v in zip(FIGURES.values(), values, strict=True)},
+                "mean_deflection_um": um_from_m(force * float(figures.compliance[0])),
+                "plunge_mean_N_per_mm": mean,
+                "plunge_min_N_per_mm": lowest,
+                "extrapolated_share": float(figures.extrapolated[0]),
+                "margin": _finite(figures.margin[0]),
+                "rapid_margin": _finite(figures.rapid_margin[0]),
+            }
+        )
     return rows
 
 
-def _extrapolated(model: StiffnessModel, program: Program, placement: FloatArray, step: float) -> float:
-    """Share of the cutting samples outside the strut law's range, at a step coarse enough to be quick."""
-    analysis = analyse(model, program, origin=pose_of(placement), step=max(step, 5e-3))
-    return share(analysis.at.extrapolated, analysis.samples.cutting)
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _plunge_figures(
+    model: StiffnessModel, path: WorkPath, load: Load, front: FloatArray, force: float
+) -> PlacementFigures | None:
+    """Figures of the plunges alone at each placement of the front; None where they are no class of their own."""
+    beside = plunging_rows(load, path.tangent, path.abc, path.cutting & (path.weight > 0.0)) & ~path.headline
+    return Evaluator(model, path.alone(beside), load, force).figures(front) if beside.any() else None
 
 
 def figures_of(analysis: Analysis) -> dict[str, Any]:
-    """Placement and figures of one analysis."""
-    found = stiffness_figures(analysis, analysis.counted)
-    keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "mean_deflection_um")
-    extrapolated = share(analysis.at.extrapolated, analysis.samples.cutting)
-    row = placement_row(np.array(analysis.origin))
-    return {**row, **{key: found[key] for key in keys}, "extrapolated_share": extrapolated}
-
-
-def analyse_before(
-    model: StiffnessModel, program: Program, origin: Pose, **options: Any
-) -> tuple[Analysis | None, str]:
-    """The program where it is now, or None and why."""
-    try:
-        return analyse(model, program, origin=origin, **options), ""
-    except UnreachableError as error:
-        return None, str(error)
+    """Placement and figures of one analysis: the headline's, and the plunges' beside."""
+    found, beside = (stiffness_figures(analysis, rows) for rows in (analysis.headline, analysis.set_aside))
+    return {
+        **placement_row(np.array(analysis.origin)),
+        **{key: found[key] for key in (*FIGURES.values(), "mean_deflection_um")},
+        "plunge_mean_N_per_mm": beside["mean_N_per_mm"],
+        "plunge_min_N_per_mm": beside["min_N_per_mm"],
+        "extrapolated_share": share(analysis.at.extrapolated, analysis.samples.cutting),
+    }
 
 
 def placement_summary(
     program: Program,
-    found: PlacementResult,
     best: Analysis,
-    before: Analysis | None,
+    front: list[dict[str, Any]],
+    search: dict[str, Any],
+    chosen: dict[str, Any],
+    before: dict[str, Any] | None,
     reason: str,
-    front: list[dict[str, float]],
-    objective: str,
-    seed: int,
+    worse: list[dict[str, Any]],
+    written: dict[str, Any] | None,
+    warnings: list[str],
 ) -> dict[str, Any]:
     """The figures of `placement.json`."""
-    placement = pose_of(found.best)
-    blocks = offset_blocks(program, placement)
-    near = np.argsort(best.at.margin + np.where(best.samples.cutting, 0.0, np.inf), kind="stable")[:200]
-    binding = list(dict.fromkeys(best.at.limits[int(best.at.limit[i])].name for i in near))[:3]
-    costs = {}
-    for goal, key, sign in (("mean", "mean_N_per_mm", 1), ("range", "range_N_per_mm", -1), ("min", "min_N_per_mm", 1)):
-        reached = max(front, key=lambda row: sign * row[key])
-        costs[goal] = {
-            "recommended_N_per_mm": figures_of(best)[key],
-            "best_on_front_N_per_mm": reached[key],
-        }
     return {
+        "warnings": warnings,
+        "worse": worse,
         "program": program.name,
         "machine": best.machine.name,
+        **effects_stated(best.model),
         "load": str(best.load),
         "force_N": best.force,
-        "objective": objective,
-        "recommended": figures_of(best),
-        "before": figures_of(before) if before else None,
+        "objective": search["options"]["--objective"],
+        "chosen": chosen,
+        "picked": chosen["number"] != search["recommended"],
+        "recommended": front[search["recommended"] - 1],
+        "before": before,
         "before_reason": reason or None,
-        "costs": costs,
+        "costs": _costs(front, chosen),
         "front": front,
-        "binding_limits": [
-            {"limit": name, "smallest_margin": float(best.at.margin[best.samples.cutting].min())}
-            for name in binding[:1]
-        ]
-        + [{"limit": name} for name in binding[1:]],
-        "offset_blocks": {
-            "linuxcnc": blocks.linuxcnc or None,
-            "linuxcnc_reason": blocks.linuxcnc_reason or None,
-            "fanuc": blocks.fanuc or None,
-            "fanuc_reason": blocks.fanuc_reason or None,
-        },
-        "seed": seed,
-        "pose_evaluations": found.pose_evaluations,
+        "binding_limits": _binding_limits(best),
+        "offset_blocks": _offsets(program, best.origin),
+        "written": written,
+        "search": search,
         "assumptions": assumptions(best),
-        "warnings": list(best.warnings),
+    }
+
+
+def _costs(front: list[dict[str, Any]], chosen: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """What the choice costs in each objective: the best on the front beside it."""
+    return {
+        name: {
+            "chosen_N_per_mm": chosen[key],
+            "best_on_front_N_per_mm": (min if name == "range" else max)(row[key] for row in front),
+        }
+        for name, key in FIGURES.items()
+    }
+
+
+def _binding_limits(best: Analysis) -> list[dict[str, Any]]:
+    """The limits that the cuts come nearest to, at most three."""
+    near = np.argsort(best.at.margin + np.where(best.samples.cutting, 0.0, np.inf), kind="stable")[:200]
+    names = list(dict.fromkeys(best.at.limits[int(best.at.limit[i])].name for i in near))[:3]
+    smallest = float(best.at.margin[best.samples.cutting].min())
+    return [{"limit": name, **({"smallest_margin": smallest} if i == 0 else {})} for i, name in enumerate(names)]
+
+
+def _offsets(program: Program, placement: Pose) -> dict[str, str | None]:
+    blocks = offset_blocks(program, placement)
+    return {
+        "linuxcnc": blocks.linuxcnc or None,
+        "linuxcnc_reason": blocks.linuxcnc_reason or None,
+        "fanuc": blocks.fanuc or None,
+        "fanuc_reason": blocks.fanuc_reason or None,
     }

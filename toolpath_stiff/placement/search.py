@@ -1,16 +1,14 @@
-"""The search for placements: a Pareto front of mean against range, and one recommendation.
+"""The search for placements: a front of mean, range and weakest place, and one recommendation that is never worse.
 
-Mean up and range down are in conflict, so there is a front. NSGA-II (pymoo: maintained, constraints and batches of
-candidates built in) finds it on a few hundred samples that stand for the path; scipy's Nelder-Mead polishes points
-along it, and the recommended one on the whole path. Every figure that is returned was computed on the whole path.
+Mean up, range down and weakest up are in conflict, so there is a front. Many placements at random and a small
+evolution on a hundred-odd samples that stand for the path find where it lies; climbs (`climb`) then finish its ends
+and the recommendation on the whole path. Every figure that is returned was computed on the whole path.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from functools import partial
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,48 +16,65 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.machine.kinematics import solve_struts
+from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.placement import batch
-from toolpath_stiff.placement.batch import Evaluator, Keepout, PlacementFigures, WorkPath, placed_path, telling_path
+from toolpath_stiff.placement.batch import Evaluator, Keepout, PlacementFigures
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules
+from toolpath_stiff.placement.front import apart, front_rows, thin
+from toolpath_stiff.placement.work_path import WorkPath, placed_path, telling_path
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
-OBJECTIVES = ("balanced", "mean", "range", "min")
-SCOUT_SAMPLES, POLISH_SAMPLES = 200, 1000
-SCOUTS = 2000  # placements tried at random before the search proper
-POPULATION, GENERATIONS = 100, 40
-FRONT_STEPS = 60  # gaps of the front that are filled
-POLISH_EVALUATIONS, FINAL_EVALUATIONS = 60, 300
-FIRST_STEP = 0.05  # of each range
+# Weights of mean, minus range, weakest.
+OBJECTIVES = {
+    "balanced": (1.0, 1.0, 0.0),
+    "mean": (1.0, 0.0, 0.0),
+    "range": (0.0, 1.0, 0.0),
+    "weakest": (0.0, 0.0, 1.0),
+}
+SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
+SCOUTS = 1000  # placements tried at random before the evolution
+GENERATIONS, CHILDREN, ARCHIVE = 36, 60, 120
+WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last generation
+CLIMB_STEPS, FINAL_STEPS = 10, 6
+SIMPLEX_EVALUATIONS = 60  # at the end of the climb to the recommendation
+FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
+STARTS = 5  # climbs towards the recommendation
+NO_WORSE = 1e-9  # of the mean: what rounding does to a figure that stays as it was
+NO_FLOORS = np.full(3, -np.inf)
 
 
 @dataclass(frozen=True)
-class Bounds:
-    """What the search may vary. SI.
+class SearchRules:
+    """What the user asks of a placement.
 
-    `low`, `high` (6,): x, y, z in m, A, B, C in rad; equal where fixed. `heights`: the only z allowed, or empty.
+    Attributes
+    ----------
+    objective
+        One of `OBJECTIVES`, for the recommendation.
+    margin
+        Smallest margin to any limit, as a share of its span.
+    allow_extrapolation
+        Whether struts may leave the lengths of their law at more samples than now.
+    keepouts
+        Boxes that the path must stay out of.
+    seed
+        Of the search; the same seed gives the same placements.
+    points
+        Most points of the front.
     """
 
-    low: FloatArray
-    high: FloatArray
-    heights: tuple[float, ...] = ()
-
-    @property
-    def free(self) -> NDArray[np.int64]:
-        """Columns of a placement that vary."""
-        return np.flatnonzero(self.high > self.low)
-
-    def placements(self, unit: FloatArray) -> FloatArray:
-        """Placements (k, 6) of points (k, free) of the unit cube."""
-        placements = np.repeat(self.low[None], len(unit), axis=0)
-        free = self.free
-        placements[:, free] = self.low[free] + np.clip(unit, 0.0, 1.0) * (self.high - self.low)[free]
-        if self.heights:
-            heights = np.array(self.heights)
-            nearest = np.abs(placements[:, 2, None] - heights).argmin(axis=1)
-            placements[:, 2] = heights[nearest]
-        return placements
+    objective: str = "balanced"
+    margin: float = 0.01
+    allow_extrapolation: bool = False
+    keepouts: tuple[Keepout, ...] = ()
+    seed: int = 1
+    points: int = 60
 
 
 @dataclass(frozen=True)
@@ -69,31 +84,66 @@ class PlacementResult:
     Attributes
     ----------
     front
-        (n, 6) placements, none dominated by another, by rising mean.
+        (n, 6) placements, none dominated by another, by rising mean; the recommended one among them.
     figures
         Their figures on the whole path.
-    best, best_figures
-        (6,) the recommended placement and its figures (one row).
+    best
+        Row of the recommended placement.
+    present
+        Figures of the present placement (one row); None if none was given.
+    rules
+        What every placement of the front keeps.
+    unmended
+        (line, what it breaks) of rapids that no placement within the bounds keeps within reach.
     pose_evaluations
         Poses that the search evaluated.
     """
 
     front: FloatArray
     figures: PlacementFigures
-    best: FloatArray
-    best_figures: PlacementFigures
-    pose_evaluations: int
+    best: int
+    present: PlacementFigures | None
+    rules: Rules
+    unmended: tuple[tuple[int, str], ...] = ()
+    pose_evaluations: int = 0
+
+    @property
+    def best_figures(self) -> PlacementFigures:
+        """Figures of the recommended placement (one row)."""
+        return self.figures.take(slice(self.best, self.best + 1))
 
 
-def score(figures: PlacementFigures, objective: str) -> FloatArray:
-    """(k,) N/m, to be maximised; -inf where infeasible."""
-    value = {
-        "balanced": figures.mean - figures.spread,
-        "mean": figures.mean,
-        "range": -figures.spread,
-        "min": figures.lowest,
-    }[objective]
-    return np.asarray(np.where(np.isnan(value), -np.inf, value))
+@dataclass
+class _Search:
+    """The evaluators of one search: of a few samples, of more, of the whole path."""
+
+    model: StiffnessModel
+    path: WorkPath
+    load: Load
+    force: float
+    bounds: Bounds
+    asked: SearchRules
+    evaluators: dict[str, Evaluator] = field(default_factory=dict)
+    rules: Rules = field(default_factory=Rules)
+
+    def sampled(self, path: WorkPath) -> None:
+        """Evaluators of a path."""
+        self.path = path
+        parts = {"whole": path, "middle": telling_path(path, POLISH_SAMPLES), "few": telling_path(path, SCOUT_SAMPLES)}
+        arguments = (self.load, self.force, self.asked.keepouts, len(path))
+        before = self.poses
+        self.evaluators = {name: Evaluator(self.model, part, *arguments) for name, part in parts.items()}
+        self.evaluators["whole"].poses = before
+
+    @property
+    def poses(self) -> int:
+        return sum(evaluator.poses for evaluator in self.evaluators.values())
+
+    def climber(self, name: str) -> Climber:
+        return Climber(self.evaluators[name], self.bounds, self.rules)
+
+    def kept(self, figures: PlacementFigures) -> NDArray[np.bool_]:
+        return np.asarray(self.rules.violation(figures) == 0.0)
 
 
 def search_placements(
@@ -101,13 +151,10 @@ def search_placements(
     path: WorkPath,
     load: Load,
     bounds: Bounds,
+    asked: SearchRules | None = None,
     *,
-    objective: str = "balanced",
-    keepouts: tuple[Keepout, ...] = (),
-    seed: int = 1,
-    points: int = 60,
     force: float = 1000.0,
-    start: FloatArray | None = None,
+    present: FloatArray | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> PlacementResult:
     """Search for placements of a path.
@@ -118,280 +165,235 @@ def search_placements(
         The machine, the path in the set-up frame, the load.
     bounds
         What may vary.
-    objective
-        One of `OBJECTIVES`, for the recommendation.
-    keepouts
-        Boxes that the path must stay out of.
-    seed
-        Of the search; the same seed gives the same placements.
-    points
-        Most points of the front.
-    start
-        (6,) a placement to try as well: the present one.
+    asked
+        What a placement must keep and is to be good at.
+    present
+        (6,) where program zero sits now: what the recommendation must not be worse than.
     progress
         Called with (stages done, stages in all).
 
     Raises
     ------
     UnreachableError
-        No placement is feasible; says which limit binds at the least bad one, at which line, by how much.
+        No placement keeps the rules; says which one binds at the least bad placement, at which line, by how much.
     """
-    if objective not in OBJECTIVES:
-        raise InputError(f"objective {objective!r}", expected=f"one of {', '.join(OBJECTIVES)}")
-    whole, scout, middle = (
-        Evaluator(model, part, load, force, keepouts)
-        for part in (path, telling_path(path, SCOUT_SAMPLES), telling_path(path, POLISH_SAMPLES))
-    )
+    asked = asked or SearchRules()
+    if asked.objective not in OBJECTIVES:
+        raise InputError(f"objective {asked.objective!r}", expected=f"one of {', '.join(OBJECTIVES)}")
     report = progress or (lambda done, total: None)
-    rng = np.random.default_rng(seed)
-    candidates = _scout(scout, bounds, rng, start)
-    report(1, 5)
-    candidates = _evolve(scout, bounds, candidates, seed)
-    report(2, 5)
-    candidates = _polish_front(middle, bounds, candidates)
-    report(3, 5)
-    if start is not None:
-        candidates = np.vstack([candidates, start])
-    figures = whole.figures(candidates)
-    if not (figures.margin >= 0.0).any():
-        candidates, figures = _rescue(whole, bounds, candidates, figures)
-    if not (figures.margin >= 0.0).any():
-        raise _infeasible(model, path, load, keepouts, candidates[int(np.argmax(figures.margin))])
-    report(4, 5)
-    candidates, figures = _finish(whole, bounds, candidates, figures, objective)
-    best = int(np.argmax(score(figures, objective)))
-    rows = _front_rows(figures)
-    rows = _thin(figures, rows, points, best)
-    report(5, 5)
+    rng = np.random.default_rng(asked.seed)
+    search = _Search(model, path, load, force, bounds, asked, rules=Rules(asked.margin))
+    search.sampled(path)
+    now = None if present is None else search.evaluators["whole"].figures(present[None])
+    unit = rng.uniform(size=(SCOUTS if len(bounds.free) else 1, len(bounds.free)))
+    scouts = bounds.placements(unit)
+    held = present is not None and bounds.holds(present)
+    if present is not None and held:
+        scouts = np.vstack([present, scouts])
+    unmended = _let_go(search, scouts)
+    search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, now))
+    report(1, 4)
+    candidates = _evolved(search, scouts, rng)
+    report(2, 4)
+    ends = _climbed(search, candidates, now)
+    report(3, 4)
+    candidates = np.vstack([candidates, ends] + ([present[None]] if present is not None and held else []))
+    figures = search.evaluators["whole"].figures(candidates)
+    if not search.kept(figures).any():
+        raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
+    best = _recommended(search, candidates, figures, now)
+    rows = front_rows(figures, search.kept(figures))
+    if best not in rows:  # equal to another in all three
+        rows = np.append(rows, best)
+    rows = rows[np.argsort(figures.mean[rows], kind="stable")]
+    rows = thin(figures.take(rows).objectives, rows, asked.points, best)
+    report(4, 4)
     return PlacementResult(
         front=candidates[rows],
-        figures=_pick(figures, rows),
-        best=candidates[best],
-        best_figures=_pick(figures, np.array([best])),
-        pose_evaluations=whole.poses + scout.poses + middle.poses,
+        figures=figures.take(rows),
+        best=int(np.flatnonzero(rows == best)[0]),
+        present=now,
+        rules=search.rules,
+        unmended=unmended,
+        pose_evaluations=search.poses,
     )
 
 
-def _pick(figures: PlacementFigures, rows: NDArray[np.int64]) -> PlacementFigures:
-    return PlacementFigures(*(getattr(figures, column.name)[rows] for column in fields(figures)))
+def _let_go(search: _Search, scouts: FloatArray) -> tuple[tuple[int, str], ...]:
+    """Drop anchored rapids that no placement keeps within reach where the cuts are; returns their lines and why."""
+    few = search.evaluators["few"]
+    anchored = few.path.anchored
+    if not len(anchored):
+        return ()
+    found = few.rows(scouts)
+    m, rule = len(few.path), search.rules.margin
+    room = np.minimum(found.margin - rule, found.clearance)
+    cuts = room[:, :m][:, few.path.cutting].min(axis=1, initial=np.inf)
+    possible = np.flatnonzero(cuts >= 0.0) if (cuts >= 0.0).any() else np.arange(len(scouts))
+    gone, told = [], []
+    for move in np.unique(anchored.move):
+        rows = np.flatnonzero(anchored.move == move)
+        room_of_move = room[possible][:, m + rows]
+        if room_of_move.min(axis=1).max() >= 0.0:
+            continue
+        best = int(possible[np.argmax(room_of_move.min(axis=1))])
+        told.append((int(anchored.line[rows[0]]), _breaks(search, few.path, scouts[best], m + rows)))
+        gone.append(move)
+    if gone:
+        kept = ~np.isin(search.path.anchored.move, gone)
+        search.sampled(replace(search.path, anchored=search.path.anchored.take(kept)))
+    return tuple(told)
 
 
-def _unit(bounds: Bounds, placements: FloatArray) -> FloatArray:
-    free = bounds.free
-    return np.asarray((placements[:, free] - bounds.low[free]) / (bounds.high - bounds.low)[free])
+def _breaks(search: _Search, path: WorkPath, placement: FloatArray, columns: IntArray) -> str:
+    """What the worst of some anchored samples breaks at a placement, in words."""
+    turn = rotation_matrices(placement[None, 3:])
+    rows = columns - len(path)
+    position = path.anchored.placed(turn, placement[None, :3])[0][rows]
+    machine = search.model.machine
+    rotation = rotation_matrices(path.anchored.abc[rows])
+    struts = solve_struts(machine, position, rotation, path.anchored.tool_length[rows])
+    stand = reach(machine, position, struts, rotation)
+    worst = int(np.argmin(stand.margin))
+    if stand.margin[worst] >= search.rules.margin:
+        boxes = [box.name for box in search.asked.keepouts if batch.clearances(box, position).min() < 0.0]
+        return f"it runs through the keep-out {boxes[0]}" if boxes else "it cannot be kept"
+    return stand.describe(worst)
 
 
-def _scout(scout: Evaluator, bounds: Bounds, rng: np.random.Generator, start: FloatArray | None) -> FloatArray:
-    """The best of many placements at random: feasible and spread over the trade-off, or nearest to feasible."""
-    unit = rng.uniform(size=(SCOUTS if len(bounds.free) else 1, len(bounds.free)))
-    placements = bounds.placements(unit)
-    if start is not None:
-        placements = np.vstack([placements, start])
-    figures = scout.figures(placements)
-    feasible = np.flatnonzero(figures.margin >= 0.0)
-    if len(feasible) < POPULATION:
-        return np.asarray(placements[np.argsort(-figures.margin, kind="stable")[:POPULATION]])
-    weights = np.linspace(0.0, 1.0, POPULATION)
-    mean, spread = _scaled(figures.mean[feasible]), _scaled(figures.spread[feasible])
-    picks = [int(feasible[np.argmax((1 - w) * mean - w * spread)]) for w in weights]
-    others = rng.permutation(feasible)[: POPULATION // 2]
-    return np.asarray(placements[np.unique([*picks, *others])])
+def _extrapolation_allowed(search: _Search, scouts: FloatArray, now: PlacementFigures | None) -> float:
+    """Largest share of samples outside the strut law: as now; where that is out of reach, the least that was found."""
+    if search.asked.allow_extrapolation or now is None:
+        return np.inf
+    if now.margin[0] >= 0.0:
+        return float(now.extrapolated[0])
+    few = search.evaluators["few"].figures(scouts)
+    possible = np.flatnonzero(search.kept(few))
+    if not len(possible):
+        return np.inf
+    least = possible[np.argsort(few.extrapolated[possible], kind="stable")[:5]]
+    return float(search.evaluators["whole"].figures(scouts[least]).extrapolated.min())
 
 
-def _scaled(values: FloatArray) -> FloatArray:
-    return np.asarray((values - values.min()) / max(float(np.ptp(values)), 1e-12))
+def _evolved(search: _Search, scouts: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """An archive of placements that nothing dominates, from the scouts on, on few samples.
 
-
-def _evolve(scout: Evaluator, bounds: Bounds, candidates: FloatArray, seed: int) -> FloatArray:
-    """NSGA-II on mean and range with the smallest margin as a constraint."""
+    Each generation moves members of the archive at random, by steps that shrink, and along the difference of two
+    others, as differential evolution does; what is dominated goes, and so does what is crowded.
+    """
+    few, bounds = search.evaluators["few"], search.bounds
+    archive, figures = _survivors(search, scouts, few.figures(scouts))
     if not len(bounds.free):
-        return candidates
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.core.problem import Problem
-    from pymoo.optimize import minimize
-
-    class Trade(Problem):
-        """Minus mean, and range, in N/um; infeasible where the margin is negative."""
-
-        def __init__(self) -> None:
-            super().__init__(n_var=len(bounds.free), n_obj=2, n_ieq_constr=1, xl=0.0, xu=1.0)
-
-        def _evaluate(self, x: FloatArray, out: dict[str, Any], *_: Any, **__: Any) -> None:
-            figures = scout.figures(bounds.placements(x))
-            out["F"] = 1e-6 * np.nan_to_num(np.column_stack([-figures.mean, figures.spread]), nan=0.0)
-            out["G"] = -figures.margin
-
-    unit = _unit(bounds, candidates)
-    fill = np.random.default_rng(seed + 1).uniform(size=(max(0, POPULATION - len(unit)), len(bounds.free)))
-    found = minimize(
-        Trade(), NSGA2(pop_size=POPULATION, sampling=np.vstack([unit, fill])), ("n_gen", GENERATIONS), seed=seed
-    )
-    last = bounds.placements(np.array([individual.X for individual in found.pop]))
-    return np.vstack([last, candidates])
+        return archive
+    for spread in np.geomspace(WIDE, NARROW, GENERATIONS):
+        parents, one, other = (bounds.unit(archive[rng.integers(len(archive), size=CHILDREN)]) for _ in range(3))
+        step = spread * rng.normal(size=parents.shape) * (rng.uniform(size=parents.shape) < 0.7)
+        along = np.where(rng.uniform(size=(CHILDREN, 1)) < 0.5, 0.5, 0.0)
+        children = bounds.placements(parents + step + along * (one - other))
+        found = PlacementFigures.joined([figures, few.figures(children)])
+        archive, figures = _survivors(search, np.vstack([archive, children]), found)
+    return archive
 
 
-def _polish_front(middle: Evaluator, bounds: Bounds, candidates: FloatArray) -> FloatArray:
-    """Fill the front: again and again the narrowest range whose mean lies in the middle of the widest gap."""
-    figures = middle.figures(candidates)
-    if not (figures.margin >= 0.0).any() or not len(bounds.free):
-        return candidates
-    for goal in ("mean", "range"):
-        first = candidates[int(np.argmax(score(figures, goal)))]
-        candidates, figures = _add(middle, candidates, figures, bounds, first, partial(score, objective=goal))
-    tried: set[tuple[float, float]] = set()
-    for _ in range(FRONT_STEPS):
-        rows = _front_rows(figures)
-        mean, spread = figures.mean[rows], figures.spread[rows]
-        if len(rows) < 2 or np.ptp(mean) < 1e-9 * mean[-1]:
-            break
-        wide = np.diff(_scaled(mean)) + np.diff(_scaled(spread))
-        gaps = [g for g in np.argsort(-wide, kind="stable") if (float(mean[g]), float(mean[g + 1])) not in tried]
-        if not gaps:
-            break
-        gap = int(gaps[0])
-        tried.add((float(mean[gap]), float(mean[gap + 1])))
-        level = 0.5 * float(mean[gap] + mean[gap + 1])
-
-        def gain(found: PlacementFigures, level: float = level) -> FloatArray:
-            """Narrow range; a mean below the level costs more than any range could win."""
-            value = -found.spread - 100.0 * np.maximum(level - found.mean, 0.0)
-            return np.asarray(np.where(np.isnan(value), -np.inf, value))
-
-        # Where the front is smooth, half-way between two of its points lies all but on it.
-        ends = candidates[rows[[gap, gap + 1]]]
-        apart = float(np.abs(np.diff(_unit(bounds, ends), axis=0)).max())
-        reach = float(np.clip(0.25 * apart, 1e-3, 0.05))
-        candidates, figures = _add(middle, candidates, figures, bounds, ends.mean(axis=0), gain, reach)
-    return candidates[figures.margin >= 0.0]
-
-
-def _add(
-    middle: Evaluator,
-    candidates: FloatArray,
-    figures: PlacementFigures,
-    bounds: Bounds,
-    first: FloatArray,
-    gain: Callable[[PlacementFigures], FloatArray],
-    reach: float = FIRST_STEP,
+def _survivors(
+    search: _Search, placements: FloatArray, figures: PlacementFigures
 ) -> tuple[FloatArray, PlacementFigures]:
-    """Climb from one placement and add where it ends."""
-    found = _climb(middle, bounds, first, gain, POLISH_EVALUATIONS, reach)
-    return np.vstack([candidates, found]), _joined(figures, middle.figures(found))
+    """What nothing dominates, thinned; where too little keeps the rules, the nearest to keeping them as well."""
+    violation = search.rules.violation(figures)
+    rows = front_rows(figures, violation == 0.0)
+    rows = thin(figures.take(rows).objectives, rows, ARCHIVE) if len(rows) else rows
+    if len(rows) < CHILDREN // 3:
+        order = np.argsort(violation, kind="stable")
+        rows = np.unique(np.append(rows, order[: CHILDREN // 3]))
+    return placements[rows], figures.take(rows)
 
 
-def _joined(one: PlacementFigures, two: PlacementFigures) -> PlacementFigures:
-    return PlacementFigures(*(np.concatenate([getattr(one, c.name), getattr(two, c.name)]) for c in fields(one)))
+def _climbed(search: _Search, candidates: FloatArray, now: PlacementFigures | None) -> FloatArray:
+    """The recommendation and the ends of the front, climbed to from several of the candidates."""
+    asked = OBJECTIVES[search.asked.objective]
+    ends = [Goal(weights, NO_FLOORS) for weights in OBJECTIVES.values()]
+    figures = search.evaluators["middle"].figures(candidates)
+    if now is not None and now.margin[0] >= 0.0:
+        goal = Goal(asked, now.objectives[0])
+        found = _climbed_to(search, candidates, figures, goal, STARTS)
+        if goal.worsening(search.evaluators["whole"].figures(found)).min() > 0.0:
+            found = np.vstack([found, _climbed_to(search, candidates, figures, Goal(None, goal.floors), STARTS)])
+    else:
+        found = _climbed_to(search, candidates, figures, Goal(asked, NO_FLOORS), STARTS)
+    return np.vstack([found, *(_climbed_to(search, candidates, figures, goal, 1) for goal in ends)])
 
 
-def _climb(
-    evaluator: Evaluator,
-    bounds: Bounds,
-    first: FloatArray,
-    gain: Callable[[PlacementFigures], FloatArray],
-    evaluations: int,
-    reach: float = FIRST_STEP,
+def _climbed_to(
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, goal: Goal, starts: int
 ) -> FloatArray:
-    """Nelder-Mead from one placement; an infeasible one counts by how far it is from being feasible."""
-    from scipy.optimize import minimize
+    """Where climbs from the best candidates end, on some hundred samples; and the best of them on the whole path.
 
-    free = bounds.free
-    best = float(gain(evaluator.figures(first[None]))[0])
-
-    def loss(unit: FloatArray) -> float:
-        figures = evaluator.figures(bounds.placements(unit[None]))
-        value = float(gain(figures)[0])
-        return -value if np.isfinite(value) else 10.0 * abs(best) + 1.0 - float(figures.margin[0])
-
-    unit = _unit(bounds, first[None])[0]
-    # The first simplex points away from the nearer bound.
-    simplex = np.vstack([unit, unit + reach * np.diag(np.where(unit < 0.5, 1.0, -1.0))])
-    found = minimize(
-        loss,
-        unit,
-        method="Nelder-Mead",
-        bounds=[(0.0, 1.0)] * len(free),
-        options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-9},
+    `figures` are those of the candidates on these samples.
+    """
+    middle, whole = search.climber("middle"), search.climber("whole")
+    order = _ranked(search, goal, figures)
+    first = candidates[order][apart(search.bounds, candidates[order], starts)]
+    found = np.array([middle.climb(place, goal, CLIMB_STEPS) for place in first])
+    best = found[_ranked(search, goal, whole.evaluator.figures(found))[0]]
+    return np.vstack(
+        [found, whole.climb(best, goal, FINAL_STEPS, FINAL_REGION, SIMPLEX_EVALUATIONS if starts > 1 else 0)]
     )
-    return bounds.placements(np.array([found.x]))
 
 
-def _rescue(
-    whole: Evaluator, bounds: Bounds, candidates: FloatArray, figures: PlacementFigures
-) -> tuple[FloatArray, PlacementFigures]:
-    """Nothing is feasible so far: climb the margin itself."""
-    if not len(bounds.free):
-        return candidates, figures
-    order = np.argsort(-figures.margin, kind="stable")[:3]
-    climbed = [_climb(whole, bounds, candidates[i], lambda f: f.margin, FINAL_EVALUATIONS) for i in order]
-    candidates = np.vstack([candidates, *climbed])
-    return candidates, whole.figures(candidates)
+def _ranked(search: _Search, goal: Goal, figures: PlacementFigures) -> IntArray:
+    """Rows, best first: the rules, then what must not get worse, then the value."""
+    return np.lexsort((-goal.value(figures), goal.worsening(figures), search.rules.violation(figures)))
 
 
-def _finish(
-    whole: Evaluator, bounds: Bounds, candidates: FloatArray, figures: PlacementFigures, objective: str
-) -> tuple[FloatArray, PlacementFigures]:
-    """Polish the ends of the front and the recommended placement on the whole path."""
-    if not len(bounds.free):
-        return candidates, figures
-    added = []
-    for goal, evaluations in (
-        (objective, FINAL_EVALUATIONS),
-        ("mean", POLISH_EVALUATIONS),
-        ("range", POLISH_EVALUATIONS),
-    ):
-        ranked = np.argsort(-score(figures, goal), kind="stable")[: 2 if goal == objective else 1]
-        gain = partial(score, objective=goal)
-        added += [_climb(whole, bounds, candidates[i], gain, evaluations) for i in ranked]
-    more = np.vstack(added)
-    extra = whole.figures(more)
-    return np.vstack([candidates, more]), _joined(figures, extra)
+def _recommended(
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, now: PlacementFigures | None
+) -> int:
+    """Row of the recommendation: the best of those that are no worse in anything, else the least worse."""
+    goal = Goal(OBJECTIVES[search.asked.objective], NO_FLOORS)
+    possible = np.flatnonzero(search.kept(figures))
+    if now is not None and now.margin[0] >= 0.0:
+        objectives = figures.objectives[possible]
+        fall = (now.objectives[0] - objectives).max(axis=1)
+        slack = NO_WORSE * float(now.mean[0])
+        least = fall <= slack if (fall <= slack).any() else fall <= fall.min() + slack
+        possible = possible[least]
+    ranked = np.lexsort((*(-figures.take(possible).objectives.T), -goal.value(figures.take(possible))))
+    return int(possible[ranked[0]])
 
 
-def _front_rows(figures: PlacementFigures) -> NDArray[np.int64]:
-    """Feasible rows that no other beats in both mean and range, by rising mean."""
-    rows = np.flatnonzero(figures.margin >= 0.0)
-    order = rows[np.lexsort((figures.spread[rows], -figures.mean[rows]))]
-    kept, narrowest = [], np.inf
-    for i in order:
-        if figures.spread[i] < narrowest:
-            kept.append(int(i))
-            narrowest = float(figures.spread[i])
-    return np.array(kept[::-1], dtype=np.int64)
-
-
-def _thin(figures: PlacementFigures, rows: NDArray[np.int64], points: int, best: int) -> NDArray[np.int64]:
-    """At most `points` rows, evenly spread along the front; the ends and the recommended one stay."""
-    kept = list(rows)
-    mean, spread = _scaled(figures.mean[rows]), _scaled(figures.spread[rows])
-    along = list(np.cumsum(np.abs(np.diff(mean, prepend=mean[0])) + np.abs(np.diff(spread, prepend=spread[0]))))
-    while len(kept) > max(points, 2):
-        # The point whose neighbours lie closest together is missed least.
-        room = [along[i + 1] - along[i - 1] if kept[i] != best else np.inf for i in range(1, len(kept) - 1)]
-        gone = 1 + int(np.argmin(room))
-        del kept[gone], along[gone]
-    return np.array(kept, dtype=np.int64)
-
-
-def _infeasible(
-    model: StiffnessModel, path: WorkPath, load: Load, keepouts: tuple[Keepout, ...], placement: FloatArray
-) -> UnreachableError:
-    """The error that names the limit, the line and by how much, at the least bad placement."""
+def _infeasible(search: _Search, placement: FloatArray) -> UnreachableError:
+    """The error that names the rule, the line and by how much, at the least bad placement."""
+    path, model, rules = search.path, search.model, search.rules
     position, tangent, abc = placed_path(path, placement)
-    found = evaluate(model, position, abc, tangent, path.tool_length, load)
+    found = evaluate(model, position, abc, tangent, path.tool_length, search.load)
     worst = int(np.argmin(found.margin))
     x, y, z = (mm_from_m(float(v)) for v in placement[:3])
     where = f"X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {deg_from_rad(float(placement[5])):.1f} degrees"
-    if found.margin[worst] >= 0.0:
-        depths = [batch.clearances(box, position) for box in keepouts]
+    least = f"no placement is feasible: at the least bad one ({where})"
+    line = f"{'' if path.cutting[worst] else 'the rapid of '}line {int(path.line[worst])}"
+    figures = search.evaluators["whole"].figures(placement[None])
+    if found.margin[worst] < 0.0:
+        return UnreachableError(
+            f"{least} {line} breaks a limit: {found.reach.describe(worst)}",
+            hint="widen the bounds, or cut the part in two set-ups",
+        )
+    if figures.clearance[0] < 0.0:
+        depths = [batch.clearances(box, position) for box in search.asked.keepouts]
         deepest = int(np.argmin([depth.min() for depth in depths]))
         row = int(np.argmin(depths[deepest]))
         return UnreachableError(
-            f"no placement is feasible: at the least bad one ({where}) line {int(path.line[row])} runs "
-            f"{mm_from_m(-float(depths[deepest][row])):.1f} mm deep into the keep-out {keepouts[deepest].name}",
+            f"{least} line {int(path.line[row])} runs {mm_from_m(-float(depths[deepest][row])):.1f} mm deep into the "
+            f"keep-out {search.asked.keepouts[deepest].name}",
             hint="make the keep-out smaller or the bounds wider",
         )
+    if found.margin[worst] < rules.margin:
+        return UnreachableError(
+            f"{least} {line} has a margin of {100.0 * found.margin[worst]:.2f} % of the limit's span: "
+            f"{found.reach.describe(worst)}",
+            hint=f"widen the bounds, or ask for less than --margin {100.0 * rules.margin:g}",
+        )
     return UnreachableError(
-        f"no placement is feasible: at the least bad one ({where}) line {int(path.line[worst])} breaks a limit: "
-        f"{found.reach.describe(worst)}",
-        hint="widen the bounds, or cut the part in two set-ups",
+        f"{least} the struts are outside their law at {100.0 * figures.extrapolated[0]:.1f} % of the samples, now at "
+        f"{100.0 * rules.extrapolated:.1f} %",
+        hint="widen the bounds, or allow it with --allow-extrapolation",
     )

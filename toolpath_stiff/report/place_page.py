@@ -18,18 +18,18 @@ from toolpath_stiff.analysis import Analysis
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.batch import Keepout
 from toolpath_stiff.placement.drawn_path import DrawnPath, drawn_path
+from toolpath_stiff.placement.report_data import placement_of
 from toolpath_stiff.report.page import filled, json_for_script
 from toolpath_stiff.report.page_data import class_colours
 from toolpath_stiff.report.sections import script_hash
-from toolpath_stiff.report.wording import number, plain
-from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
+from toolpath_stiff.report.wording import machine_text, number, plain
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 FloatArray = NDArray[np.float64]
 
 POINTS = (150, 800)  # of the path on the page, fewest and most
 ENDS = (0.05, 0.95)  # of the path's length, all placements together, between which the colours run
 VALUES = 48_000  # points times placements that the page holds, some 300 kB
-PLACEMENT = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "rotation_deg")
 
 
 def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepouts: Sequence[Keepout] = ()) -> str:
@@ -40,15 +40,15 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
     summary
         As in `placement.json`.
     best
-        The analysis at the recommended placement: model, load, force and step are taken from it.
+        The analysis at the chosen placement: model, load, force and step are taken from it.
     program
         In the set-up frame, as read.
     keepouts
         Boxes to draw.
     """
-    front, recommended = _choices(summary)
+    front = summary["front"]
     shown = front + ([summary["before"]] if summary["before"] else [])
-    placements = np.array([_placement(row) for row in shown])
+    placements = np.array([placement_of(row) for row in shown])
     path = drawn_path(
         best.model,
         program,
@@ -60,7 +60,8 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
     )
     data = {
         "front": front,
-        "recommended": recommended,
+        "chosen": summary["chosen"]["number"] - 1,
+        "recommended": summary["recommended"]["number"] - 1,
         "before": summary["before"],
         "before_reason": plain(summary["before_reason"] or ""),
         "force": best.force,
@@ -72,7 +73,7 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
     }
     script = '\n"use strict";\n(() => {\n' + _asset("place.js") + "})();\n"
     name = html.escape(plain(summary["program"]))
-    about = f"machine {summary['machine']} · load {summary['load']}, {summary['force_N']:g} N"
+    about = f"machine {machine_text(summary)} · load {summary['load']}, {summary['force_N']:g} N"
     return filled(
         _asset("place.html"),
         {
@@ -80,8 +81,8 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
             "about": html.escape(plain(about)),
             "objective": html.escape(summary["objective"]),
             "load": html.escape(summary["load"]),
-            "note": _note(path)
-            + f" Colours span the middle {ENDS[1] - ENDS[0]:.0%} of the length at all placements.".replace("%", " %"),
+            "note": _note(path),
+            "warnings": _warnings(summary),
             "script": script,
             "script_hash": script_hash(script),
             "data": json_for_script(data),
@@ -89,26 +90,14 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
     )
 
 
-def _choices(summary: dict[str, Any]) -> tuple[list[dict[str, Any]], int]:
-    """The placements to choose from, and which is the recommended one: it may lie off the front of mean and range."""
-    front, best = list(summary["front"]), summary["recommended"]
-    for i, row in enumerate(front):
-        if all(abs(row[key] - best[key]) < 1e-9 for key in PLACEMENT):
-            return front, i
-    return [*front, best], len(front)
-
-
-def _placement(row: dict[str, Any]) -> FloatArray:
-    """(6,) m and rad of a row in mm and degrees."""
-    values = np.array([row[key] for key in PLACEMENT])
-    return np.concatenate([m_from_mm(values[:3]), rad_from_deg(values[3:])])
-
-
 def _drawn(path: DrawnPath) -> dict[str, Any]:
     """The path in the program's axes and its stiffness; the tool's axis where it leans."""
     stiffness = n_per_mm_from_n_per_m(path.stiffness)
-    finite = stiffness[np.isfinite(stiffness)]
-    length = np.broadcast_to(_lengths(path), stiffness.shape)[np.isfinite(stiffness)]
+    about = np.isfinite(stiffness) & ~path.plunge
+    if not about.any():
+        about = np.isfinite(stiffness)
+    finite = stiffness[about]
+    length = np.broadcast_to(_lengths(path), stiffness.shape)[about]
     low, high = _scale(finite, length)
     digits = max(0, 5 - int(np.log10(max(float(finite.max()), 1.0))))  # six digits
     leaning = bool((path.axis[:, 2] < 1.0 - 1e-12).any())
@@ -120,14 +109,15 @@ def _drawn(path: DrawnPath) -> dict[str, Any]:
         "axis": np.round(path.axis, 5).tolist() if leaning else None,
         "s": np.round(mm_from_m(path.s), 2).tolist(),
         "cut": path.cut.tolist(),
+        "plunge": path.plunge.tolist() if path.plunge.any() else None,
         "stiffness": values,
         "scale": [low, high],
-        "beyond": [bool(finite.min() < low), bool(finite.max() > high)],
+        "beyond": [bool(np.nanmin(stiffness) < low), bool(np.nanmax(stiffness) > high)],
     }
 
 
 def _scale(stiffness: FloatArray, length: FloatArray) -> tuple[float, float]:
-    """Ends of the colour scale in N/mm: a few plunges, stiffer by far, would otherwise take all the contrast."""
+    """Ends of the colour scale in N/mm: a few corners would otherwise take all the contrast."""
     order = np.argsort(stiffness, kind="stable")
     along = np.cumsum(length[order])
     low, high = (float(v) for v in stiffness[order[np.searchsorted(along, np.array(ENDS) * along[-1])]])
@@ -139,6 +129,12 @@ def _lengths(path: DrawnPath) -> FloatArray:
     step = np.where(np.diff(path.cut) == 0, np.diff(path.s), 0.0)
     length = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
     return np.asarray(length if length.any() else np.ones(len(length)))
+
+
+def _warnings(summary: dict[str, Any]) -> str:
+    """What has to be said, as a list at the head of the page; nothing if there is nothing."""
+    items = "".join(f"<li>{html.escape(plain(text))}</li>" for text in summary["warnings"])
+    return f'<section class="warnings" role="note"><h2>Before it is run</h2><ul>{items}</ul></section>' if items else ""
 
 
 def _workspace(best: Analysis) -> list[list[float | None]]:
@@ -153,11 +149,13 @@ def _box(low: Sequence[float], high: Sequence[float]) -> list[list[float]]:
 
 def _note(path: DrawnPath) -> str:
     shown = len(path.s)
+    scale = f" Colours span the middle {100.0 * (ENDS[1] - ENDS[0]):.0f} % of the length at all placements"
+    scale += ", plunges left out." if path.plunge.any() else "."
     if shown == path.samples:
-        return f"All {number(shown)} samples of the cutting path are drawn."
+        return f"All {number(shown)} samples of the cutting path are drawn.{scale}"
     return (
         f"Drawn are {number(shown)} of the {number(path.samples)} samples of the cutting path, joined by straight "
-        "lines, each with the stiffness that was evaluated there; the figures in the table are of all samples."
+        "lines, each with the stiffness that was evaluated there; the figures in the table are of all samples." + scale
     )
 
 

@@ -29,7 +29,7 @@ function placed(row, stiffness) {
   const tools = leans ? d.position.map((_, i) => times(q, d.axis ? d.axis[i] : [0, 0, 1])) : null;
   return { row, zero, stiffness, points: d.position.map(shift), axes: [0, 1, 2].map((k) => q.map((r) => r[k])), tools };
 }
-let chosen = d.recommended;
+let chosen = d.chosen;
 const places = d.front.map((row, i) => placed(row, d.stiffness[i]));
 const before = d.before ? placed(d.before, d.stiffness[d.stiffness.length - 1]) : null;
 
@@ -121,7 +121,10 @@ function grid(svg, list, digits, vertical, map, a, b) {
   }
 }
 const title = (node, text) => make(node, "title", {}, text);
-const nameOf = (row, i) => `mean ${words(row.mean_N_per_mm)}, range ${words(row.range_N_per_mm)}, weakest ${words(row.min_N_per_mm)} N/mm` + (i === d.recommended ? ", recommended" : "");
+const weakest = rowsShown.map((r) => r.min_N_per_mm), weakEnds = [Math.min(...weakest), Math.max(...weakest)];
+const coloursNow = () => (dark.matches ? d.colours_dark : d.colours);
+const weakColour = (v) => coloursNow()[Math.min(d.colours.length - 1, Math.floor((v - weakEnds[0]) / (weakEnds[1] - weakEnds[0] || 1) * d.colours.length))];
+const nameOf = (row, i) => `number ${row.number}: mean ${words(row.mean_N_per_mm)}, range ${words(row.range_N_per_mm)}, weakest ${words(row.min_N_per_mm)} N/mm` + (i === d.recommended ? ", recommended" : "") + (i === d.chosen && i !== d.recommended ? ", picked" : "");
 let dots = [];
 function drawFront() {
   const W = widthOf(front), H = Math.round(Math.min(340, 0.85 * W)), [L, R, T, B] = [66, 14, 24, 44], focused = document.activeElement && front.contains(document.activeElement);
@@ -131,9 +134,9 @@ function drawFront() {
   grid(front, tx, digitsOf(tx), true, X, T, H - B); grid(front, ty, digitsOf(ty), false, Y, L, W - R);
   make(front, "text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" }, "mean stiffness, N/mm (more is better)");
   make(front, "text", { x: 4, y: 14 }, "range, N/mm (less is better)");
-  if (d.before) title(make(front, "rect", { x: X(d.before.mean_N_per_mm) - 6, y: Y(d.before.range_N_per_mm) - 6, width: 12, height: 12, fill: "none", stroke: "currentColor", "stroke-width": 2 }), "original placement");
+  if (d.before) title(make(front, "rect", { x: X(d.before.mean_N_per_mm) - 6, y: Y(d.before.range_N_per_mm) - 6, width: 12, height: 12, fill: weakColour(d.before.min_N_per_mm), stroke: "currentColor", "stroke-width": 2 }), "present placement, weakest " + words(d.before.min_N_per_mm) + " N/mm");
   dots = d.front.map((row, i) => {
-    const dot = make(front, "circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot", role: "radio", "aria-label": nameOf(row, i) });
+    const dot = make(front, "circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot", fill: weakColour(row.min_N_per_mm), role: "radio", "aria-label": nameOf(row, i) });
     title(dot, nameOf(row, i)); dot.addEventListener("click", () => choose(i, true)); return dot;
   });
   const best = d.front[d.recommended];
@@ -143,7 +146,7 @@ function drawFront() {
 function mark() {
   dots.forEach((dot, k) => { dot.classList.toggle("on", k === chosen); dot.setAttribute("aria-checked", k === chosen); dot.setAttribute("tabindex", k === chosen ? 0 : -1); });
 }
-$("front-key").textContent = "\u2605 recommended" + (d.before ? "  \u25a1 original" : ". No original to compare with: " + d.before_reason) + ". Arrow keys step along the front.";
+$("front-key").textContent = "\u2605 recommended" + (d.before ? "  \u25a1 present" : ". No present placement to compare with: " + d.before_reason) + ". No placement is better in mean, range and weakest place at once. Arrow keys step along the front.";
 front.addEventListener("keydown", (event) => {
   const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key], jump = { Home: 0, End: dots.length - 1 }[event.key];
   if (step === undefined && jump === undefined) return;
@@ -151,17 +154,20 @@ front.addEventListener("keydown", (event) => {
 });
 
 // ---------------------------------------------------------------- the profile
-const profileSpan = span(d.stiffness.flat().filter((v) => v !== null).concat(rowsShown.flatMap((r) => [r.min_N_per_mm, r.min_N_per_mm + r.range_N_per_mm])));
+// Plunges along the tool axis are stiffer by far and would take all of the axis; a switch shows them.
+const plunges = $("plunges"), isPlunge = (i) => d.plunge !== null && d.plunge[i], hidden = (i) => isPlunge(i) && !plunges.checked;
+const profileSpan = () => span(d.stiffness.flatMap((row) => row.filter((v, i) => v !== null && !hidden(i))).concat(rowsShown.flatMap((r) => [r.min_N_per_mm, r.min_N_per_mm + r.range_N_per_mm])));
+$("plunge-switch").hidden = d.plunge === null; plunges.addEventListener("change", () => drawProfile(places[chosen]));
 function drawProfile(place) {
-  const svg = $("profile"), w = widthOf(svg), narrow = w < 700, h = 240, [l, r, t, b] = [66, 10, 8, 38];
+  const svg = $("profile"), w = widthOf(svg), narrow = w < 700, h = 240, [l, r, t, b] = [66, 10, 8, 38], ends = profileSpan();
   svg.replaceChildren(); svg.setAttribute("viewBox", `0 0 ${w} ${h}`); svg.setAttribute("height", h);
-  const s0 = d.s[0], s1 = d.s[d.s.length - 1] || 1, sx = (s) => l + (w - l - r) * (s - s0) / (s1 - s0 || 1), sy = (v) => h - b - (h - b - t) * (v - profileSpan[0]) / (profileSpan[1] - profileSpan[0]);
-  const list = ticks(...profileSpan, 4), along = ticks(s0, s1, narrow ? 4 : 8);
+  const s0 = d.s[0], s1 = d.s[d.s.length - 1] || 1, sx = (s) => l + (w - l - r) * (s - s0) / (s1 - s0 || 1), sy = (v) => h - b - (h - b - t) * (v - ends[0]) / (ends[1] - ends[0]);
+  const list = ticks(...ends, 4), along = ticks(s0, s1, narrow ? 4 : 8);
   grid(svg, along, digitsOf(along), true, sx, t, h - b); grid(svg, list, digitsOf(list), false, sy, l, w - r);
   make(svg, "text", { x: (l + w - r) / 2, y: h - 6, "text-anchor": "middle" }, "path length, mm (rapids included)");
   for (const [curve, colour] of [[before, "var(--muted)"], [place, "var(--blue)"]]) {
     if (!curve) continue;
-    const text = curve.stiffness.map((v, i) => (v === null ? "" : (i && d.cut[i] === d.cut[i - 1] && curve.stiffness[i - 1] !== null ? "L" : "M") + sx(d.s[i]).toFixed(1) + " " + sy(v).toFixed(1))).join("");
+    const text = curve.stiffness.map((v, i) => (v === null || hidden(i) ? "" : (i && d.cut[i] === d.cut[i - 1] && curve.stiffness[i - 1] !== null && !hidden(i - 1) ? "L" : "M") + sx(d.s[i]).toFixed(1) + " " + sy(v).toFixed(1))).join("");
     make(svg, "path", { d: text, fill: "none", stroke: colour, "stroke-width": 1.6, "stroke-linejoin": "round" });
     make(svg, "path", { d: `M${l} ${sy(curve.row.mean_N_per_mm)}H${w - r}`, stroke: colour, "stroke-dasharray": "7 5" });
   }
@@ -169,17 +175,18 @@ function drawProfile(place) {
 
 // ---------------------------------------------------------------- figures
 function drawFacts(row) {
-  const columns = d.before ? [row, d.before] : [row], table = $("facts"), figure = (key, digits) => columns.map((r) => (r[key] === undefined ? "\u2013" : words(r[key], digits)));
+  const columns = d.before ? [row, d.before] : [row], table = $("facts"), figure = (key, digits) => columns.map((r) => (r[key] === undefined || r[key] === null ? "\u2013" : words(r[key], digits)));
   const rows = [["mean, N/mm", figure("mean_N_per_mm")], ["range, N/mm", figure("range_N_per_mm")], ["weakest, N/mm", figure("min_N_per_mm")],
     [`mean deflection at ${d.force} N, \u00b5m`, figure("mean_deflection_um", 2)], ["program zero X, mm", figure("x_mm", 3)], ["Y, mm", figure("y_mm", 3)], ["Z, mm", figure("z_mm", 3)], ["turned by, degrees", figure("rotation_deg", 3)]];
+  if (columns.some((r) => r.plunge_mean_N_per_mm !== null)) rows.splice(3, 0, ["plunges along the tool axis: mean, N/mm", figure("plunge_mean_N_per_mm")]);
   if (columns.some((r) => r.a_deg || r.b_deg)) rows.push(["tilt A, degrees", figure("a_deg", 3)], ["tilt B, degrees", figure("b_deg", 3)]);
-  if (row.extrapolated_share !== undefined) rows.push(["strut law extrapolated, % of samples", [words(100 * row.extrapolated_share, 1), ...(d.before ? [""] : [])]]);
+  if (row.extrapolated_share !== undefined) rows.push(["strut law extrapolated, % of samples", columns.map((r) => words(100 * r.extrapolated_share, 1))]);
   table.replaceChildren();
   const line = (parent, name, cells, tag) => { const tr = parent.appendChild(document.createElement("tr")); const th = tr.appendChild(document.createElement("th")); th.textContent = name; th.scope = "row"; for (const c of cells) tr.appendChild(document.createElement(tag)).textContent = c; return tr; };
-  line(table.createTHead(), "", d.before ? ["chosen", "original"] : ["chosen"], "th");
+  line(table.createTHead(), "", d.before ? ["shown", "present"] : ["shown"], "th");
   const body = table.createTBody(); for (const [name, cells] of rows) line(body, name, cells, "td");
   const origin = document.createElement("code"), last = body.appendChild(document.createElement("tr")).appendChild(document.createElement("th"));
-  last.colSpan = columns.length + 1; origin.textContent = "--origin " + [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6)).join(","); last.appendChild(origin);
+  last.colSpan = columns.length + 1; origin.textContent = "--origin " + [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6)).join(",") + ` or --pick ${row.number}`; last.appendChild(origin);
 }
 
 // ---------------------------------------------------------------- choosing
@@ -188,17 +195,18 @@ function draw() {
   const place = places[chosen], zoom = zoomed(), size = sizeOf(zoom, before ? [place, before] : [place]);
   drawPlace($("chosen"), place, zoom, size); if (before) drawPlace($("before"), before, zoom, size);
   drawProfile(place); drawFacts(place.row); mark();
-  $("chosen-title").textContent = chosen === d.recommended ? "Recommended placement" : `Placement ${chosen + 1} of ${places.length}`;
+  $("chosen-title").textContent = (chosen === d.recommended ? "Recommended placement, " : chosen === d.chosen ? "Picked placement, " : "Placement ") + `${chosen + 1} of ${places.length}`;
   $("chosen").setAttribute("aria-label", "Path from above, from the front and from the right, coloured by stiffness; " + nameOf(place.row, chosen));
-  $("ramp").style.background = `linear-gradient(to right, ${(dark.matches ? d.colours_dark : d.colours).join(",")})`;
+  $("weak-ramp").style.background = $("ramp").style.background = `linear-gradient(to right, ${(dark.matches ? d.colours_dark : d.colours).join(",")})`;
 }
 function drawAll() { drawFront(); draw(); }
 function choose(i, remember) { chosen = i; if (remember) history.replaceState(null, "", i === d.recommended ? "#recommended" : "#" + (i + 1)); draw(); }
+$("weak-low").textContent = words(weakEnds[0]); $("weak-high").textContent = words(weakEnds[1]);
 // #recommended or #7, the seventh of the front; a zoom may follow: #7,workspace
 function fromAddress() {
   const [name, zoom] = location.hash.slice(1).split(","), i = name === "recommended" ? d.recommended : Number(name) - 1;
   for (const radio of document.querySelectorAll("input[name=zoom]")) if (radio.value === zoom) radio.checked = true;
-  choose(Number.isInteger(i) && i >= 0 && i < places.length ? i : d.recommended, false);
+  choose(Number.isInteger(i) && i >= 0 && i < places.length ? i : d.chosen, false);
 }
 const scaleDigits = digitsOf([0, (d.scale[1] - d.scale[0]) / 30]);
 $("low").textContent = (d.beyond[0] ? "\u2264 " : "") + words(d.scale[0], scaleDigits); $("high").textContent = (d.beyond[1] ? "\u2265 " : "") + words(d.scale[1], scaleDigits);

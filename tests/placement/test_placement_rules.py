@@ -1,0 +1,331 @@
+"""What a recommended placement keeps: never worse than now, rapids, margins, strut law, bounds; and `--pick`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.placement.test_placement_search import MODEL, TANGENTIAL, headline_figures, program_of
+from toolpath_stiff.analysis import analyse
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.errors import UnreachableError
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.nc import parse_program
+from toolpath_stiff.path import place
+from toolpath_stiff.placement.batch import Evaluator
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules
+from toolpath_stiff.placement.search import NO_FLOORS, OBJECTIVES, SearchRules, search_placements
+from toolpath_stiff.placement.work_path import telling_path, work_path
+from toolpath_stiff.stiffness.model import build_model
+
+ROOT = Path(__file__).parents[2]
+README_BOUNDS = Bounds(np.array([-0.3, -0.3, 0.4, 0, 0, 0]), np.array([0.3, 0.3, 1.25, 0, 0, 2 * np.pi]))
+PRESENT = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
+NIST = load_machine("nist")
+
+
+def searched(program, bounds=README_BOUNDS, present=PRESENT, step=4e-3, read=None, **asked):
+    path = work_path(program, step, TANGENTIAL, present, read)
+    return search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(**asked), present=np.array(present))
+
+
+@pytest.mark.parametrize("objective", sorted(OBJECTIVES))
+@pytest.mark.parametrize("name", ["pocket", "inch_bracket"])
+def test_never_worse_than_the_present_placement(name, objective):
+    """Told by plain analysis of both placements; the README's own bounds, where a corner was recommended once."""
+    program = program_of(name)
+    found = searched(program, objective=objective)
+    best = analyse(NIST, program, origin=tuple(found.front[found.best]), step=4e-3)
+    before = analyse(NIST, program, origin=PRESENT, step=4e-3)
+    now, then = headline_figures(best), headline_figures(before)
+    assert now["mean_N_per_mm"] >= then["mean_N_per_mm"]
+    assert now["range_N_per_mm"] <= then["range_N_per_mm"]
+    assert now["min_N_per_mm"] >= then["min_N_per_mm"]
+    assert best.at.reachable.all()  # rapids too
+    assert not best.warnings
+    assert not best.at.extrapolated[best.samples.cutting].any()
+    goal = Goal(OBJECTIVES[objective], NO_FLOORS)
+    no_worse = (found.figures.objectives >= found.present.objectives).all(axis=1)
+    assert goal.value(found.best_figures)[0] >= goal.value(found.figures)[no_worse].max() - 1e-6
+
+
+def test_the_present_placement_stays_where_nothing_is_better():
+    """Only a turn may vary about the axis of a round part: one must not pay for a difference that is none."""
+    bounds = Bounds(np.array(PRESENT), np.array([0.0, 0.0, 0.8, 0.0, 0.0, 0.1]))
+    found = searched(program_of("inch_bracket"), bounds)
+    assert (found.best_figures.objectives >= found.present.objectives - 1e-9 * found.present.mean[0]).all()
+
+
+def test_what_must_give_way_is_said_first(tmp_path, capsys):
+    out = tmp_path / "out"
+    command = ["place", str(ROOT / "programs/pocket.nc"), "--x", "100:300", "--y=-300:300", "--z", "400:700"]
+    assert main([*command, "--rotate", "0", "--step", "4", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    summary = json.loads((out / "placement.json").read_text())
+    assert {row["figure"] for row in summary["worse"]} == {"mean", "range", "weakest"}
+    for row, line in zip(summary["worse"], printed, strict=False):
+        assert line.startswith("warning         WORSE")
+        assert f"{row['chosen_N_per_mm']:.0f} instead of {row['before_N_per_mm']:.0f} N/mm" in line
+        sign = -1.0 if row["figure"] == "range" else 1.0
+        assert row["worse_by_N_per_mm"] == pytest.approx(sign * (row["before_N_per_mm"] - row["chosen_N_per_mm"]))
+    # The present placement lies outside; the hints to widen are options of the command itself.
+    hints = [text for text in summary["warnings"] if "widen it with" in text]
+    assert any("--x=0:300" in text for text in hints) and any("--z=400:850" in text for text in hints)
+    # What warns, warns everywhere.
+    page = (out / "report.html").read_text()
+    for text in summary["warnings"]:
+        assert f"<li>{text}</li>" in page
+        assert f"warning         {text}" in printed
+    if shutil.which("pdftotext"):
+        done = subprocess.run(["pdftotext", str(out / "setup.pdf"), "-"], capture_output=True, text=True, check=True)
+        told = " ".join(done.stdout.split())
+        for text in summary["warnings"]:
+            assert text[:60] in told
+
+
+def test_least_worse_is_found_where_all_are_worse():
+    """The largest loss of the recommendation is no larger than that of any of 3,000 placements at random."""
+    bounds = Bounds(np.array([0.1, -0.3, 0.4, 0, 0, 0]), np.array([0.3, 0.3, 0.7, 0, 0, 0]))
+    program = program_of("pocket")
+    found = searched(program, bounds)
+    evaluator = Evaluator(MODEL, work_path(program, 4e-3), TANGENTIAL, 1000.0)
+    unit = np.random.default_rng(11).uniform(size=(3000, len(bounds.free)))
+    others = evaluator.figures(bounds.placements(unit)).objectives
+    loss = np.nanmin((found.present.objectives - others).max(axis=1))
+    assert (found.present.objectives - found.best_figures.objectives).max() <= loss
+
+
+def test_a_rapid_is_a_constraint_like_a_cut():
+    """A retract 700 mm above the part: cuts alone would let it rise out of the machine."""
+    text = "G21 G90 F500\nG0 X0 Y0\nG0 Z700\nG0 Z5\nG1 Z0\nG1 X40\nG1 Y30\nG1 X0 Y0\nG0 Z700\nM2\n"
+    program = parse_program(text, "high.nc")
+    found = searched(program, objective="mean")
+    assert (found.figures.rapid_margin >= 0.01).all()
+    for placement in (found.front[found.best], found.front[0], found.front[-1]):
+        assert analyse(NIST, program, origin=tuple(placement), step=4e-3).at.reachable.all()
+    # It does bind: without the rapids the search goes higher.
+    low = parse_program(text.replace("Z700", "Z6"), "low.nc")
+    assert searched(low, objective="mean").front[:, 2].max() > found.front[:, 2].max() + 0.05
+
+
+def test_the_first_rapid_starts_where_the_control_stands_now():
+    program = program_of("pocket")
+    path = work_path(program, 4e-3, TANGENTIAL, PRESENT)
+    anchored = path.anchored
+    turn = np.eye(3)[None]
+    here = anchored.placed(turn, np.array([PRESENT[:3]]))[0]
+    there = anchored.placed(turn, np.array([[0.2, 0.1, 1.0]]))[0]
+    at_start = np.flatnonzero((anchored.u == 0.0) & ~anchored.follows[0].any(axis=1))
+    assert len(at_start)
+    np.testing.assert_allclose(there[at_start], here[at_start])
+    np.testing.assert_allclose(here[at_start], np.tile(PRESENT[:3], (len(at_start), 1)))
+    # X and Y before Z: a point over the new place at the old height.
+    assert (np.linalg.norm(there - [0.2, 0.1, 0.8], axis=1) < 1e-12).any()
+
+
+def homing(reference: str):
+    text = f"{reference}G21 G90 F500\nG0 X0 Y0 Z50\nG0 Z5\nG1 Z0\nG1 X40\nG1 Y30\nG1 X0 Y0\nG0 Z50\n"
+
+    def read(origin):
+        return parse_program(text + "G53 G0 Z1300\nG53 G0 X0 Y0\nM2\n", "home.nc", origin=origin)
+
+    return read
+
+
+def test_axes_in_machine_coordinates_stay_where_they_are():
+    """Held against the program read anew for the placement: every anchored sample lies on the control's own line."""
+    read = homing("")
+    program = read(PRESENT)
+    anchored = work_path(program, 4e-3, TANGENTIAL, PRESENT, read).anchored
+    there = (0.1, -0.05, 0.9, 0.0, 0.0, 0.5)
+    c, s = np.cos(0.5), np.sin(0.5)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])[None]
+    position = anchored.placed(turn, np.array([there[:3]]))[0]
+    moves = place(read(there).moves, there)
+    for line in (9, 10):
+        row = int(np.flatnonzero(moves.line == line)[0])
+        start, end = moves.start[row, :3], moves.end[row, :3]
+        some = anchored.line == line
+        assert some.any()
+        expected = start + anchored.u[some, None] * (end - start)
+        np.testing.assert_allclose(position[some], expected, atol=1e-9)
+    assert moves.end[-1, 2] == pytest.approx(1.3)
+
+
+def test_a_homing_rapid_that_no_placement_mends_is_named_and_no_constraint(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = "G21 G90 F500\nG0 X0 Y0 Z50\nG0 Z5\nG1 Z0\nG1 X40\nG1 Y30\nG1 X0 Y0\nG0 Z50\nG53 G0 Z2500\nM2\n"
+    Path("home.nc").write_text(text)
+    command = ["place", "home.nc", "--x=-100:100", "--y=-100:100", "--z", "700:1000", "--step", "5", "--out", "out"]
+    assert main([*command, "--no-plots"]) == 0
+    summary = json.loads(Path("out/placement.json").read_text())
+    assert [rapid["line"] for rapid in summary["search"]["unmended_rapids"]] == [9]
+    assert any(
+        text.startswith("line 9: no placement within the bounds keeps this rapid") for text in summary["warnings"]
+    )
+    assert "line 9: no placement" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("margin", [0.01, 0.2])
+def test_margins_are_kept_by_cuts_and_rapids(margin):
+    bounds = Bounds(np.array([-0.5, -0.5, 0.6, 0, 0, 0]), np.array([0.5, 0.5, 1.4, 0, 0, 0]))
+    found = searched(program_of("case_study"), bounds, margin=margin, allow_extrapolation=True)
+    assert found.figures.margin.min() >= margin
+    assert found.figures.rapid_margin.min() >= margin
+
+
+def test_a_margin_that_cannot_be_had_is_one_error():
+    with pytest.raises(UnreachableError, match=r"margin of .* --margin 49"):
+        searched(program_of("case_study"), margin=0.49)
+
+
+def test_a_present_placement_with_less_margin_is_told(tmp_path, capsys):
+    command = ["place", str(ROOT / "programs/pocket.nc"), "--origin", "0,0,1480", "--x=-100:100", "--y=-100:100"]
+    command += ["--z", "900:1480", "--rotate", "0", "--step", "5", "--no-plots", "--out", str(tmp_path), "--margin"]
+    assert main([*command, "15"]) == 0
+    summary = json.loads((tmp_path / "placement.json").read_text())
+    least = min(summary["before"]["extrapolated_share"], 1.0)
+    assert summary["chosen"]["extrapolated_share"] <= least
+    assert any("present placement has a margin of" in text for text in summary["warnings"])
+    assert min(row["margin"] for row in summary["front"]) >= 0.15
+
+
+def test_no_larger_share_outside_the_strut_law_unless_allowed():
+    """High up the struts are shorter than the law was measured at, and stiffer by extrapolation."""
+    bounds = Bounds(np.array([-0.3, -0.3, 0.8, 0, 0, 0]), np.array([0.3, 0.3, 1.4, 0, 0, 2 * np.pi]))
+    program = program_of("three_tools")
+    kept = searched(program, bounds, objective="mean")
+    assert kept.present.extrapolated[0] == 0.0
+    assert (kept.figures.extrapolated == 0.0).all()
+    allowed = searched(program, bounds, objective="mean", allow_extrapolation=True)
+    assert allowed.figures.extrapolated.max() > 0.0
+    assert allowed.figures.mean.max() > kept.figures.mean.max()
+
+
+def test_a_climb_ends_no_lower_than_nelder_mead():
+    """An independent way up, scipy's simplex search from the same place: each may end on another kink, within 1 %."""
+    from scipy.optimize import minimize
+
+    path = telling_path(work_path(program_of("pocket"), 5e-3, TANGENTIAL, PRESENT), 150)
+    evaluator = Evaluator(MODEL, path, TANGENTIAL, 1000.0)
+    climber = Climber(evaluator, README_BOUNDS, Rules(0.01))
+    goal = Goal(OBJECTIVES["balanced"], NO_FLOORS)
+    for first in ([0.1, 0.05, 0.9, 0, 0, 1.0], [-0.05, 0.1, 1.0, 0, 0, 4.0]):
+        ours = climber.climb(np.array(first, dtype=float), goal, 40, evaluations=100)
+
+        def loss(unit):
+            return -float(goal.value(evaluator.figures(README_BOUNDS.placements(unit[None])))[0]) / 1e6
+
+        start = README_BOUNDS.unit(np.array([first], dtype=float))[0]
+        theirs = minimize(loss, start, method="Nelder-Mead", options={"maxfev": 500})
+        assert goal.value(evaluator.figures(ours[None]))[0] / 1e6 >= -0.99 * theirs.fun
+
+
+SEARCH = ["--x=-100:100", "--y=-100:100", "--z", "700:1100", "--step", "5", "--points", "12", "--no-plots"]
+
+
+@pytest.fixture
+def earlier(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROOT / "programs/pocket.nc", "part.nc")
+    assert main(["place", "part.nc", *SEARCH, "--out", "out"]) == 0
+    capsys.readouterr()
+    return json.loads(Path("out/placement.json").read_text())
+
+
+def test_pick_takes_a_point_of_the_front_without_a_search(earlier, monkeypatch, capsys):
+    from toolpath_stiff.placement import placing
+
+    def never(*_, **__):
+        raise AssertionError("searched again")
+
+    monkeypatch.setattr(placing, "search_placements", never)
+    number = 1 if earlier["recommended"]["number"] != 1 else 2
+    command = ["place", "part.nc", *SEARCH, "--out", "out", "--pick", str(number), "--write", "placed.nc"]
+    assert main([*command, "--decimals", "7"]) == 0
+    summary = json.loads(Path("out/placement.json").read_text())
+    row = earlier["front"][number - 1]
+    assert summary["picked"] and summary["chosen"]["number"] == number
+    assert summary["front"] == earlier["front"] and summary["recommended"] == earlier["recommended"]
+    assert f"Z{row['z_mm']:.4f}".rstrip("0").rstrip(".") in summary["offset_blocks"]["linuxcnc"]
+    again = analyse(NIST, parse_program(Path("placed.nc").read_text(), "placed.nc"), origin=PRESENT, step=5e-3)
+    assert headline_figures(again)["mean_N_per_mm"] == pytest.approx(row["mean_N_per_mm"], rel=1e-6)
+    printed = capsys.readouterr().out
+    assert f"placement {number} of {len(earlier['front'])}, picked" in printed
+    # From the picked one's own folder another may be picked.
+    assert main(["place", "part.nc", *SEARCH, "--out", "out", "--pick", str(earlier["recommended"]["number"])]) == 0
+    back = json.loads(Path("out/placement.json").read_text())
+    assert back == earlier
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--pick", "99"], "--pick 99"),
+        (["--pick", "0"], "--pick 0"),
+        (["--pick", "2", "--margin", "2"], "differs in --margin"),
+        (["--pick", "2", "--objective", "mean"], "differs in --objective"),
+        (["--pick", "2", "--x=-50:50"], "differs in --x"),
+        (["--pick", "2", "--origin", "0,0,850"], "differs in --origin"),
+        (["--pick", "2", "--machine", "softer.toml"], "differs in machine"),
+    ],
+)
+def test_pick_refuses_another_search(earlier, capsys, change, words):
+    toml = (ROOT / "toolpath_stiff/data/machines/nist.toml").read_text()
+    Path("softer.toml").write_text(toml.replace("[46.5, 32.5]", "[46.0, 32.0]"))
+    before = Path("out/placement.json").read_bytes()
+    assert main(["place", "part.nc", *SEARCH, "--out", "out", *change]) == 2
+    assert words in capsys.readouterr().err
+    assert Path("out/placement.json").read_bytes() == before
+
+
+def test_pick_refuses_a_changed_program(earlier, capsys):
+    text = Path("part.nc").read_text()
+    Path("part.nc").write_text(text.replace("X60. Y30.", "X60. Y30. (CHANGED)"))
+    assert Path("part.nc").read_text() != text
+    assert main(["place", "part.nc", *SEARCH, "--out", "out", "--pick", "1"]) == 2
+    assert "differs in program" in capsys.readouterr().err
+
+
+def test_a_program_that_only_plunges_says_so(tmp_path, capsys):
+    part = tmp_path / "holes.nc"
+    part.write_text("G21 G90 F200\nG0 X0 Y0 Z5\nG81 X0 Y0 Z-5 R2\nX40\nY30\nG80\nM2\n")
+    command = ["place", str(part), "--x=-50:50", "--y=-50:50", "--z", "700:900", "--rotate", "0", "--no-plots"]
+    assert main([*command, "--out", str(tmp_path / "out")]) == 0
+    assert "the program only plunges along the tool axis" in capsys.readouterr().out
+
+
+def test_effects_are_placed_by_the_plain_analysis(tmp_path):
+    """A model with an effect takes the other route; its figures are those of `analyse`."""
+    from toolpath_stiff.machine.model import EffectEntry
+
+    machine = NIST.with_changes(effects=(EffectEntry("platform_flexibility", {"bar_stiffness_N_per_m": 2e8}),))
+    model = build_model(machine)
+    program = program_of("inch_bracket")
+    placement = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7]])
+    found = Evaluator(model, work_path(program, 4e-3), TANGENTIAL, 1000.0).figures(placement)
+    wanted = headline_figures(analyse(model, program, origin=tuple(placement[0]), step=4e-3))
+    assert found.mean[0] / 1e3 == pytest.approx(wanted["mean_N_per_mm"], rel=1e-9)
+    assert found.spread[0] / 1e3 == pytest.approx(wanted["range_N_per_mm"], rel=1e-9)
+
+
+@pytest.mark.parametrize("load", ["normal", "softest", "radial", "axial", "x", "1,1,0.5"])
+def test_other_loads_are_those_of_the_plain_analysis(load):
+    from toolpath_stiff.analysis import parse_load
+
+    program, direction = program_of("tilted_five_axis"), parse_load(load)
+    placements = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7], [0.0, 0.05, 0.8, 0.05, -0.03, 0.2]])
+    found = Evaluator(MODEL, work_path(program, 4e-3, direction), direction, 1000.0).figures(placements)
+    for i, placement in enumerate(placements):
+        analysis = analyse(MODEL, program, origin=tuple(placement), step=4e-3, load=direction)
+        k = analysis.at.stiffness[analysis.counted]
+        assert found.lowest[i] == pytest.approx(k.min(), rel=1e-9)
+        assert found.mean[i] == pytest.approx(
+            np.average(k, weights=analysis.samples.weight[analysis.counted]), rel=1e-9
+        )
+        assert found.margin[i] == pytest.approx(analysis.at.margin[analysis.samples.cutting].min(), rel=1e-9)

@@ -1,0 +1,332 @@
+"""Climbing from one placement: a sequence of linear programmes within a trust region.
+
+Range and weakest place are extremes over samples and have kinks where two samples are equally stiff, which is where
+their best values lie. Linearised sample by sample they are constraints of a linear programme (the epigraph form:
+L <= k_i <= H for all i), and so are the limits and what must not get worse. Its solution is tried; where the figures
+did not follow, the trust region shrinks (Fletcher, Practical Methods of Optimization, 1987, section 14.4, exact penalty
+functions; here with one shared slack for all constraints, so that there is always a solution).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.placement.batch import Evaluator, PlacedRows, PlacementFigures
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+DIFFERENCE = 1e-6  # of each range, for the derivatives
+PENALTY = 100.0  # what a shortfall costs, in units of the objective
+INSIDE = 1e-6  # of the mean stiffness, and of a limit's span: constraints are met with this to spare
+SMALLEST_REGION = 1e-5  # of each range
+SMALLEST_GAIN = 1e-9  # of the mean stiffness
+WORTH_A_RESTART = 1e-5  # of the mean stiffness: with a region as wide as at first, which kinks may have closed early
+SIMPLEX = 0.01  # of each range, size of the first simplex
+SLACKEST = 1e3
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What the search may vary. SI.
+
+    `low`, `high` (6,): x, y, z in m, A, B, C in rad; equal where fixed. `heights`: the only z allowed, or empty.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    heights: tuple[float, ...] = ()
+
+    @property
+    def free(self) -> NDArray[np.int64]:
+        """Columns of a placement that vary."""
+        return np.flatnonzero(self.high > self.low)
+
+    @property
+    def round(self) -> BoolArray:
+        """(6,) turns that go all the way round, and so have no end."""
+        angle = np.arange(6) == 5
+        return np.asarray(angle & (self.high - self.low >= 2.0 * np.pi - 1e-9))
+
+    def placements(self, unit: FloatArray) -> FloatArray:
+        """Placements (k, 6) of points (k, free) of the unit cube; a whole turn goes round."""
+        placements = np.repeat(self.low[None], len(unit), axis=0)
+        free = self.free
+        inside = np.where(self.round[free], np.mod(unit, 1.0), np.clip(unit, 0.0, 1.0))
+        placements[:, free] = self.low[free] + inside * (self.high - self.low)[free]
+        if self.heights:
+            heights = np.array(self.heights)
+            nearest = np.abs(placements[:, 2, None] - heights).argmin(axis=1)
+            placements[:, 2] = heights[nearest]
+        return placements
+
+    def unit(self, placements: FloatArray) -> FloatArray:
+        """Points (k, free) of the unit cube of placements (k, 6)."""
+        free = self.free
+        return np.asarray((placements[:, free] - self.low[free]) / (self.high - self.low)[free])
+
+    def holds(self, placement: FloatArray) -> bool:
+        """Whether a placement (6,) lies within; the turn counts modulo a whole one."""
+        apart = np.mod(placement[5] - self.low[5] + 1e-9, 2.0 * np.pi) - 1e-9
+        inside = (placement >= self.low - 1e-9) & (placement <= self.high + 1e-9)
+        inside[5] = apart <= self.high[5] - self.low[5] + 1e-9
+        on_a_height = not self.heights or bool(np.abs(np.array(self.heights) - placement[2]).min() < 1e-9)
+        return bool(inside.all()) and on_a_height
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a placement has to keep.
+
+    Attributes
+    ----------
+    margin
+        Smallest margin to any limit, as a share of its span; cuts and rapids alike.
+    extrapolated
+        Largest share of samples outside the strut law; inf: any.
+    """
+
+    margin: float = 0.0
+    extrapolated: float = np.inf
+
+    def violation(self, figures: PlacementFigures) -> FloatArray:
+        """(k,) how far placements are from keeping the rules; 0 where they are kept."""
+        shortfalls = [self.margin - figures.margin, self.margin - figures.rapid_margin, -figures.clearance]
+        shortfalls.append(figures.extrapolated - self.extrapolated - 1e-12)
+        return np.asarray(np.maximum(np.max(shortfalls, axis=0), 0.0))
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is to be raised: `weights` . (mean, -range, weakest), N/m, none of them below `floors`.
+
+    `weights` None: the smallest surplus over the floors, which may be negative.
+    """
+
+    weights: tuple[float, float, float] | None
+    floors: FloatArray
+
+    def value(self, figures: PlacementFigures) -> FloatArray:
+        """(k,) N/m, -inf where the figures do not exist."""
+        if self.weights is None:
+            value = (figures.objectives - self.floors).min(axis=1)
+        else:
+            value = figures.objectives @ np.array(self.weights)
+        return np.asarray(np.where(np.isnan(value), -np.inf, value))
+
+    def worsening(self, figures: PlacementFigures) -> FloatArray:
+        """(k,) N/m, the largest fall below a floor; 0 if there is none."""
+        if self.weights is None:
+            return np.zeros(len(figures))
+        below = np.maximum((self.floors - figures.objectives).max(axis=1), 0.0)
+        return np.asarray(np.where(np.isnan(below), np.inf, below))
+
+
+@dataclass(frozen=True)
+class Climber:
+    """One evaluator, the bounds and the rules that a climb keeps."""
+
+    evaluator: Evaluator
+    bounds: Bounds
+    rules: Rules
+
+    @property
+    def free(self) -> NDArray[np.int64]:
+        """Columns that a climb may vary: a height from a list stays."""
+        free = self.bounds.free
+        return free[free != 2] if self.bounds.heights else free
+
+    def climb(
+        self, first: FloatArray, goal: Goal, steps: int, region: float = 0.05, evaluations: int = 0
+    ) -> FloatArray:
+        """The best placement (6,) on the way up from `first` (6,): rules first, then floors, then value.
+
+        Linear programmes follow the kinks quickly, and creep where the figures are curved along one: a simplex search
+        (Nelder and Mead, 1965) of so many `evaluations` may end the climb.
+        """
+        if not len(self.free):
+            return first
+        found = self._programmes(first, goal, steps, region)
+        return self._simplex(found, goal, evaluations) if evaluations else found
+
+    def _simplex(self, first: FloatArray, goal: Goal, evaluations: int) -> FloatArray:
+        from scipy.optimize import minimize
+
+        best, best_rank = first, self._rank(self.evaluator.rows(first[None]), goal)
+
+        def loss(step: FloatArray) -> float:
+            nonlocal best, best_rank
+            there = self._moved(first, step)
+            rows = self.evaluator.rows(there[None])
+            rank = self._rank(rows, goal)
+            if rank > best_rank:
+                best, best_rank = there, rank
+            return -self._merit(rows, goal)
+
+        d = len(self.free)
+        simplex = np.vstack([np.zeros(d), SIMPLEX * np.diag(self._inwards(first))])
+        minimize(
+            loss,
+            np.zeros(d),
+            method="Nelder-Mead",
+            options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-6, "fatol": SMALLEST_GAIN},
+        )
+        return best
+
+    def _inwards(self, placement: FloatArray) -> FloatArray:
+        """(free,) 1 or -1, the sense that leads away from the nearer bound."""
+        middle = 0.5 * (self.bounds.low + self.bounds.high)
+        return np.where(placement[self.free] > middle[self.free], -1.0, 1.0)
+
+    def _programmes(self, first: FloatArray, goal: Goal, steps: int, region: float) -> FloatArray:
+        here, rows = first, self.evaluator.rows(first[None])
+        merit = self._merit(rows, goal)
+        best, best_rank = first, self._rank(rows, goal)
+        gradient, began, first_region = None, merit, region
+        for _ in range(steps):
+            if gradient is None:
+                gradient = self._gradient(here, rows)
+            step = self._step(here, rows, gradient, goal, region)
+            there = self._moved(here, step)
+            tried = self.evaluator.rows(there[None])
+            gained, rank = self._merit(tried, goal), self._rank(tried, goal)
+            if rank > best_rank:
+                best, best_rank = there, rank
+            taken = float(np.abs(step).max())
+            if gained > merit + SMALLEST_GAIN:
+                region = min(2.0 * region, 0.25) if taken > 0.9 * region else region
+                here, rows, merit, gradient = there, tried, gained, None
+            else:
+                region = 0.4 * min(region, max(taken, SMALLEST_REGION))
+            if region < SMALLEST_REGION:
+                if merit - began < WORTH_A_RESTART:
+                    break
+                began, region = merit, first_region
+        return best
+
+    def _rank(self, rows: PlacedRows, goal: Goal) -> tuple[float, float, float]:
+        figures = self.evaluator.summary(rows)
+        worse = float(goal.worsening(figures)[0])
+        return (-float(self.rules.violation(figures)[0]), -worse, float(goal.value(figures)[0]))
+
+    def _merit(self, rows: PlacedRows, goal: Goal) -> float:
+        """Value less penalties, in units of the path's mean stiffness at this machine's scale."""
+        violated, worse, value = self._rank(rows, goal)
+        if not np.isfinite(value) or not np.isfinite(worse):
+            return -1e3 + violated
+        scale = float(np.nanmean(rows.stiffness))
+        return (value + PENALTY * worse) / scale + PENALTY * violated
+
+    def _moved(self, placement: FloatArray, step: FloatArray) -> FloatArray:
+        """A placement moved by a step (free,) of the ranges; a whole turn is brought back when the climb ends."""
+        span = (self.bounds.high - self.bounds.low)[self.free]
+        moved = placement.copy()
+        moved[self.free] += step * span
+        held = self.free[~self.bounds.round[self.free]]
+        moved[held] = np.clip(moved[held], self.bounds.low[held], self.bounds.high[held])
+        if self.bounds.round[5]:
+            moved[5] = self.bounds.low[5] + np.mod(moved[5] - self.bounds.low[5], 2.0 * np.pi)
+        return moved
+
+    def _gradient(self, here: FloatArray, rows: PlacedRows) -> PlacedRows:
+        """Derivatives of every row along each free column: arrays (free, samples), per unit of the range."""
+        span = (self.bounds.high - self.bounds.low)[self.free]
+        sign = self._inwards(here)
+        around = np.repeat(here[None], len(self.free), axis=0)
+        around[np.arange(len(self.free)), self.free] += sign * DIFFERENCE * span
+        found = self.evaluator.rows(around)
+        names = ("stiffness", "law", "margin", "clearance")
+        with np.errstate(invalid="ignore"):
+            return PlacedRows(
+                **{n: (getattr(found, n) - getattr(rows, n)) / (sign * DIFFERENCE)[:, None] for n in names}
+            )
+
+    def _step(self, here: FloatArray, rows: PlacedRows, gradient: PlacedRows, goal: Goal, region: float) -> FloatArray:
+        """(free,) the linear programme's step within the region; variables step, L, H, t, slack."""
+        from scipy.optimize import linprog
+
+        d = len(self.free)
+        matrix, right = self._constraints(rows, gradient, goal, region)
+        cost = np.zeros(d + 4)
+        weight = self.evaluator.path.weight[self.evaluator.path.headline]
+        slope = self._stiffness(rows, gradient)[1] @ weight / weight.sum()
+        if goal.weights is None:
+            cost[d + 2] = -1.0
+        else:
+            w_mean, w_range, w_low = goal.weights
+            cost[:d] = -w_mean * slope
+            cost[d], cost[d + 1] = -w_low - w_range, w_range
+        cost[d + 3] = PENALTY
+        span = (self.bounds.high - self.bounds.low)[self.free]
+        room = [(here[i] - self.bounds.low[i], self.bounds.high[i] - here[i]) for i in self.free]
+        box = [
+            (-region, region) if self.bounds.round[i] else (max(-region, -below / s), min(region, above / s))
+            for i, s, (below, above) in zip(self.free, span, room, strict=True)
+        ]
+        limits = [*box, (None, None), (None, None), (None, None), (0.0, SLACKEST)]
+        found = linprog(cost, matrix, right, bounds=limits, method="highs")
+        return np.asarray(found.x[:d]) if found.x is not None else np.zeros(d)
+
+    def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray]:
+        """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean."""
+        head = self.evaluator.path.headline
+        values = rows.stiffness[0, head]
+        scale = float(np.mean(values))
+        if not np.isfinite(scale):  # a cut out of reach: no figures, the limits alone guide
+            return np.ones(len(values)), np.zeros((len(self.free), len(values)))
+        return values / scale, np.nan_to_num(gradient.stiffness[:, head] / scale)
+
+    def _constraints(
+        self, rows: PlacedRows, gradient: PlacedRows, goal: Goal, region: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """A x <= b in the variables step, L, H, t, slack; rows that cannot bind within the region are left out."""
+        d = len(self.free)
+        k, g = self._stiffness(rows, gradient)
+        reach = region * np.abs(g).sum(axis=0)
+        low, high = (k - reach <= (k + reach).min()), (k + reach >= (k - reach).max())
+        blocks = [_block(-g[:, low], [1.0, 0.0, 0.0, 0.0]), _block(g[:, high], [0.0, -1.0, 0.0, 0.0])]
+        rights = [k[low], -k[high]]
+        for values, slopes, least in self._kept(rows, gradient):
+            near = values - region * np.abs(slopes).sum(axis=0) < least + INSIDE
+            blocks.append(_block(-slopes[:, near], [0.0, 0.0, 0.0, -1.0]))
+            rights.append(values[near] - least - INSIDE)
+        raw = self.evaluator.path.weight[self.evaluator.path.headline]
+        weight = raw / raw.sum()
+        scale = float(np.nanmean(rows.stiffness))
+        floors = (goal.floors / scale) + (0.0 if goal.weights is None else INSIDE)
+        soft = (1.0, 0.0) if goal.weights is None else (0.0, -1.0)  # the common surplus t, or the slack
+        if np.isfinite(scale):
+            if np.isfinite(floors[0]):
+                blocks.append(np.array([[*(-(g @ weight)), 0.0, 0.0, *soft]]))
+                rights.append(np.array([float(k @ weight) - floors[0]]))
+            if np.isfinite(floors[1]):
+                blocks.append(np.array([[*np.zeros(d), -1.0, 1.0, *soft]]))
+                rights.append(np.array([-floors[1]]))
+            if np.isfinite(floors[2]):
+                blocks.append(np.array([[*np.zeros(d), -1.0, 0.0, *soft]]))
+                rights.append(np.array([-floors[2]]))
+        blocks.append(np.array([[*np.zeros(d), 1.0, -1.0, 0.0, 0.0], [*np.zeros(d + 2), 1.0, 0.0]]))
+        return np.concatenate(blocks), np.concatenate([*rights, [0.0, SLACKEST]])
+
+    def _kept(self, rows: PlacedRows, gradient: PlacedRows) -> list[tuple[FloatArray, FloatArray, float]]:
+        """Values, derivatives and least value of what the rules keep, sample by sample."""
+        kept = [(rows.margin[0], gradient.margin, self.rules.margin)]
+        if self.evaluator.keepouts:
+            kept.append((rows.clearance[0], gradient.clearance, 0.0))
+        cutting = self.evaluator.path.cutting
+        law = rows.law[0, cutting]
+        if np.isfinite(self.rules.extrapolated) and len(law):
+            inside = law >= 0.0
+            # With room for more samples outside the law none is held; a trial that takes too many is refused.
+            if np.mean(~inside) >= 0.98 * self.rules.extrapolated:
+                kept.append((law[inside], gradient.law[:, cutting][:, inside], 0.0))
+        return kept
+
+
+def _block(slopes: FloatArray, rest: list[float]) -> FloatArray:
+    """Rows (n, free + 4) of one kind of constraint from derivatives (free, n)."""
+    n = slopes.shape[1]
+    return np.concatenate([slopes.T, np.tile(np.array(rest), (n, 1))], axis=1)

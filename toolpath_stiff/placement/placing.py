@@ -1,0 +1,233 @@
+"""A program placed: search or an earlier search's front, one placement chosen, analysed, and everything said about it.
+
+`place_program` searches; `place_again` takes another point of a front that was found before. Both return `Placed`,
+which the command line saves and prints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis import Analysis, analyse
+from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.machine.model import Pose
+from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.placement.advice import placement_warnings, worsened
+from toolpath_stiff.placement.batch import Evaluator, PlacementFigures
+from toolpath_stiff.placement.climb import Bounds
+from toolpath_stiff.placement.fingerprint import fingerprint, refuse_other_search
+from toolpath_stiff.placement.report_data import (
+    FIGURES,
+    figures_of,
+    front_rows,
+    placement_of,
+    placement_row,
+    placement_summary,
+    pose_of,
+)
+from toolpath_stiff.placement.rewrite import check_decimals, check_rewritable, rewrite_program, rewriting_differences
+from toolpath_stiff.placement.search import SearchRules, search_placements
+from toolpath_stiff.placement.work_path import Read, WorkPath, work_path
+from toolpath_stiff.stiffness.model import StiffnessModel
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rewriting:
+    """How the program itself is to be written: its file's name, decimals, chords (m), and what it was read with."""
+
+    file: str
+    decimals: int | None
+    linearise: float | None
+    reading: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be placed, and how. SI.
+
+    Attributes
+    ----------
+    model, program
+        Machine and effects; the program as read where its zero sits now.
+    present
+        Where that is.
+    read
+        Reads the program for another zero: moves to machine coordinates depend on it.
+    bounds, rules
+        What may vary; what a placement must keep and be good at.
+    load, step, force
+        As `analyse` takes them.
+    rewriting
+        Whether and how the program itself is written; None: not.
+    """
+
+    model: StiffnessModel
+    program: Program
+    present: Pose
+    read: Read
+    bounds: Bounds
+    rules: SearchRules
+    load: Load
+    step: float
+    force: float
+    rewriting: Rewriting | None = None
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A program at the chosen placement.
+
+    Attributes
+    ----------
+    task
+        What was asked.
+    summary
+        Everything in the shop's units, as `placement.json` has it.
+    best, before
+        Analyses at the chosen and at the present placement; `before` None where that is out of reach.
+    program
+        As read for the chosen placement.
+    rewritten
+        Bytes of the transformed program; None unless asked for.
+    """
+
+    task: Task
+    summary: dict[str, Any]
+    best: Analysis
+    before: Analysis | None
+    program: Program
+    rewritten: bytes | None
+
+
+def place_program(task: Task, progress: Callable[[int, int], None] | None = None) -> Placed:
+    """Search, and place the program where the search recommends.
+
+    Raises
+    ------
+    InputError
+        The program cannot be placed, or not be written there (before the search where that can be seen).
+    UnreachableError
+        No placement keeps the limits.
+    """
+    check_task(task)
+    path = _path(task)
+    found = search_placements(
+        task.model,
+        path,
+        task.load,
+        task.bounds,
+        task.rules,
+        force=task.force,
+        present=np.array(task.present),
+        progress=progress,
+    )
+    rows = front_rows(task.model, path, task.load, found, task.force)
+    search = {
+        **fingerprint(task),
+        "recommended": found.best + 1,
+        "unmended_rapids": [{"line": line, "reason": reason} for line, reason in found.unmended],
+        "pose_evaluations": found.pose_evaluations,
+    }
+    assert found.present is not None
+    return _placed(task, rows, search, found.best + 1, found.present)
+
+
+def place_again(task: Task, earlier: dict[str, Any], number: int) -> Placed:
+    """Place the program at point `number` (from 1) of the front in an earlier `placement.json`, without a search.
+
+    Raises
+    ------
+    InputError
+        The earlier search was another one's (program, machine or options differ), or has no such point.
+    """
+    check_task(task)
+    refuse_other_search(task, earlier)
+    rows = earlier["front"]
+    if not 1 <= number <= len(rows):
+        raise InputError(f"--pick {number}", expected=f"1 to {len(rows)}, the points of the front in placements.csv")
+    path = _path(task)
+    evaluator = Evaluator(task.model, path, task.load, task.force, task.rules.keepouts)
+    placed = _placed(task, rows, earlier["search"], number, evaluator.figures(np.array([task.present])))
+    row, again = rows[number - 1], placed.summary["chosen"]
+    if any(abs(row[key] - again[key]) > 1e-6 * abs(row["mean_N_per_mm"]) for key in FIGURES.values()):
+        raise InputError(
+            f"--pick {number}: the figures of this point have changed since the search (the model is another one)",
+            hint="search again, without --pick",
+        )
+    return placed
+
+
+def check_task(task: Task) -> None:
+    """Raise `InputError` for what can be told before a search."""
+    writing, program = task.rewriting, task.program
+    if writing is None:
+        return
+    check_decimals(writing.decimals)
+    check_rewritable(program)
+    if program.interpreter != "builtin":
+        raise InputError(
+            f"--write {writing.file}: {program.name} was read by LinuxCNC's interpreter; its blocks cannot be "
+            "rewritten",
+            hint="leave --write out and set the work offset",
+        )
+
+
+def _path(task: Task) -> WorkPath:
+    return work_path(task.program, task.step, task.load, task.present, task.read)
+
+
+def _placed(
+    task: Task, rows: list[dict[str, Any]], search: dict[str, Any], number: int, present: PlacementFigures
+) -> Placed:
+    """Analyse, before and at the chosen point; collect what is to be said."""
+    before, reason = _analysed(task, task.program, task.present)
+    at = pose_of(placement_of(rows[number - 1]))
+    program = task.read(at) if task.program.moves.from_machine.any() else task.program
+    best, beyond = _analysed(task, program, at)
+    if best is None:
+        raise UnreachableError(f"placement {number} of the front: {beyond}", hint="search again")
+    margins = {key: rows[number - 1][key] for key in ("margin", "rapid_margin")}
+    chosen = {"number": number, **figures_of(best), **margins}
+    old = figures_of(before) if before else None
+    worse = worsened(chosen, old)
+    rewritten, written = _rewritten(task, program, best)
+    warnings = placement_warnings(task, search, chosen, old, reason, worse, present, best)
+    summary = placement_summary(program, best, rows, search, chosen, old, reason, worse, written, warnings)
+    return Placed(task, summary, best, before, program, rewritten)
+
+
+def _analysed(task: Task, program: Program, at: Pose) -> tuple[Analysis | None, str]:
+    """The program at a placement, or None and why."""
+    try:
+        return analyse(task.model, program, origin=at, load=task.load, step=task.step, force=task.force), ""
+    except UnreachableError as error:
+        return None, str(error)
+
+
+def _rewritten(task: Task, program: Program, best: Analysis) -> tuple[bytes | None, dict[str, Any] | None]:
+    """The transformed program's bytes, and what `placement.json` says of it; None, None unless asked for."""
+    writing = task.rewriting
+    if writing is None:
+        return None, None
+    rewritten = rewrite_program(
+        program,
+        best.origin,
+        task.present,
+        decimals=writing.decimals,
+        linearise=writing.linearise,
+        **writing.reading,
+    )
+    return rewritten.content, {
+        "file": writing.file,
+        "analysed_at": placement_row(np.array(task.present)),
+        "relative_difference": rewriting_differences(best, rewritten, task.present, **writing.reading),
+        "notes": list(rewritten.notes),
+    }
