@@ -24,7 +24,7 @@ LEFT, COLUMN = 0.1, 0.34  # of the width
 LINE = 0.0185  # of the height
 VALUE_LETTERS, FULL_LETTERS = 66, 96  # that fit beside a name, and across the sheet
 SMALLEST_SKETCH = 0.2  # of the height
-LEAST_GAP = 0.012
+UNDERLAY = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}  # of names over the path
 
 
 def setup_sheet(summary: dict[str, Any], best: Analysis) -> bytes:
@@ -137,7 +137,7 @@ def _sketch(figure: Figure, box: tuple[float, float, float, float], row: dict[st
         tip, beyond = ((x + far * along[0], y + far * along[1]) for far in (reach, 1.05 * reach))
         axes.annotate("", tip, (x, y), arrowprops={"arrowstyle": "-|>", "color": SECOND_ORANGE, "lw": 2})
         side = "left" if along[0] >= 0.0 else "right"
-        axes.annotate(name, beyond, ha=side, va="center", fontsize=9, color=SECOND_ORANGE)
+        axes.annotate(name, beyond, ha=side, va="center", fontsize=9, color=SECOND_ORANGE, bbox=UNDERLAY)
     axes.plot(x, y, "o", color=SECOND_ORANGE)
     axes.plot(0, 0, "+", color=INK, ms=14, mew=2)
     _name_zero(axes, (x, y), turn)
@@ -160,6 +160,7 @@ def _name_zero(axes: Axes, zero: tuple[float, float], turn: float) -> None:
         va="bottom" if away[1] >= 0.0 else "top",
         fontsize=9,
         color=SECOND_ORANGE,
+        bbox=UNDERLAY,
     )
 
 
