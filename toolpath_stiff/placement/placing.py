@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.advice import placement_warnings, worsened
 from toolpath_stiff.placement.batch import Evaluator, PlacementFigures
@@ -31,10 +30,12 @@ from toolpath_stiff.placement.report_data import (
     placement_summary,
     pose_of,
 )
-from toolpath_stiff.placement.rewrite import check_decimals, check_rewritable, rewrite_program, rewriting_differences
 from toolpath_stiff.placement.search import SearchRules, search_placements
 from toolpath_stiff.placement.work_path import Read, WorkPath, work_path
+from toolpath_stiff.placement.written_path import rewriting_differences
+from toolpath_stiff.rewriting import check_decimals, check_rewritable, rewrite_program
 from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.units import Pose
 
 FloatArray = NDArray[np.float64]
 

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis.cut_classes import headline_rows
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import Pose
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
 from toolpath_stiff.path import place, place_orientations, sample_moves
 from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.units import Pose
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
