@@ -1,4 +1,4 @@
-"""What every report starts from: the machine file as it stands, then its strut law refitted; and how errors are counted.
+"""What every report starts from: the machine file as it stands, then its strut law refitted; how errors are counted.
 
 The size of an error is counted as the paper does, |modelled - measured| / measured. Wherever a sign is shown it is that
 of (measured - modelled) / modelled: minus is softer than modelled.
