@@ -221,9 +221,10 @@ def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: flo
     names.append("model")
     if np.isfinite(ratio):
         axes.bar(at + 1, total * ratio, 0.8, color="white", edgecolor=INK, hatch="////", linewidth=1.0)
-        off = f"{stiffness_deviation_percent(ratio):+.0f} %"
+        off = f"stiffness\n{stiffness_deviation_percent(ratio):+.0f} %"
         axes.text(
-            at + 1, total * (ratio + 0.012), off, ha="center", va="bottom", fontsize=8.5, weight="bold", zorder=4, bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
+            at + 1, total * (ratio + 0.012), off, ha="center", va="bottom", fontsize=8.5,
+            weight="bold", zorder=4, bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
         )  # fmt: skip
         names.append("measured")
     axes.set_xticks(range(len(names)), [shortened(plain(name), 22) for name in names], fontsize=8.5)
