@@ -147,7 +147,7 @@ def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[
         axes.plot(outside, y, "o", color=colour, mfc=colour if is_offered(row, document) else "white", ms=8, zorder=4)
         if (error := standard_error(base, outside, figure_of(row, "held_out_gain_in_se"))) is not None:
             axes.plot([max(outside - error, 0.0), outside + error], [y, y], color=colour, lw=2.0, zorder=3)
-    axes.set_xlabel("mean |modelled - measured| / measured, %: dot at points left out, tick in sample", size=9)
+    axes.set_xlabel("mean |modelled - measured| / measured, %; dot: left out, tick: in sample", size=9)
 
 
 def standard_error(base: float | None, outside: float | None, gain_in_se: float | None) -> float | None:

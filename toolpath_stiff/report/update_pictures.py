@@ -77,7 +77,11 @@ def before_after_png(
     height = 1.35 + MAP * len(rows) + 0.4 + 4.0
     question = "Did the error fall, and what remains?" if len(halves) > 1 else "Where does the model fail?"
     wide = f"{2.4 * _reach(data):.0f} mm wide"
-    note = f"{DEVIATION}, {MINUS_IS_SOFTER}; maps from above, X to the right, {wide}; a point: mean of its readings"
+    refitted = figure_of(base, "mean_abs_error_percent")
+    step = f"{LAW_REFITTED} alone: {percent(refitted, 2)}; " if refitted is not None and known[1] is not base else ""
+    note = (
+        f"{step}{DEVIATION}, {MINUS_IS_SOFTER}; maps from above, X to the right, {wide}; a point: mean of its readings"
+    )
     with house_style():
         figure = new_figure(width, height)
         figure.text(0.25 / width, 1.0 - 0.4 / height, question, size=14, weight="bold")

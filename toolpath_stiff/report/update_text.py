@@ -52,11 +52,11 @@ def _ladder(document: Mapping[str, Any]) -> list[str]:
 
 def _by_direction(document: Mapping[str, Any]) -> list[str]:
     first, last = document["steps"][0]["by_direction"], document["steps"][-1]["by_direction"]
-    found = ["direction  readings  before %  after %  left out %"]
+    found = ["direction  readings  as given %  after %  left out %"]
     for name, before in first.items():
         after = last[name]
         found.append(
-            f"{name:<9}  {before['readings']:>8}  {before['mean_abs_error_percent']:>8.2f}  "
+            f"{name:<9}  {before['readings']:>8}  {before['mean_abs_error_percent']:>10.2f}  "
             f"{after['mean_abs_error_percent']:>7.2f}  {_figure(after['held_out_error_percent'], 10)}"
         )
     return found

@@ -166,7 +166,7 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> dict[str, Any]:
     bounded = fit.at_upper_bound()
     remark = f"{', '.join(bounded)} at its bound" if bounded else ""
     if not remark and gate is None and not base_passes:
-        remark = "behind those that were tested"
+        remark = "not tested further"
     return common | {
         "parameters": parameters(fit, family),
         "choice": dict(fit.candidates[0].choice),
