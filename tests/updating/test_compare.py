@@ -50,9 +50,10 @@ def test_errors_as_the_paper_counts_them():
     # Model 10 % too stiff, then 10 % too soft.
     figures = error_figures(np.log([1.0 / 1.1, 1.0 / 0.9]))
     assert figures["mean_abs_error_percent"] == pytest.approx(10.0)
-    assert figures["bias_percent"] == pytest.approx(0.0, abs=1e-12)
+    # (measured - modelled) / modelled: 1 / 1.1 - 1 and 1 / 0.9 - 1.
+    assert figures["bias_percent"] == pytest.approx((-100.0 / 11.0 + 100.0 / 9.0) / 2.0)
     assert figures["rms_percent"] == pytest.approx(10.0)
-    assert error_figures(np.log([0.5]))["bias_percent"] == pytest.approx(100.0)
+    assert error_figures(np.log([0.5]))["bias_percent"] == pytest.approx(-50.0)
 
 
 def test_levels_share_the_readings_and_their_errors_out():

@@ -167,8 +167,8 @@ def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> t
 
     additions = [parse_addition(text, data, args.effects) for text in args.add]
     found = update(
-        machine, data, additions, strut_law=args.strut_law, keep_law=args.keep_strut_law, auto=args.auto, force=args.force, noise=args.noise,
-        strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed, progress=say,
+        machine, data, additions, strut_law=args.strut_law, keep_law=args.keep_strut_law, auto=args.auto,
+        force=args.force, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed, progress=say,
     )  # fmt: skip
     return found, None
 
@@ -268,5 +268,7 @@ def _pictures(found: dict[str, Any], update: Update, figure3: str | bytes | None
 
 def _rung(step: dict[str, Any]) -> dict[str, Any]:
     """A step with what its effect acts on below the effect's name."""
-    name, _, choice = step["name"].partition(" (")
-    return {**step, "name": name, "remark": choice.rstrip(")")}
+    import re
+
+    choices = re.findall(r"\(([^)]*)\)", step["name"])
+    return {**step, "name": re.sub(r" \([^)]*\)", "", step["name"]), "remark": ", ".join(choices)}

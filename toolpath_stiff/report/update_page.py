@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from toolpath_stiff.report.sections import bullets, figures, hint_list, page, picture, section, text_table
+from toolpath_stiff.report.update_text import result_step
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, machine_text, number
 
 VERDICTS = {
@@ -102,7 +103,7 @@ def _figures(document: Mapping[str, Any]) -> str:
 
 
 def _by_direction(document: Mapping[str, Any]) -> str:
-    first, last = document["steps"][0]["by_direction"], document["steps"][-1]["by_direction"]
+    first, last = document["steps"][0]["by_direction"], result_step(document)["by_direction"]
     rows = [
         (
             name,
@@ -121,7 +122,7 @@ def _by_direction(document: Mapping[str, Any]) -> str:
 
 
 def _fitted(document: Mapping[str, Any]) -> str:
-    last = document["steps"][-1]
+    last = result_step(document)
     rows = [
         ("strut law", f"at {end['length_mm']:.1f} mm", f"{end['stiffness']:.2f} N/um", f"sd {end['sd']:.2g} N/um")
         for end in last["strut_law_N_per_um"]

@@ -285,7 +285,7 @@ class _Work:
         return self.step(f"+ {fit.candidates[-1].label}", fit)
 
     def ladder(self, start: Step, asked: Sequence[Sequence[Candidate]]) -> list[Step]:
-        """Steps that add the effects asked for, each lower than the one before; one step where there is no such order."""
+        """Steps that add the effects asked for, each lower than the one before; one step if no order does."""
         rest, steps = list(asked), [start]
         while rest:
             self.say(f"fitting {', '.join(candidates[0].name for candidates in rest)}")

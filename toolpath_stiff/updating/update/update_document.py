@@ -223,8 +223,8 @@ def _assumptions(update: Update) -> list[str]:
     ]
     if update.objective != "likelihood":
         found.append(
-            "smallest mean |modelled - measured| / measured, as the paper counts it; standard deviations by a bootstrap "
-            "over the measuring points"
+            "smallest mean |modelled - measured| / measured, as the paper counts it; standard deviations by a "
+            "bootstrap over the measuring points"
         )
         return found
     found.append(
