@@ -168,7 +168,8 @@ def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> t
     additions = [parse_addition(text, data, args.effects) for text in args.add]
     found = update(
         machine, data, additions, strut_law=args.strut_law, keep_law=args.keep_strut_law, auto=args.auto,
-        force=args.force, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed, progress=say,
+        force=args.force, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects,
+        seed=args.seed, progress=say,
     )  # fmt: skip
     return found, None
 
