@@ -23,6 +23,7 @@ BoolArray = NDArray[np.bool_]
 FEWEST = 2  # readings in a level; a single one is a reading, not a pattern
 CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose curvature is looked for too
 ALL = "all"
+NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
 SHARE = "share_of_strut_"  # of the compliance; the strut's number follows
 
 
@@ -121,19 +122,21 @@ def sentence(
         f"{signed(percent(first_end))} at {_short(values[low], values)}{unit} to {signed(percent(last_end))} at "
         f"{_short(values[high], values)}{unit} ({readings})"
     )
-    cause = _as_if(pattern, last_end - first_end, float(values[high] - values[low]) / 100.0)
+    cause = _as_if(pattern, first_end, last_end, float(values[low]) / 100.0, float(values[high]) / 100.0)
     return (f"{cause}: {text}" if cause else _capital(text)), size
 
 
-def _as_if(pattern: Pattern, change: float, share: float) -> str:
-    """Which strut of what stiffness would make such a course with its share of the compliance; "" of other courses.
+def _as_if(pattern: Pattern, first: float, last: float, low: float, high: float) -> str:
+    """Which strut of what stiffness would make such a course from its low to its high share of the compliance, or "".
 
-    A strut's stiffness times f adds share (1 / f - 1) to the compliance.
+    A strut's stiffness times f adds share (1 / f - 1) to the compliance, and nothing where the share is nothing.
     """
-    if not pattern.variable.startswith(SHARE) or pattern.direction != ALL or share <= 0.0:
+    if not pattern.variable.startswith(SHARE) or pattern.direction != ALL or high <= low:
         return ""
-    softer = 1.0 + float(np.expm1(-change)) / share
-    if softer <= 0.0:
+    change = last - first
+    without = first - change * low / (high - low)
+    softer = 1.0 + float(np.expm1(-change)) / (high - low)
+    if softer <= 0.0 or abs(without) > NOUGHT * abs(change):
         return ""
     off = 100.0 * (1.0 / softer - 1.0)
     strut = pattern.variable.removeprefix(SHARE)
