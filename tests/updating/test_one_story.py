@@ -248,7 +248,7 @@ def test_a_users_own_effect_has_a_finding_without_writing_one():
         name, title, link, equation, source = "own", "a cable pulls", "instrument", "k (1 + s)", "made up"
         parameters = (Parameter("scale", "%", 0.01, (-50.0, 50.0), (-20.0, 20.0), "made up"),)
 
-    assert Own().finding({"scale": 21.834}) == "a cable pulls (scale 21.8 %)"
+    assert Own().finding({"scale": 21.834}) == "a cable pulls, scale 21.8 %"
 
 
 def test_a_share_of_a_strut_is_told_as_the_strut():

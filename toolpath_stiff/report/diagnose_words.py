@@ -16,7 +16,7 @@ from toolpath_stiff.updating.inference.candidates import choice_text
 MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
 NONE = "none"
 LEAST = 0.005  # probability from which a row is more than "< 0.5 %"
-SETTLED = ("does not explain the data", "ruled out")
+SETTLED = ("does not fit", "ruled out")
 
 AS_GIVEN = "as given"
 
@@ -203,7 +203,7 @@ def floor_text(document: Mapping[str, Any]) -> str:
     """The noise floor in words; a guess says so."""
     name = str((document.get("noise") or {}).get("name") or "")
     guess = f" ({plain(name)} guess)" if name in ("low", "high") else ""
-    return percent(noise_floor_percent(document)) + guess
+    return percent(noise_floor_percent(document), 2) + guess
 
 
 def headline(document: Mapping[str, Any]) -> str:

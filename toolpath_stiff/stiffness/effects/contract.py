@@ -251,7 +251,7 @@ class Effect:
         for one in self.parameters:
             value = p[one.name] if one.discrete else f"{float(f'{p[one.name]:.3g}'):g} {one.unit}".rstrip()
             sizes.append(f"{one.name.replace('_', ' ')} {value}")
-        return f"{self.title} ({', '.join(sizes)})"
+        return f"{self.title}, {', '.join(sizes)}"
 
     @property
     def is_instrument(self) -> bool:

@@ -190,7 +190,7 @@ def row_words(diagnosis: Diagnosis, name: str) -> str:
         return "enough" if name == NONE else "no more than chance" if probability >= SHOWN else "not needed"
     gate = main.base_gate if name == NONE else main.gates.get(name)
     if probability < SHOWN and gate is not None and gate.probability <= (FALSE_ALARM if name == NONE else ADEQUATE):
-        return "does not explain the data"
+        return "does not fit"
     said = words(probability, max(main.probability.values(), default=0.0))
     return "closest" if said == "best" and main.verdict == "unexplained" else said
 
