@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import about
-from toolpath_stiff.updating.comparison.residual_structure import Found, Pattern
+from toolpath_stiff.updating.comparison.residual_structure import SIGNIFICANT, Found, Pattern
 from toolpath_stiff.updating.comparison.residual_variables import Label, Variable, directions, varies
 from toolpath_stiff.updating.readings.measurements import Measurements
 
@@ -122,7 +122,10 @@ def sentence(
         f"{signed(percent(first_end))} at {_short(values[low], values)}{unit} to {signed(percent(last_end))} at "
         f"{_short(values[high], values)}{unit} ({readings})"
     )
-    cause = _as_if(pattern, first_end, last_end, float(values[low]) / 100.0, float(values[high]) / 100.0)
+    sure = found.p_adjusted < SIGNIFICANT
+    cause = (
+        _as_if(pattern, first_end, last_end, float(values[low]) / 100.0, float(values[high]) / 100.0) if sure else ""
+    )
     return (f"{cause}: {text}" if cause else _capital(text)), size
 
 
