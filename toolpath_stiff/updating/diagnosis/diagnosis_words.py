@@ -164,8 +164,7 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     """What to do next, as hints: commands run as they stand."""
     if diagnosis.verdict == "identified" and diagnosis.best is not None:
         names = [name for name in diagnosis.plausible if name != NONE]
-        # The diagnosis weighs every effect with the strut law refitted: the update is to do the same.
-        own = [*options(add=names), "--strut-law", "-o", asked.updated_machine]
+        own = [*options(add=names), "-o", asked.updated_machine]
         return [hint("add it" if len(names) == 1 else "add them", asked.command("update", *own))]
     if diagnosis.verdict == "ambiguous":
         found = [hint("measure what tells them apart", asked.command("plan"))]
