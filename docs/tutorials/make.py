@@ -134,23 +134,26 @@ def agrees(shown: list[str], lines: list[str]) -> bool:
 
 
 def renewed(shown: list[str], lines: list[str]) -> list[str]:
-    """What to show now: each line by the one most like it in its letters, in order; ellipses stay."""
+    """What to show now: the lines, in order, that together are most like those shown in their letters."""
     if ELLIPSIS not in shown:
         return lines if shown else []
     letters = [re.sub(r"[^a-zA-Z]", "", line) for line in lines]
-    found, position = [], 0
-    for line in shown:
-        if line == ELLIPSIS:
-            found.append(line)
-            continue
-        wanted = re.sub(r"[^a-zA-Z]", "", line)
-        scores = [difflib.SequenceMatcher(None, wanted, other).ratio() for other in letters[position:]]
-        if not scores:
-            raise ValueError(f"nothing like {line!r} is printed any more: edit the text by hand")
-        position += scores.index(max(scores))
-        found.append(lines[position])
-        position += 1
-    return found
+    wanted = [re.sub(r"[^a-zA-Z]", "", line) for line in shown if line != ELLIPSIS]
+    if len(wanted) > len(lines):
+        raise ValueError(f"fewer lines are printed than shown, {shown[0]!r} and so on: edit the text by hand")
+    # best[i][j]: the likeness of the first i lines shown, all of them found among the first j printed.
+    best = [[0.0] * (len(lines) + 1)] + [[float("-inf")] * (len(lines) + 1) for _ in wanted]
+    for i, own in enumerate(wanted):
+        for j, other in enumerate(letters):
+            alike_here = difflib.SequenceMatcher(None, own, other).ratio()
+            best[i + 1][j + 1] = max(best[i + 1][j], best[i][j] + alike_here)
+    place, chosen = len(lines), []
+    for i in range(len(wanted), 0, -1):
+        while best[i][place] == best[i][place - 1]:
+            place -= 1
+        place -= 1
+        chosen.append(lines[place])
+    return [line if line == ELLIPSIS else chosen.pop() for line in shown]
 
 
 def play(tutorial: Path, pictures: bool) -> Iterator[tuple[str, list[str], list[str]]]:

@@ -81,6 +81,7 @@ def common(verdict: str, **more: Any) -> dict[str, Any]:
         "candidates": [],
         "pairs": [],
         "plausible": [],
+        "explanations": list(more.get("plausible", [])),
         "why": [],
         "cannot_test": [{"effect": "thermal_drift", "missing": ["time_min"]},
                         {"effect": "setup_compliance", "missing": ["setup"]}],

@@ -119,24 +119,26 @@ def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namesp
 
 
 def _residuals(diagnosis: Diagnosis) -> str:
-    """One row a reading: measured, modelled before and after, in shop units."""
+    """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
     import numpy as np
 
     from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+    from toolpath_stiff.updating.inference.baseline import deviation_percent
 
     data = diagnosis.data
-    after = diagnosis.before if diagnosis.after is None else diagnosis.after
     lines = [
-        "file,line,point,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,dx,dy,dz,stiffness_N_per_mm,before_N_per_mm,after_N_per_mm,"
-        "before_percent,after_percent"
+        "file,line,point,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,dx,dy,dz,stiffness_N_per_mm,as_given_N_per_mm,"
+        "law_refitted_N_per_mm,after_N_per_mm,as_given_deviation_percent,law_refitted_deviation_percent,"
+        "after_deviation_percent"
     ]
     for i in range(len(data)):
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
-        modelled = [measured * float(np.exp(-r[i])) for r in (diagnosis.before, after)]
+        own = [float(r[i]) for r in (diagnosis.before, diagnosis.base.residual, diagnosis.after)]
+        modelled = [measured * float(np.exp(-r)) for r in own]
         numbers = [f"{value:.6g}" for value in pose]
         numbers += [f"{value:.1f}" for value in (measured, *modelled)]
-        numbers += [f"{100.0 * (value / measured - 1.0):.3f}" for value in modelled]
+        numbers += [f"{float(deviation_percent(np.array(r))):.3f}" for r in own]
         name = '"' + str(data.file[i]).replace('"', '""') + '"'
         point = '"' + str(data.point[i]).replace('"', '""') + '"'
         lines.append(",".join([name, str(data.line[i]), point, *numbers]))

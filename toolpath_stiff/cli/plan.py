@@ -164,12 +164,13 @@ def _told_apart(
     from toolpath_stiff.updating.readings.measurements import read_measurements
 
     taken: set[str] = set()
+    errors: dict[str, float] = {}
     noise: float | tuple[float, float]
     if args.data:
         data = read_measurements(args.data, machine)
         taken = set(data.point.tolist())
         menu = _menu(args, Menu.of(data))
-        rivals, noise, notes, verdict = _rivals(args, machine, data, effects)
+        rivals, noise, notes, verdict, errors = _rivals(args, machine, data, effects)
     else:
         menu = _menu(args, Menu(setups=("table", "riser")))
         noise = CAMPAIGN_NOISE if args.noise is None else args.noise
@@ -184,7 +185,10 @@ def _told_apart(
     )  # fmt: skip
     plan = replace(plan, notes=(*notes, *plan.notes))
     rows = plan_rows(plan.visits, plan.chosen, taken)
-    document = {"kind": "rivals", "verdict": verdict, **plan_document(plan)}
+    document = {"kind": "rivals", "verdict": verdict, "mean_abs_error_percent": errors, **plan_document(plan)}
+    if errors:
+        steps = ", ".join(f"{name} {value:.2f} %" for name, value in errors.items())
+        document["text"] = [f"mean error so far: {steps}", *document["text"]]
     document["visits"] = _visits(rows, plan.kinds, plan.why)
     contents: dict[str, Any] = {"plan.csv": plan_csv(rows)}
     if not args.no_plots:
@@ -200,8 +204,8 @@ def _told_apart(
 
 def _rivals(
     args: argparse.Namespace, machine: Machine, data: Measurements, effects: dict[str, Effect]
-) -> tuple[list[Rival], tuple[float, float], list[str], str]:
-    """Rivals, noise (repeat, clamping), notes, the verdict of the diagnosis ("" if none was made)."""
+) -> tuple[list[Rival], tuple[float, float], list[str], str, dict[str, float]]:
+    """Rivals, noise (repeat, clamping), notes, verdict of the diagnosis ("" if none was made), mean errors so far."""
     import numpy as np
 
     from toolpath_stiff.updating.inference.evidence import Problem
@@ -209,7 +213,7 @@ def _rivals(
     from toolpath_stiff.updating.inference.predict import Predictor
     from toolpath_stiff.updating.inference.scatter import Scatter
     from toolpath_stiff.updating.inference.verdict import judge
-    from toolpath_stiff.updating.planning.plan_between import fitted_rivals, rivals_of
+    from toolpath_stiff.updating.planning.plan_between import errors_so_far, fitted_rivals, rivals_of
 
     # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
     noise = noise_models(data, args.noise, args.strut_spread)[-1]
@@ -228,7 +232,8 @@ def _rivals(
         rivals, verdict = rivals_of(judgement), judgement.verdict
         if verdict != "ambiguous":
             notes.append(f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next")
-    return rivals, (float(np.sqrt(np.mean(noise.repeat**2))), noise.clamping), notes, verdict
+    of_reading = (float(np.sqrt(np.mean(noise.repeat**2))), noise.clamping)
+    return rivals, of_reading, notes, verdict, errors_so_far(problem, rivals)
 
 
 # -- a first campaign --------------------------------------------------------------------------------------------------

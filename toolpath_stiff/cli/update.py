@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 EPILOG = """\
 examples:
   tps update measurements.csv --add joint_compliance -o fitted.toml
-  tps update measurements.csv --add weak_strut:strut=3 --strut-law
-  tps update measurements.csv --auto --strut-law
+  tps update measurements.csv --add weak_strut:strut=3 --keep-strut-law
+  tps update measurements.csv --auto
   tps update nist-table1 --strut-law --objective mean-error     the paper's own estimation
 
-An effect that the data do not bear is refused, with the reason, unless --force is given; the exit code is 0 all the
+An effect that the data do not support is refused, with the reason, unless --force is given; the exit code is 0 all the
 same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another place),
 ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
 """
@@ -53,12 +53,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--add", action="append", default=[], metavar="EFFECT[:KEY=VALUE,..]",
         help="effect to fit; what it acts on is searched unless it is said (weak_strut:strut=3)",
     )  # fmt: skip
-    parser.add_argument("--strut-law", action="store_true", help="fit the strut law's two stiffnesses along")
+    law = parser.add_mutually_exclusive_group()
+    law.add_argument("--strut-law", action="store_true", help="write the refitted strut law even without an effect")
+    law.add_argument(
+        "--keep-strut-law", action="store_true",
+        help="keep the strut law as given (default: its two stiffnesses are refitted along with every effect)",
+    )  # fmt: skip
     parser.add_argument(
-        "--auto", action="store_true", help="add effects as long as the error at left-out points falls and data bear it"
+        "--auto",
+        action="store_true",
+        help="add effects as long as the error at left-out points falls and the data support it",
     )
     parser.add_argument(
-        "--force", action="store_true", help="write what the data do not bear as well; and as --replace"
+        "--force", action="store_true", help="write what the data do not support as well; and as --replace"
     )
     parser.add_argument(
         "--objective", choices=("likelihood", "mean-error"), default="likelihood",
@@ -160,8 +167,9 @@ def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> t
 
     additions = [parse_addition(text, data, args.effects) for text in args.add]
     found = update(
-        machine, data, additions, strut_law=args.strut_law, auto=args.auto, force=args.force, noise=args.noise,
-        strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed, progress=say,
+        machine, data, additions, strut_law=args.strut_law, keep_law=args.keep_strut_law, auto=args.auto,
+        force=args.force, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects,
+        seed=args.seed, progress=say,
     )  # fmt: skip
     return found, None
 
@@ -184,7 +192,7 @@ def _provenance(args: argparse.Namespace, update: Update) -> dict[str, Any]:
 
 def _command(args: argparse.Namespace) -> str:
     """The command that repeats the fit; where its results go does not matter."""
-    flags = {name: getattr(args, name) for name in ("strut_law", "auto", "force")}
+    flags = {name: getattr(args, name) for name in ("strut_law", "keep_strut_law", "auto", "force")}
     objective = args.objective if args.objective != "likelihood" else None
     own = options(add=args.add, **flags, objective=objective, seed=args.seed or None)
     return asked(args).command("update", *own)
@@ -240,18 +248,17 @@ def _pictures(found: dict[str, Any], update: Update, figure3: str | bytes | None
     from toolpath_stiff.report.update_pictures import before_after_png, error_ladder_png
 
     last = found["steps"][-1]
-    called = " ".join(last["effects"] and ["+", " + ".join(last["effects"])]) or last["name"]
+    called = f"with {' + '.join(last['effects'])}" if last["effects"] else last["name"]
     entry = {"effect": called, "held_out_error_percent": last["held_out_error_percent"]}
     drawn = before_after_png(
-        {"verdict": found["verdict"], "candidates": [entry], "best": called},
-        update.data, update.steps[0].fit.residual, update.last.fit.residual if update.changed else None,
-        names=("as given", called),
+        {"verdict": found["verdict"], "baseline": found["strut_law_refitted"], "candidates": [entry], "best": called},
+        update.data, update.steps[0].fit.residual, update.steps[-1].fit.residual, names=("as given", called),
     )  # fmt: skip
     pictures = {
         "ladder.png": error_ladder_png(
             [_rung(step) for step in found["steps"]],
             found["noise_floor_percent"],
-            "What each step does to the error",
+            "What does each step do to the error?",
             [{**one, "name": one["effect"]} for one in found["turned_down"]],
         ),
         "before_after.png": drawn,
@@ -262,5 +269,7 @@ def _pictures(found: dict[str, Any], update: Update, figure3: str | bytes | None
 
 def _rung(step: dict[str, Any]) -> dict[str, Any]:
     """A step with what its effect acts on below the effect's name."""
-    name, _, choice = step["name"].partition(" (")
-    return {**step, "name": name, "remark": choice.rstrip(")")}
+    import re
+
+    choices = re.findall(r"\(([^)]*)\)", step["name"])
+    return {**step, "name": re.sub(r" \([^)]*\)", "", step["name"]), "remark": ", ".join(choices)}

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.report.compare_pictures import heading, in_percent, near_rows
+from toolpath_stiff.report.compare_pictures import heading, near_rows
 from toolpath_stiff.report.figure import GRID, INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
+from toolpath_stiff.report.wording import DEVIATION
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.comparison.residual_variables import directions, planes
+from toolpath_stiff.updating.inference.baseline import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +71,7 @@ def machine_png(found: Comparison) -> bytes:
         heading(
             figure,
             "Where does the model fail? Alike all around, or on one side?",
-            f"bar up: measured stiffer than modelled; down: softer; the tallest is {largest:.0f} %; "
+            f"{DEVIATION}: bar down: softer than modelled, up: stiffer; the tallest is {largest:.0f} %; "
             "poses that fall together in a view: their mean",
         )
         _key(figure, axes_shown, width, height)
@@ -101,7 +103,7 @@ def _key(figure: Any, axes_shown: list[str], width: float, height: float) -> Non
 
 def _largest(found: Comparison) -> float:
     """Residual of the tallest bar, %: few extreme readings do not take the contrast."""
-    size = np.abs(in_percent(found.residual))
+    size = np.abs(deviation_percent(found.residual))
     near = near_rows(found)
     return max(float(np.quantile(size[near] if near.any() else size, 0.98)), 0.5)
 
@@ -174,7 +176,7 @@ def _glyphs(
             chosen = here & (along == axis)
             if not chosen.any():
                 continue
-            size = float(in_percent(found.residual[chosen].mean()))
+            size = float(deviation_percent(found.residual[chosen].mean()))
             tall = float(np.clip(size / largest, -1.15, 1.15)) * TALLEST
             area.add_artist(
                 Rectangle((j * (BAR + GAP), middle), BAR, tall, fc=DIRECTION_COLOURS[axis], ec="none", alpha=0.9)

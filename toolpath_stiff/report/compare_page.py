@@ -12,7 +12,7 @@ from toolpath_stiff.report.compare_machine import machine_png
 from toolpath_stiff.report.compare_pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare_variables import load_path_png, variables_png
 from toolpath_stiff.report.sections import bullets, escaped, figures, page, picture, section, text_table
-from toolpath_stiff.report.wording import machine_text
+from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, machine_text
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.comparison.compare import Comparison
@@ -40,7 +40,7 @@ QUESTIONS = {
     ),
     "variables.png": (
         "Which variable is missing?",
-        "The most telling first. A trend in one direction of load alone says more than one in all: compare with what "
+        "The strongest first. A trend in one direction of load alone says more than one in all: compare with what "
         "every effect of the catalogue would do with tps diagnose.",
     ),
     "load_path.png": (
@@ -102,7 +102,7 @@ def _headline(document: Mapping[str, Any]) -> str:
     """The strongest finding, or that there is none."""
     if document["findings"]:
         return str(document["findings"][0]["text"])
-    return f"{document['baseline']['mean_abs_error_percent']:.2g} % off in the mean, without a pattern"
+    return f"{document['baseline']['mean_abs_error_percent']:.2f} % off in the mean as given, without a pattern"
 
 
 def _figures(document: Mapping[str, Any]) -> str:
@@ -112,14 +112,13 @@ def _figures(document: Mapping[str, Any]) -> str:
     scatter = " to ".join(f"{base['scatter_rms_percent'][one['name']]:.1f}" for one in noise)
     share = " to ".join(f"{base['explained_by_scatter_percent'][one['name']]:.0f}" for one in noise)
     found = [
-        (f"{base['mean_abs_error_percent']:.2f} %", "mean |model - measured| / measured"),
-        (f"{base['bias_percent']:+.1f} %", "bias; positive: the model is too stiff"),
+        (f"{base['mean_abs_error_percent']:.2f} %", "mean |modelled - measured| / measured, as given"),
+        *([(f"{refit['mean_abs_error_percent']:.2f} %", "the same, strut law refitted")] if refit else []),
+        (f"{base['bias_percent']:+.1f} %", f"bias: {DEVIATION}, {MINUS_IS_SOFTER}"),
         (f"{base['rms_percent']:.1f} %", "rms error"),
         (f"{scatter} %", "rms that scatter alone would leave"),
         (f"{share} %", "of the mean square is scatter"),
     ]
-    if refit:
-        found.append((f"{refit['mean_abs_error_percent']:.2f} %", "mean error with the strut law refitted"))
     return figures(found)
 
 
@@ -166,7 +165,8 @@ def _errors(document: Mapping[str, Any]) -> str:
         for name, one in levels
     ]
     head = ["", "readings", "mean error", "bias", "rms", *(f"rms of scatter alone ({name})" for name in names)]
-    return text_table(head, rows, range(1, len(head)))
+    remark = f"Machine file as given. Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."
+    return text_table(head, rows, range(1, len(head))) + f'<p class="muted">{escaped(remark)}</p>'
 
 
 def _far_off(document: Mapping[str, Any]) -> str:
@@ -183,7 +183,7 @@ def _far_off(document: Mapping[str, Any]) -> str:
         )
         for one in document["far_off"][:MOST_FAR_OFF]
     ]
-    head = ("line", "direction", "point", "beside the findings", "standard deviations")
+    head = ("line", "direction", "point", "with the findings taken out", "standard deviations")
     return text_table(head, rows, (3, 4))
 
 

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.report.figure import INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.update_pictures import BAND, DIRECTION_COLOURS, RESIDUAL_MAP
-from toolpath_stiff.report.wording import number, plain, shortened
+from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison.residual_variables import directions, planes
+from toolpath_stiff.updating.inference.baseline import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +25,7 @@ FloatArray = NDArray[np.float64]
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 MOST_CHANGES = 12  # of set-up or file that are marked
 SIDES = 2.0  # standard deviations of the bars and bands: 95 %
-RESIDUAL_AXIS = "measured over modelled, %"
+RESIDUAL_AXIS = f"{DEVIATION}, %; {MINUS_IS_SOFTER}"
 
 
 def heading(figure: Figure, question: str, remark: str) -> None:
@@ -32,11 +33,6 @@ def heading(figure: Figure, question: str, remark: str) -> None:
     width, height = figure.get_size_inches()
     figure.text(0.3 / width, 1.0 - 0.4 / height, question, size=14, weight="bold")
     figure.text(0.3 / width, 1.0 - 0.66 / height, remark, size=9.5, color=MUTED)
-
-
-def in_percent(residual: FloatArray) -> FloatArray:
-    """ln(measured / modelled) as measured over modelled in per cent."""
-    return np.asarray(100.0 * np.expm1(residual))
 
 
 def near_rows(found: Comparison) -> NDArray[np.bool_]:
@@ -90,7 +86,7 @@ def measured_modelled_png(found: Comparison) -> bytes:
         heading(
             figure,
             "How wrong is the model, biased or scattered?",
-            f"above the line: stiffer than modelled; bars: {SIDES:g} standard deviations of scatter "
+            f"as given; below the line: softer than modelled; bars: {SIDES:g} standard deviations of scatter "
             f"({'the high guess' if name == 'high' else f'noise {name}'})",
         )
         return png_bytes(figure)
@@ -125,7 +121,9 @@ def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict
         if (along == axis).any():
             figures = found.document["by_direction"][axis]
             mean, bias = figures["mean_abs_error_percent"], figures["bias_percent"]
-            text = f"{axis}: mean error {mean:.1f} %, model {abs(bias):.1f} % too {'stiff' if bias > 0 else 'soft'}"
+            text = (
+                f"{axis}: mean error {mean:.1f} %, {abs(bias):.1f} % {'softer' if bias < 0 else 'stiffer'} on balance"
+            )
             keys.append(Line2D([], [], marker="o", ls="", color=colour, label=text))
     if len(shapes) > 1:
         for setup, marker in list(shapes.items())[: len(MARKERS)]:
@@ -137,11 +135,13 @@ def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict
 
 def strips_png(found: Comparison) -> bytes:
     """PNG: residuals in measuring order, one strip a direction, changes of set-up and file marked."""
-    data, residual = found.data, in_percent(found.residual)
+    data, residual = found.data, deviation_percent(found.residual)
     along, shapes = directions(data), markers(data.setup)
     present = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     order = np.arange(1, len(data) + 1)
-    edges = np.concatenate([residual, in_percent(-SIDES * found.scatter), in_percent(SIDES * found.scatter)])
+    edges = np.concatenate(
+        [residual, deviation_percent(-SIDES * found.scatter), deviation_percent(SIDES * found.scatter)]
+    )
     margin = 0.12 * float(np.ptp(edges))
     with house_style():
         height = 1.3 + 1.9 * len(present)
@@ -151,7 +151,13 @@ def strips_png(found: Comparison) -> bytes:
             rows = along == axis
             spread = SIDES * found.scatter[rows]
             axes.fill_between(
-                order[rows], in_percent(-spread), in_percent(spread), color="#e9edf2", step="mid", lw=0, zorder=0
+                order[rows],
+                deviation_percent(-spread),
+                deviation_percent(spread),
+                color="#e9edf2",
+                step="mid",
+                lw=0,
+                zorder=0,
             )
             axes.axhline(0.0, color=MUTED, lw=0.9, zorder=1)
             axes.vlines(order[rows], 0.0, residual[rows], color=DIRECTION_COLOURS[axis], lw=0.8, alpha=0.5, zorder=2)
@@ -223,7 +229,7 @@ def planes_png(found: Comparison) -> bytes:
             if chosen.any():
                 weights = chosen / chosen.sum()
                 error = 100.0 * float(np.sqrt(weights @ found.covariance @ weights))
-                cells[i, j] = in_percent(weights @ found.residual), error, chosen.sum()
+                cells[i, j] = deviation_percent(weights @ found.residual), error, chosen.sum()
     limit = max(float(np.nanmax(np.abs(cells[..., 0]), initial=0.0, where=np.isfinite(cells[..., 0]))), 1.0)
     with house_style():
         width, height = max(2.6 + 1.75 * len(columns), 8.2), 1.5 + 0.85 * len(rows)
@@ -253,7 +259,7 @@ def planes_png(found: Comparison) -> bytes:
         heading(
             figure,
             "Z against X and Y? Upper against lower plane?",
-            f"{RESIDUAL_AXIS}: red softer, blue stiffer than modelled; bold: beyond {SIDES:g} standard errors"
+            f"{RESIDUAL_AXIS} (red), blue: stiffer; bold: beyond {SIDES:g} standard errors"
             + ("" if near.all() else f"; without {count_of(int((~near).sum()), 'reading')} far off"),
         )
         return png_bytes(figure)

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.report.wording import plain
+from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison.compare import Comparison
 from toolpath_stiff.updating.comparison.residual_variables import directions, planes
+from toolpath_stiff.updating.inference.baseline import deviation_percent
 
 MOST_NAMED = 5  # readings far off, on the terminal
 
@@ -23,11 +24,12 @@ def terminal_text(document: Mapping[str, Any]) -> str:
     lines += _table(document)
     base, refit = document["baseline"], document["baseline"]["strut_law_refitted"]
     if refit:
-        gain = base["mean_abs_error_percent"] - refit["mean_abs_error_percent"]
+        gain = round(base["mean_abs_error_percent"] - refit["mean_abs_error_percent"], 2)
         first, second = refit["strut_law"]["N_per_um"]
         lines += [
             "",
-            f"strut law refitted: {refit['mean_abs_error_percent']:.2f} % mean error, rms {refit['rms_percent']:.1f} % "
+            f"strut law refitted: {refit['mean_abs_error_percent']:.2f} % mean error, "
+            f"{refit['bias_percent']:+.1f} % bias, rms {refit['rms_percent']:.1f} % "
             f"({first:.1f} / {second:.1f} N/um)" + ("" if gain > 0.0 else ": nothing gained"),
         ]
     lines += ["", "findings"]
@@ -46,7 +48,8 @@ def terminal_text(document: Mapping[str, Any]) -> str:
         lines += ["", "readings far off"]
         lines += [
             f"  {plain(one['file'])}:{one['line']}: {one['direction']} at point {plain(one['point'])}, "
-            f"{one['off_percent']:+.0f} % beside the findings ({one['standard_deviations']:+.1f} standard deviations)"
+            f"{one['off_percent']:+.0f} % with the findings taken out "
+            f"({one['standard_deviations']:+.1f} standard deviations)"
             for one in document["far_off"][:MOST_NAMED]
         ]
         if len(document["far_off"]) > MOST_NAMED:
@@ -65,8 +68,9 @@ def _table(document: Mapping[str, Any]) -> list[str]:
             rows += [(f"{title} {plain(name) or '(none)'}".strip(), figures) for name, figures in levels.items()]
     noise = document["noise"][-1]["name"]
     width = max(len(name) for name, _ in rows)
-    head = f"{'':<{width}}  readings  mean error   bias    rms  scatter alone   (bias +: model too stiff)"
-    return [head] + [
+    head = f"{'':<{width}}  readings  mean error   bias    rms  scatter alone"
+    lines = ["machine file as given; bias: mean of " + f"{DEVIATION}, {MINUS_IS_SOFTER}", head]
+    return lines + [
         f"{name:<{width}}  {one['readings']:>8}  {one['mean_abs_error_percent']:>8.2f} % {one['bias_percent']:>+6.1f} "
         f"{one['rms_percent']:>6.1f}  {one['scatter_rms_percent'][noise]:>9.1f} rms"
         for name, one in rows
@@ -80,13 +84,13 @@ def _with_unit(name: str, unit: str) -> str:
 
 
 def residuals_csv(found: Comparison) -> str:
-    """One row a reading: measured, modelled, error, scatter, and every variable that residuals were held against."""
+    """One row a reading: measured, modelled, deviation, scatter, every variable that residuals were held against."""
     data = found.data
     own = [one for one in found.numbers if one.name not in ("x", "y", "height", "order")]
     head = [
         "file", "line", "point", "setup", "clamp", "plane", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg",
-        "c_deg", "dx", "dy", "dz", "measured_N_per_mm", "modelled_N_per_mm", "error_percent",
-        "measured_over_modelled_percent", "scatter_percent", *(_with_unit(one.name, one.unit) for one in own),
+        "c_deg", "dx", "dy", "dz", "measured_N_per_mm", "modelled_N_per_mm", "deviation_percent", "scatter_percent",
+        *(_with_unit(one.name, one.unit) for one in own),
     ]  # fmt: skip
     along, where = directions(data), planes(data)
     out = io.StringIO()
@@ -100,8 +104,8 @@ def residuals_csv(found: Comparison) -> str:
             [
                 data.file[i], data.line[i], data.point[i], data.setup[i], data.clamp[i], where[i], along[i],
                 *(f"{value + 0.0:.6g}" for value in pose),
-                f"{measured:.1f}", f"{modelled:.1f}", f"{100.0 * (modelled / measured - 1.0):.3f}",
-                f"{100.0 * np.expm1(found.residual[i]):.3f}", f"{100.0 * found.scatter[i]:.3f}",
+                f"{measured:.1f}", f"{modelled:.1f}", f"{float(deviation_percent(found.residual[i])):.3f}",
+                f"{100.0 * found.scatter[i]:.3f}",
                 *("" if np.isnan(one.values[i]) else f"{one.values[i]:.6g}" for one in own),
             ]
         )  # fmt: skip

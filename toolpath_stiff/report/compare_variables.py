@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.report.compare_pictures import RESIDUAL_AXIS, count_of, heading, in_percent
+from toolpath_stiff.report.compare_pictures import RESIDUAL_AXIS, count_of, heading
 from toolpath_stiff.report.figure import INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
-from toolpath_stiff.report.wording import plain, shortened
+from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, plain, shortened
 from toolpath_stiff.updating.comparison.residual_structure import SIGNIFICANT
 from toolpath_stiff.updating.comparison.residual_variables import directions
+from toolpath_stiff.updating.inference.baseline import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +35,7 @@ EFFECT, MISSING = "#de6b12", "#9aa5b1"
 
 
 def variables_png(found: Comparison) -> bytes:
-    """PNG: residual against each variable, the most telling first; readings far off stand at the edge."""
+    """PNG: residual against each variable, the strongest first; readings far off stand at the edge."""
     limits = _limits(found)
     panels: list[tuple[float, str, Variable | Label]] = []
     held_against: list[Variable | Label] = [*found.numbers, *found.names]
@@ -69,8 +70,8 @@ def variables_png(found: Comparison) -> bytes:
         heading(
             figure,
             "Which variable is missing?",
-            f"{RESIDUAL_AXIS}, against what the model does not use; lines: a direction's own trend; p: of the "
-            "strongest pattern, corrected for all that were looked for; triangles: beyond the frame",
+            f"{RESIDUAL_AXIS}; lines: a direction's own trend; p: of the strongest pattern, corrected for all "
+            "that were looked for; triangles: beyond the frame",
         )
         return png_bytes(figure)
 
@@ -83,7 +84,7 @@ def _about(test: Mapping[str, Any], name: str) -> bool:
 
 def _limits(found: Comparison) -> tuple[float, float]:
     """Range shown: all, but a few wild readings do not squeeze the others."""
-    values = in_percent(found.residual)
+    values = deviation_percent(found.residual)
     middle = float(np.median(values))
     reach = WIDE * float(np.median(np.abs(values - middle)))
     kept = values[np.abs(values - middle) <= reach] if reach > 0.0 else values
@@ -106,7 +107,7 @@ def _key(figure: object, found: Comparison) -> None:
 
 def _panel(axes: Axes, found: Comparison, one: Variable | Label, limits: tuple[float, float]) -> None:
     """Points by direction; a trend line a direction, or the means of levels."""
-    residual, along = in_percent(found.residual), directions(found.data)
+    residual, along = deviation_percent(found.residual), directions(found.data)
     if one.values.dtype.kind == "f":
         x = np.asarray(one.values, dtype=float)
         names: list[str] = []
@@ -188,8 +189,8 @@ def load_path_png(found: Comparison) -> bytes:
         heading(
             figure,
             "Which link takes what share of the compliance?",
-            f"mean over {poses}, link by link; last bars: what the model sums to and what was measured there along "
-            "that direction; 1 nm/N alone is 1000 N/um",
+            f"mean over {poses}; last bars: the model's sum and what was measured along that direction, with "
+            f"{DEVIATION} of its stiffness, {MINUS_IS_SOFTER}",
         )
         return png_bytes(figure)
 
@@ -199,6 +200,11 @@ def _measured_over_modelled(found: Comparison, rows: NDArray[np.bool_]) -> float
     if not rows.any():
         return float("nan")
     return float(np.mean(1.0 / found.data.stiffness[rows]) / np.mean(np.exp(-found.log_model[rows])))
+
+
+def stiffness_deviation_percent(compliance_ratio: float) -> float:
+    """Of a ratio of compliances, measured over modelled: (measured - modelled) / modelled of the stiffness, %."""
+    return 100.0 * (1.0 / compliance_ratio - 1.0)
 
 
 def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: float) -> None:
@@ -215,8 +221,9 @@ def _waterfall(axes: Axes, parts: FloatArray, links: tuple[str, ...], ratio: flo
     names.append("model")
     if np.isfinite(ratio):
         axes.bar(at + 1, total * ratio, 0.8, color="white", edgecolor=INK, hatch="////", linewidth=1.0)
+        off = f"stiffness\n{stiffness_deviation_percent(ratio):+.0f} %"
         axes.text(
-            at + 1, total * (ratio + 0.012), f"{round(100 * (ratio - 1)):+d} %", ha="center", va="bottom", fontsize=8.5,
+            at + 1, total * (ratio + 0.012), off, ha="center", va="bottom", fontsize=8.5,
             weight="bold", zorder=4, bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
         )  # fmt: skip
         names.append("measured")

@@ -10,15 +10,16 @@ from typing import Any
 
 from toolpath_stiff.report.diagnose_words import (
     HEADLINES,
-    NONE,
     best_explanation,
     entries,
+    explanations,
     figure_of,
     floor_text,
     headline,
     hidden_name,
     is_offered,
     is_plausible,
+    model_rows,
     name_text,
     parameter_texts,
     path_text,
@@ -26,10 +27,11 @@ from toolpath_stiff.report.diagnose_words import (
     plausible_text,
     probability_text,
     remark_text,
+    row_name,
     significant,
 )
 from toolpath_stiff.report.sections import bullets, escaped, figures, hint_list, page, picture, section, table
-from toolpath_stiff.report.wording import machine_text, number
+from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, machine_text, number
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
@@ -40,7 +42,7 @@ QUESTIONS = {
     ),
     "before_after.png": (
         "Where does the model fail, and what is left?",
-        "Red: measured softer than modelled; blue: stiffer. A pattern points to physics, colours sprinkled at "
+        f"{DEVIATION}, {MINUS_IS_SOFTER} (red); blue: stiffer. A pattern points to physics, colours sprinkled at "
         "random to scatter.",
     ),
     "confounding.png": (
@@ -105,26 +107,26 @@ def _figures(document: Mapping[str, Any]) -> str:
     """The few figures that say it all."""
     base = document.get("baseline") or {}
     best = best_explanation(document)
-    found = [(percent(figure_of(base, "held_out_error_percent")), "mean error at points left out, strut law refitted")]
+    key = "mean_abs_error_percent"
+    found = [(percent(figure_of(base.get("as_given"), key), 2), "mean error as given")]
+    found.append((percent(figure_of(base, key), 2), "mean error, strut law refitted"))
     if best is not None and document.get("verdict") in ("identified", "ambiguous"):
-        found.append((percent(figure_of(best, "held_out_error_percent")), f"the same with {name_text(best)}"))
+        found.append((percent(figure_of(best, key), 2), f"mean error with {name_text(best)}"))
+        found.append((percent(figure_of(best, "held_out_error_percent"), 2), "the same at points left out"))
     found.append((floor_text(document), "would be left by scatter alone"))
-    found.append((plausible_text(entries(document, "plausible")), "hold the truth with 95 % probability"))
-    if not entries(document, "plausible"):
-        found[-1] = ("no effect", "of the catalogue explains these data")
+    standing = explanations(document)
+    remark = "is the explanation" if len(standing) == 1 else "are left standing"
+    found.append((plausible_text(standing), remark) if standing else ("no effect", "of the catalogue is left standing"))
     return figures(found)
 
 
 def _candidates(document: Mapping[str, Any]) -> str:
-    """Base model, pairs and all candidates."""
-    base = {**(document.get("baseline") or {}), "effect": NONE}
+    """As given, strut law refitted, pairs and all candidates."""
     rows = []
-    for entry in [base, *entries(document, "pairs"), *entries(document, "candidates")]:
-        is_base = entry.get("effect") == NONE
-        name = "model without a further effect" if is_base else name_text(entry)
-        title = "strut law refitted" if is_base else str(entry.get("title") or "")
+    for entry in [*model_rows(document), *entries(document, "pairs"), *entries(document, "candidates")]:
+        name, title = row_name(entry), str(entry.get("finding") or entry.get("title") or "")
         gain = figure_of(entry, "held_out_gain_in_se")
-        kind = "plausible" if is_plausible(entry, document) else "" if is_offered(entry) else "out"
+        kind = "plausible" if is_plausible(entry, document) else "" if is_offered(entry, document) else "out"
         rows.append(
             (
                 kind,

@@ -11,19 +11,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff.report.diagnose_words import (
+    AS_GIVEN,
     NONE,
     entries,
+    explanations,
     figure_of,
     floor_text,
     hidden_name,
     is_offered,
     is_plausible,
-    name_text,
+    model_rows,
     noise_floor_percent,
     parameter_texts,
     percent,
     probability_text,
     remark_text,
+    row_name,
     significant,
     size_text,
 )
@@ -66,8 +69,8 @@ def ladder_png(document: Mapping[str, Any]) -> bytes:
             axes.spines[["top", "right", "left"]].set_visible(False)
         _ladder_labels(labels, rows, document)
         _ladder_errors(errors, rows, document)
-        _ladder_chances(chances, rows)
-        _ladder_words(words, rows)
+        _ladder_chances(chances, rows, document)
+        _ladder_words(words, rows, document)
         for y, row in enumerate(rows):
             if _marked(row, document):
                 shade.axhspan(y - 0.5, y + 0.5, color=PALE_BLUE, lw=0)
@@ -75,11 +78,11 @@ def ladder_png(document: Mapping[str, Any]) -> bytes:
 
 
 def ladder_rows(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The base model, what no effect describes (if it was weighed), then pairs and effects as the document has them."""
-    base = {**(document.get("baseline") or {}), "effect": NONE}
-    outside = figure_of(base, "probability_outside")
+    """As given, strut law refitted, what no effect describes (if it was weighed), then pairs and effects."""
+    models = model_rows(document)
+    outside = figure_of(models[-1], "probability_outside")
     beyond = [{"effect": OUTSIDE, "title": "a smooth unknown", "probability": outside}] if outside else []
-    return [base, *beyond, *entries(document, "pairs")[:MOST_PAIRS], *entries(document, "candidates")]
+    return [*models, *beyond, *entries(document, "pairs")[:MOST_PAIRS], *entries(document, "candidates")]
 
 
 def _marked(row: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
@@ -87,29 +90,27 @@ def _marked(row: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
 
 
 def _ladder_note(document: Mapping[str, Any]) -> str:
-    plausible = entries(document, "plausible")
-    shown = f"shaded: holds the truth with 95 % probability ({len(plausible)})" if plausible else "nothing is plausible"
+    standing = len(explanations(document))
+    shown = f"shaded: {standing} explanation{'s' if standing > 1 else ''} left standing" if standing else "none left"
     return (
         f"verdict: {plain(str(document.get('verdict', '-')))}   ·   {shown}   ·   bar at a dot: standard error "
-        "of its fall from the base model   ·   grey: not offered"
+        "of its fall from the refitted strut law   ·   grey: not offered"
     )
 
 
 def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
     for y, row in enumerate(rows):
-        if row.get("effect") == NONE:
-            name, small = "model without a further effect", "strut law refitted"
-        else:
-            name = name_text(row)
-            small = ", ".join(parameter_texts(row, intervals=False)) or plain(str(row.get("title") or ""))
-        colour = INK if is_offered(row) else GREY
+        name = row_name(row)
+        small = ", ".join(parameter_texts(row, intervals=False)) or plain(str(row.get("title") or ""))
+        offered = is_offered(row, document)
+        colour = INK if offered else GREY
         weight = "bold" if _marked(row, document) else "normal"
         axes.text(0.0, y - 0.16, shortened(name, 58), va="center", color=colour, weight=weight)
-        axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=MUTED if is_offered(row) else GREY, size=8)
+        axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=MUTED if offered else GREY, size=8)
 
 
 def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
-    base = figure_of(rows[0], "held_out_error_percent")
+    base = figure_of(document.get("baseline"), "held_out_error_percent")
     held = [figure_of(row, "held_out_error_percent") for row in rows]
     inside = [figure_of(row, "mean_abs_error_percent") for row in rows]
     known = [value for value in (*held, *inside) if value is not None]
@@ -121,7 +122,7 @@ def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[
     axes.set_xlim(0.0, end)
     for value, other, text, colour, style in (
         (floor, base, f"noise floor {floor_text(document)}", SECOND_ORANGE, ":"),
-        (base, floor, f"base model {percent(base)}", INK, "--"),
+        (base, floor, f"strut law refitted {percent(base)}", INK, "--"),
     ):
         if value is not None:
             axes.axvline(value, color=colour, lw=1.3, ls=style, zorder=1)
@@ -143,10 +144,10 @@ def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[
                 f"{percent(outside)} \N{RIGHTWARDS ARROW}", (end, y), ha="right", va="center", size=9, color=colour
             )
             continue
-        axes.plot(outside, y, "o", color=colour, mfc=colour if is_offered(row) else "white", ms=8, zorder=4)
+        axes.plot(outside, y, "o", color=colour, mfc=colour if is_offered(row, document) else "white", ms=8, zorder=4)
         if (error := standard_error(base, outside, figure_of(row, "held_out_gain_in_se"))) is not None:
             axes.plot([max(outside - error, 0.0), outside + error], [y, y], color=colour, lw=2.0, zorder=3)
-    axes.set_xlabel("mean |model - measured| / measured, %: dot at points left out, tick in sample", size=9)
+    axes.set_xlabel("mean |modelled - measured| / measured, %; dot: left out, tick: in sample", size=9)
 
 
 def standard_error(base: float | None, outside: float | None, gain_in_se: float | None) -> float | None:
@@ -157,18 +158,18 @@ def standard_error(base: float | None, outside: float | None, gain_in_se: float 
 
 
 def _row_colour(row: Mapping[str, Any], document: Mapping[str, Any]) -> str:
-    if not is_offered(row):
+    if not is_offered(row, document):
         return GREY
     if _marked(row, document):
         return BLUE
-    return INK if row.get("effect") == NONE else "#52606d"
+    return INK if row.get("effect") in (AS_GIVEN, NONE) else "#52606d"
 
 
-def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
+def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
     axes.set_xlim(0.0, 1.0)
     for y, row in enumerate(rows):
         value = figure_of(row, "probability")
-        axes.barh(y, value or 0.0, height=0.5, color=BLUE if is_offered(row) else GREY, zorder=2)
+        axes.barh(y, value or 0.0, height=0.5, color=BLUE if is_offered(row, document) else GREY, zorder=2)
         inside = (value or 0.0) > 0.6
         axes.text(
             (value or 0.0) + (-0.03 if inside else 0.03), y, probability_text(value), va="center",
@@ -178,12 +179,12 @@ def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
     axes.set_xlabel("probability", size=9)
 
 
-def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]]) -> None:
+def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
     import textwrap
 
     for y, row in enumerate(rows):
         lines = textwrap.wrap(remark_text(row).split(":")[0], 31, max_lines=2, placeholder=" ...")
-        axes.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if is_offered(row) else MUTED)
+        axes.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if is_offered(row, document) else MUTED)
 
 
 def confounding_png(document: Mapping[str, Any]) -> bytes:

@@ -8,21 +8,23 @@ from typing import Any
 
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report.diagnose_words import (
-    NONE,
     best_explanation,
     entries,
+    explanations,
     figure_of,
     floor_text,
     hidden_name,
     is_offered,
     is_plausible,
     missing_text,
+    model_rows,
     name_text,
     parameter_texts,
     path_text,
     percent,
     plausible_text,
     probability_text,
+    row_name,
     size_text,
 )
 from toolpath_stiff.report.wording import machine_text, plain, shortened
@@ -53,7 +55,7 @@ def terminal_text(document: Mapping[str, Any]) -> str:
         "",
         *_table(document),
         "",
-        *_entry("plausible", plausible_text(entries(document, "plausible"))),
+        *_entry("plausible", plausible_text(explanations(document))),
         *_by_noise(document),
         *_listed("cannot test", ["; ".join(missing_text(e) for e in entries(document, "cannot_test"))]),
         *_listed("would show", [_detectable(document)]),
@@ -104,7 +106,7 @@ def _error(document: Mapping[str, Any]) -> str:
     parts = []
     as_given = figure_of(base.get("as_given"), "mean_abs_error_percent")
     if as_given is not None:
-        parts.append(f"{percent(as_given)} as the machine file stands")
+        parts.append(f"{percent(as_given, 2)} as given")
     parts.append(_pair_of_errors(base) + " with the strut law refitted")
     best = best_explanation(document)
     if best is not None and document.get("verdict") != "adequate":
@@ -114,25 +116,24 @@ def _error(document: Mapping[str, Any]) -> str:
 
 def _pair_of_errors(entry: Mapping[str, Any]) -> str:
     inside, outside = (figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out"))
-    return f"{percent(inside)} ({percent(outside)} at points left out)"
+    return f"{percent(inside, 2)} ({percent(outside, 2)} at points left out)"
 
 
 def _table(document: Mapping[str, Any]) -> list[str]:
-    """The base model, pairs and the best candidates; an asterisk marks the plausible set."""
-    base = {**(document.get("baseline") or {}), "effect": NONE, "words": ""}
+    """As given, strut law refitted, pairs and the best candidates; an asterisk marks what is left standing."""
+    models = model_rows(document)
     candidates, pairs = entries(document, "candidates"), entries(document, "pairs")
-    shown = [base, *pairs[:MOST_PAIRS], *candidates[:MOST_CANDIDATES]]
+    shown = [*models, *pairs[:MOST_PAIRS], *candidates[:MOST_CANDIDATES]]
     shown += [entry for entry in candidates[MOST_CANDIDATES:] if is_plausible(entry, document)]
     rows = [["", "probab.", "error %", "left out %", "gain/SE", "", ""]]
     for entry in shown:
         mark = "* " if is_plausible(entry, document) else "  "
-        name = "none" if entry.get("effect") == NONE else name_text(entry)
         figures = [figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out")]
         gain = figure_of(entry, "held_out_gain_in_se")
-        remark = str(entry.get("remark") or "") or ("" if is_offered(entry) else "not offered")
+        remark = str(entry.get("remark") or "") or ("" if is_offered(entry, document) else "not offered")
         rows.append(
             [
-                shortened(mark + name, LONGEST_NAME),
+                shortened(mark + row_name(entry), LONGEST_NAME),
                 probability_text(figure_of(entry, "probability")),
                 *("-" if value is None else f"{value:.2f}" for value in figures),
                 "-" if gain is None else f"{gain:.1f}",
@@ -148,7 +149,7 @@ def _table(document: Mapping[str, Any]) -> list[str]:
         lines.append((left + shortened(row[5], WIDTH - len(left))).rstrip())
         if row[6]:
             lines.append(shortened("      " + row[6], WIDTH))
-    more = len(candidates) + len(pairs) + 1 - len(shown)
+    more = len(candidates) + len(pairs) + len(models) - len(shown)
     if more > 0:
         lines.append(f"  and {more} less likely, in diagnose.json")
     return lines

@@ -15,11 +15,15 @@ from toolpath_stiff.updating.inference.candidates import choice_text
 # Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
 MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
 NONE = "none"
+LEAST = 0.005  # probability from which a row is more than "< 0.5 %"
+SETTLED = ("does not fit", "ruled out")
+
+AS_GIVEN = "as given"
 
 HEADLINES = {
     "adequate": "Nothing is missing that these data could show",
-    "identified": "One explanation fits the data, and no other does",
-    "ambiguous": "Several explanations fit the data equally well",
+    "identified": "One explanation is far likelier than any other",
+    "ambiguous": "These data cannot tell several explanations apart",
     "unexplained": "Something is missing, and nothing in the catalogue accounts for it",
 }
 
@@ -120,18 +124,32 @@ def parameter_name(key: str, unit: str) -> str:
     return (key.removesuffix(f"_{tail}") if tail else key).replace("_", " ")
 
 
-def is_offered(entry: Mapping[str, Any]) -> bool:
-    """False only where the diagnosis says so."""
-    return entry.get("offered") is not False
+def explanations(document: Mapping[str, Any]) -> list[str]:
+    """What is left standing: effects, `none`, pairs as "a + b"."""
+    return [plain(str(name)) for name in entries(document, "explanations")]
 
 
 def is_plausible(entry: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
-    """Whether all its effects are in the plausible set; a pair needs some probability of its own besides."""
-    plausible = entries(document, "plausible")
-    names = effect_names(entry)
-    if not plausible or not all(name in plausible for name in names):
-        return False
-    return len(names) == 1 or (figure_of(entry, "probability") or 0.0) > 0.0
+    """Whether it is one of the explanations left standing; a member of a pair alone is not."""
+    return " + ".join(effect_names(entry)) in explanations(document)
+
+
+def is_offered(entry: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
+    """False only where the diagnosis says so and does not rely on it all the same."""
+    return entry.get("offered") is not False or is_plausible(entry, document)
+
+
+def model_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The machine file as given, then with its strut law refitted: the first rows of every table and ladder."""
+    base = document.get("baseline") or {}
+    as_given = base.get("as_given")
+    first = [{**as_given, "effect": AS_GIVEN, "title": "the machine file as it stands"}] if as_given else []
+    return [*first, {**base, "effect": NONE, "title": "no further effect"}]
+
+
+def row_name(entry: Mapping[str, Any]) -> str:
+    """Name of a row: "as given", "strut law refitted (none)", or the effects with what they act on."""
+    return "strut law refitted (none)" if entry.get("effect") == NONE else name_text(entry)
 
 
 def best_explanation(document: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -140,17 +158,18 @@ def best_explanation(document: Mapping[str, Any]) -> Mapping[str, Any] | None:
     for entry in found:
         if " + ".join(effect_names(entry)) == document.get("best"):
             return dict(entry)
-    offered = [entry for entry in found if is_offered(entry)]
+    offered = [entry for entry in found if is_offered(entry, document)]
     return max(offered, key=lambda e: figure_of(e, "probability") or 0.0, default=None)
 
 
 def remark_text(entry: Mapping[str, Any]) -> str:
-    """How it stands, and what speaks against it."""
+    """How it stands, and what is against it."""
     own = str(entry.get("remark") or "")
-    if not is_offered(entry):
+    said = str(entry.get("words") or "")
+    if entry.get("offered") is False and (figure_of(entry, "probability") or 0.0) < LEAST:
         return plain(own or "not offered")
-    against = own or ("leaves structure" if entry.get("adequate") is False else "")
-    return plain("; ".join(part for part in (str(entry.get("words") or ""), against) if part))
+    settled = entry.get("adequate") is False and said not in SETTLED
+    return plain("; ".join(part for part in (said, own or ("leaves structure" if settled else "")) if part))
 
 
 def noise_floor_percent(document: Mapping[str, Any]) -> float | None:
@@ -184,12 +203,18 @@ def floor_text(document: Mapping[str, Any]) -> str:
     """The noise floor in words; a guess says so."""
     name = str((document.get("noise") or {}).get("name") or "")
     guess = f" ({plain(name)} guess)" if name in ("low", "high") else ""
-    return percent(noise_floor_percent(document)) + guess
+    return percent(noise_floor_percent(document), 2) + guess
 
 
 def headline(document: Mapping[str, Any]) -> str:
-    """The verdict as one sentence that needs no figures."""
+    """The verdict as one sentence: the cause where one was found."""
     verdict = str(document.get("verdict") or "-")
+    cause = str((best_explanation(document) or {}).get("finding") or "") if verdict == "identified" else ""
+    if cause:
+        return plain(cause[0].upper() + cause[1:])
+    standing = explanations(document)
+    if verdict == "ambiguous" and len(standing) == 1:
+        return plain(f"{standing[0]} is likeliest, but something else is not ruled out")
     found = document.get("by_noise") or {}
     if verdict == "ambiguous" and len({str(one.get("verdict")) for one in found.values()}) > 1:
         return "It depends on how much the readings scatter, which these data do not tell"

@@ -9,11 +9,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from toolpath_stiff.report.sections import bullets, figures, hint_list, page, picture, section, text_table
-from toolpath_stiff.report.wording import machine_text, number
+from toolpath_stiff.report.update_text import result_step
+from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, machine_text, number
 
 VERDICTS = {
     "updated": "The machine is updated",
-    "refused": "Refused: the data do not bear it",
+    "refused": "Refused: the data do not support it",
     "forced": "Added by force",
     "nothing added": "Nothing to add",
 }
@@ -21,12 +22,15 @@ VERDICTS = {
 QUESTIONS = {
     "ladder.png": (
         "What does each step do to the error?",
-        "The error at left-out points counts: in sample every effect makes it fall. Bars: standard error of the step. "
-        "Below the noise floor lies only luck.",
+        "From the machine file as given over its refitted strut law to the last model. What counts is the error at "
+        "left-out points, which the fit has not seen. A fit weighs readings by their scatter, so that a step can raise "
+        "this mean. Effects that only together lower it are one step. Bars: standard error of the step; an error below "
+        "the noise floor is chance.",
     ),
     "before_after.png": (
         "Did the error fall, and what remains?",
-        "Both halves on one colour scale. A pattern that remains is something else that the model lacks.",
+        f"{DEVIATION}, {MINUS_IS_SOFTER} (red); blue: stiffer; both halves on one colour scale. A pattern that remains "
+        "is something else that the model lacks.",
     ),
     "figure3.png": (
         "How stiff must the platform be taken?",
@@ -57,7 +61,7 @@ def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]
         *(picture(name, pictures, QUESTIONS) for name in QUESTIONS),
         section("Errors by direction", _by_direction(document)),
         section("What was fitted", _fitted(document)),
-        section("Does the data bear it?", _support(document)),
+        section("Do the data support it?", _support(document)),
         section("What to do next", hint_list(document.get("next") or [])),
         section("Where it comes from", bullets(record)),
         section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
@@ -77,24 +81,29 @@ def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]
 
 def _headline(document: Mapping[str, Any]) -> str:
     first, last = document["steps"][0], document["steps"][-1]
-    if len(document["steps"]) == 1:
-        return f"{first['mean_abs_error_percent']:.2g} % mean error, and nothing to add"
-    return f"Mean error {first['mean_abs_error_percent']:.3g} % before, {last['mean_abs_error_percent']:.3g} % after"
+    if document["verdict"] == "nothing added":
+        return f"Mean error {first['mean_abs_error_percent']:.2f} % as given, and nothing to add"
+    if last["findings"] and document["verdict"] in ("updated", "forced"):
+        cause = "; ".join(last["findings"])
+        return cause[0].upper() + cause[1:]
+    return f"Mean error {first['mean_abs_error_percent']:.2f} % as given, {last['mean_abs_error_percent']:.2f} % after"
 
 
 def _figures(document: Mapping[str, Any]) -> str:
-    last = document["steps"][-1]
-    found = [
-        (_percent(document["steps"][0]["mean_abs_error_percent"]), "mean error as given"),
-        (_percent(last["mean_abs_error_percent"]), "after"),
-        (_percent(last["held_out_error_percent"]), "after, at left-out points"),
-        (_percent(document["noise_floor_percent"]), "noise floor"),
-    ]
+    key, last = "mean_abs_error_percent", document["steps"][-1]
+    found = [(_percent(document["steps"][0][key]), "mean error as given")]
+    if document["objective"] == "likelihood":
+        found.append((_percent(document["strut_law_refitted"][key]), "mean error, strut law refitted"))
+    if last["effects"] or document["objective"] != "likelihood":
+        called = f"mean error with {' + '.join(last['effects'])}" if last["effects"] else last["name"]
+        found.append((_percent(last[key]), called))
+    found.append((_percent(last["held_out_error_percent"]), "the same at left-out points"))
+    found.append((_percent(document["noise_floor_percent"]), "would be left by scatter alone"))
     return figures(found)
 
 
 def _by_direction(document: Mapping[str, Any]) -> str:
-    first, last = document["steps"][0]["by_direction"], document["steps"][-1]["by_direction"]
+    first, last = document["steps"][0]["by_direction"], result_step(document)["by_direction"]
     rows = [
         (
             name,
@@ -107,12 +116,13 @@ def _by_direction(document: Mapping[str, Any]) -> str:
         )
         for name, before in first.items()
     ]
-    head = ("direction", "readings", "before", "after", "after, left out", "bias before", "bias after")
-    return text_table(head, [("", row) for row in rows], range(1, len(head)))
+    head = ("direction", "readings", "as given", "after", "after, left out", "bias as given", "bias after")
+    remark = f"Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."
+    return text_table(head, [("", row) for row in rows], range(1, len(head))) + f'<p class="muted">{remark}</p>'
 
 
 def _fitted(document: Mapping[str, Any]) -> str:
-    last = document["steps"][-1]
+    last = result_step(document)
     rows = [
         ("strut law", f"at {end['length_mm']:.1f} mm", f"{end['stiffness']:.2f} N/um", f"sd {end['sd']:.2g} N/um")
         for end in last["strut_law_N_per_um"]
@@ -141,7 +151,7 @@ def _support(document: Mapping[str, Any]) -> str:
                 "; ".join(one["reasons"]),
             )
         )
-    head = ("effect", "borne", "fall at left-out points", "gain in twice the log likelihood", "what speaks against it")
+    head = ("effect", "supported", "fall at left-out points", "gain in twice the log likelihood", "what is against it")
     return text_table(head, [("", row) for row in rows], (2, 3))
 
 

@@ -8,10 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.report.diagnose_words import best_explanation, figure_of, name_text, percent, significant
+from toolpath_stiff.report.diagnose_words import (
+    AS_GIVEN,
+    best_explanation,
+    figure_of,
+    name_text,
+    percent,
+    significant,
+)
 from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
-from toolpath_stiff.report.wording import number, plain, shortened
+from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.updating.inference.baseline import LAW_REFITTED, deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,17 +56,19 @@ def before_after_png(
     data
         n readings.
     before, after
-        (n,) ln(measured / modelled). Without `after`, or where the verdict is `adequate` and nothing is to be added,
-        only the first half is drawn.
+        (n,) ln(measured / modelled), of the machine file as given and of the last model. Without `after` only the
+        first half is drawn.
     names
         What the two models are called; else taken from the document.
     """
     halves = [np.asarray(before, dtype=float)]
-    if after is not None and document.get("verdict") != "adequate":
+    if after is not None:
         halves.append(np.asarray(after, dtype=float))
-    known = (document.get("baseline") or {}, best_explanation(document) or {})
+    base = document.get("baseline") or {}
+    known: tuple[Mapping[str, Any], Mapping[str, Any]] = ({}, last_model(document))
     word = "best of the catalogue:" if document.get("verdict") == "unexplained" else "with"
-    called = names or ("strut law refitted", f"{word} {name_text(known[1])}")
+    last = LAW_REFITTED if known[1] is base else f"{word} {name_text(known[1])}"
+    called = names or (AS_GIVEN, last)
     directions, levels = _directions(data), _levels(data)
     columns, rows = [d for d in DIRECTION_COLOURS if (directions == d).any()], np.unique(levels)
     limit = _limit(halves)
@@ -66,7 +76,12 @@ def before_after_png(
     width = max(1.1 + len(halves) * block + 0.9, 11.0 if len(halves) > 1 else 8.0)
     height = 1.35 + MAP * len(rows) + 0.4 + 4.0
     question = "Did the error fall, and what remains?" if len(halves) > 1 else "Where does the model fail?"
-    note = f"maps from above, X to the right, {2.4 * _reach(data):.0f} mm wide; a point: mean of its readings"
+    wide = f"{2.4 * _reach(data):.0f} mm wide"
+    refitted = figure_of(base, "mean_abs_error_percent")
+    step = f"{LAW_REFITTED} alone: {percent(refitted, 2)}; " if refitted is not None and known[1] is not base else ""
+    note = (
+        f"{step}{DEVIATION}, {MINUS_IS_SOFTER}; maps from above, X to the right, {wide}; a point: mean of its readings"
+    )
     with house_style():
         figure = new_figure(width, height)
         figure.text(0.25 / width, 1.0 - 0.4 / height, question, size=14, weight="bold")
@@ -98,18 +113,24 @@ def before_after_png(
             ((0.95 + len(halves) * block) / width, (height - 1.35 - MAP * len(rows) + 0.1) / height, 0.16 / width,
              (MAP * len(rows) - 0.3) / height)
         )  # fmt: skip
-        figure.colorbar(points, cax=bar, extend="both").set_label("measured over modelled, %", size=9)
+        figure.colorbar(points, cax=bar, extend="both").set_label(f"{DEVIATION}, %", size=9)
         bar.grid(visible=False)
         _scatter_pair(figure, data, halves, directions)
         return png_bytes(figure)
 
 
+def last_model(document: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The best explanation; the refitted strut law where none is needed or none was offered."""
+    base: Mapping[str, Any] = document.get("baseline") or {}
+    return base if document.get("verdict") == "adequate" else best_explanation(document) or base
+
+
 def _half_title(name: str, entry: Mapping[str, Any], residual: FloatArray) -> str:
     """Name and errors: the mean as the paper counts it, and at left-out points where it is known."""
     relative = np.expm1(-residual[np.isfinite(residual)])
-    text = f"{shortened(plain(name), 44)}   mean error {100 * float(np.mean(np.abs(relative))):.1f} %"
+    text = f"{shortened(plain(name), 44)}   mean error {100 * float(np.mean(np.abs(relative))):.2f} %"
     held_out = figure_of(entry, "held_out_error_percent")
-    return text + (f" (at points left out {percent(held_out)})" if held_out is not None else "")
+    return text + (f" (at points left out {percent(held_out, 2)})" if held_out is not None else "")
 
 
 def _directions(data: Measurements) -> NDArray[np.str_]:
@@ -137,7 +158,7 @@ def _level_text(data: Measurements, chosen: NDArray[np.bool_]) -> str:
 
 def _limit(halves: Sequence[FloatArray]) -> float:
     """End of the common colour scale, %: of both halves together, few extreme readings not taking the contrast."""
-    sizes = np.abs(100.0 * np.expm1(np.concatenate(halves)))
+    sizes = np.abs(deviation_percent(np.concatenate(halves)))
     sizes = sizes[np.isfinite(sizes)]
     return max(float(np.quantile(sizes, SHOWN)), 1e-3) if len(sizes) else 1.0
 
@@ -148,7 +169,7 @@ def _map(axes: Axes, data: Measurements, residual: FloatArray, chosen: NDArray[n
     poses, which = np.unique(
         np.round(np.concatenate([data.position, data.angles], axis=1)[chosen], 6), axis=0, return_inverse=True
     )
-    percent_ = 100.0 * np.expm1(residual[chosen])
+    percent_ = deviation_percent(residual[chosen])
     places, values = (
         mm_from_m(poses[:, :2]),
         np.array([np.mean(percent_[which.ravel() == k]) for k in range(len(poses))]),
@@ -310,7 +331,7 @@ def error_ladder_png(
         axes.set_ylim(0.0, 1.25 * top or 1.0)
         axes.set_xlim(-0.4, len(steps) - 0.3)
         axes.set_xticks(at, [_step_text(step) for step in steps], color=INK, size=9)
-        axes.set_ylabel("mean |model - measured| / measured, %", size=9.5)
+        axes.set_ylabel("mean |modelled - measured| / measured, %", size=9.5)
         axes.grid(visible=False, axis="x")
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(frameon=False, ncol=3, loc="lower left", bbox_to_anchor=(-0.01, 1.0))
@@ -362,6 +383,6 @@ def figure3_png(
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(lambda value, _: significant(value, 1))
         axes.set_xlabel("stiffness of each platform bar, N/m")
-        axes.set_ylabel("mean |model - measured| / measured, %")
+        axes.set_ylabel("mean |modelled - measured| / measured, %")
         axes.legend(frameon=False)
         return png_bytes(figure)

@@ -50,20 +50,26 @@ def _ladder(document: Mapping[str, Any]) -> list[str]:
     return found
 
 
+def result_step(document: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The model that comes out: the last step, the machine file as given where nothing is added."""
+    found: Mapping[str, Any] = document["steps"][0 if document["verdict"] == "nothing added" else -1]
+    return found
+
+
 def _by_direction(document: Mapping[str, Any]) -> list[str]:
-    first, last = document["steps"][0]["by_direction"], document["steps"][-1]["by_direction"]
-    found = ["direction  readings  before %  after %  left out %"]
+    first, last = document["steps"][0]["by_direction"], result_step(document)["by_direction"]
+    found = ["direction  readings  as given %  after %  left out %"]
     for name, before in first.items():
         after = last[name]
         found.append(
-            f"{name:<9}  {before['readings']:>8}  {before['mean_abs_error_percent']:>8.2f}  "
+            f"{name:<9}  {before['readings']:>8}  {before['mean_abs_error_percent']:>10.2f}  "
             f"{after['mean_abs_error_percent']:>7.2f}  {_figure(after['held_out_error_percent'], 10)}"
         )
     return found
 
 
 def _parameters(document: Mapping[str, Any]) -> list[str]:
-    last = document["steps"][-1]
+    last = result_step(document)
     found = []
     if last["strut_law_N_per_um"][0]["sd"] is not None:
         ends = " and ".join(

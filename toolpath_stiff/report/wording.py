@@ -12,6 +12,10 @@ from toolpath_stiff.stiffness.acting import machine_words
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
 
+# The sign of every residual that is shown, for axes and legends.
+DEVIATION = "(measured - modelled) / modelled"
+MINUS_IS_SOFTER = "minus: softer than modelled"
+
 
 ONLY_PLUNGES = "only plunges"  # beside a program, a tool or an operation
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 
 FloatArray = NDArray[np.float64]
 
@@ -47,3 +48,10 @@ class ContactNonlinearity(Effect):
             return None
         force = np.maximum(np.abs(path.strut_forces), IDLE)
         return np.asarray(p["compliance"] * np.cbrt(REFERENCE_FORCE / force))
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """Which part gives way, by how much."""
+        return (
+            f"the contacts in the joints of a strut give way by about {about(p['compliance'])} nm/N at "
+            f"{REFERENCE_FORCE:g} N, less under more load"
+        )

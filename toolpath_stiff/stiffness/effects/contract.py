@@ -14,7 +14,7 @@ Everything is SI and batched over n poses. A method that an effect does not impl
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
@@ -242,10 +242,38 @@ class Effect:
         """Whether these poses come with every condition that it waits for."""
         return all(getattr(path, CONDITIONS[name]) is not None for name in self.conditions(p))
 
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What a fit has found, as an engineer says it: a clause with its size and unit, the cause first.
+
+        `p`: parameter name -> value in the units of files, choices as they are.
+        """
+        sizes = []
+        for one in self.parameters:
+            value = p[one.name] if one.discrete else f"{float(f'{p[one.name]:.3g}'):g} {one.unit}".rstrip()
+            sizes.append(f"{one.name.replace('_', ' ')} {value}")
+        return f"{self.title}, {', '.join(sizes)}"
+
     @property
     def is_instrument(self) -> bool:
         """Whether it changes readings only."""
         return self.link == "instrument"
+
+
+def joined(parts: Sequence[str]) -> str:
+    """Parts as a sentence lists them, "a, b and c"; "nothing" without parts."""
+    if len(parts) < 2:
+        return parts[0] if parts else "nothing"
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def sizes_in_words(sizes: Sequence[tuple[float, str]]) -> str:
+    """Sizes that are not zero, each before its unit and place: "0.35 nm/N along X and 0.19 nm/N along Y"."""
+    return joined([f"{about(size)} {words}" for size, words in sizes if size])
+
+
+def about(size: float) -> str:
+    """How large it is, to two digits and without sign: "19", "0.054"."""
+    return f"{float(f'{abs(size):.2g}'):g}"
 
 
 def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> dict[str, Any]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, sizes_in_words
 
 FloatArray = NDArray[np.float64]
 
@@ -67,6 +68,12 @@ class FrameCompliance(Effect):
             own = p["radial"] * _outer(outward) + p["vertical"] * _outer(upward)
             form[np.ix_(range(len(path)), pair, pair)] += own
         return form
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """Which part gives way, by how much."""
+        sizes = sizes_in_words([(p["radial"], "nm/N radially"), (p["vertical"], "nm/N vertically")])
+        which = f"frame vertex {p['vertex']} gives" if p["vertex"] else "all three frame vertices give"
+        return f"{which} way by about {sizes}"
 
 
 def frame_vertices(frame_joints: FloatArray) -> list[tuple[list[int], FloatArray]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 
 FloatArray = NDArray[np.float64]
 
@@ -70,3 +70,9 @@ class GaugeScale(Effect):
         if p["setup"]:
             used &= path.setup == p["setup"] if path.setup is not None else False
         return np.where(used, (1.0 + p["scale"]) * stiffness, stiffness)
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What is off, to which side, by how much."""
+        where = f" along {'XYZ'[p['direction'] - 1]}" if p["direction"] else ""
+        where += f" in set-up {p['setup']}" if p["setup"] else ""
+        return f"readings{where} are about {about(p['scale'])} % too {'high' if p['scale'] > 0.0 else 'low'}"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 
 FloatArray = NDArray[np.float64]
 
@@ -46,3 +47,7 @@ class JointClearance(Effect):
         if path.strut_forces is None:
             return None
         return np.asarray(p["lost_motion"] / np.maximum(np.abs(path.strut_forces), IDLE))
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What is off, to which side, by how much."""
+        return f"every strut moves about {about(p['lost_motion'])} um to each side before it carries its load"

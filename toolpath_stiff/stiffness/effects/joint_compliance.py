@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 
 FloatArray = NDArray[np.float64]
 
@@ -40,3 +41,7 @@ class JointCompliance(Effect):
     def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
         """The constant, for every strut and pose."""
         return np.full((len(path), 6), p["compliance"])
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """Which part gives way, by how much."""
+        return f"joints and nut of every strut give way by about {about(p['compliance'])} nm/N"

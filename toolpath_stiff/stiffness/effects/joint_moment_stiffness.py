@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 
 FloatArray = NDArray[np.float64]
 
@@ -53,6 +54,10 @@ class JointMomentStiffness(Effect):
         against_platform[..., 3:] -= np.eye(3) - axis[..., :, None] * axis[..., None, :]
         rotations = np.concatenate([against_frame, against_platform], axis=2).reshape(len(path), 36, 6)
         return np.asarray(p["stiffness"] * np.swapaxes(rotations, 1, 2) @ rotations)
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What is off, to which side, by how much."""
+        return f"the joints resist turning by about {about(p['stiffness'] / 1e3)} kN m/rad at each end of each strut"
 
 
 def _cross(vector: FloatArray) -> FloatArray:

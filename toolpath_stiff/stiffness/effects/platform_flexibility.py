@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 from toolpath_stiff.stiffness.platform_truss import free_platform_flexibility
 
 FloatArray = NDArray[np.float64]
@@ -46,6 +47,10 @@ class PlatformFlexibility(Effect):
             flexibility = free_platform_flexibility(joints) / p["bar_stiffness"]
             form[rows] = np.swapaxes(loads[rows], 1, 2) @ flexibility @ loads[rows]
         return form
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """Which part gives way, by how much."""
+        return f"the platform is flexible: its bars have about {about(p['bar_stiffness'] / 1e6)} N/um each"
 
 
 def platform_loads(path: LoadPath) -> FloatArray:

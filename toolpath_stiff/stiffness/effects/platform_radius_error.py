@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, Parameter, about
 
 
 class PlatformRadiusError(Effect):
@@ -42,3 +43,8 @@ class PlatformRadiusError(Effect):
         off_axis = radius > 0.0
         joints[off_axis, :2] *= (1.0 + p["error"] / radius[off_axis])[:, None]
         return machine.with_changes(platform_joints=joints)
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What is off, to which side, by how much."""
+        side = "out" if p["error"] > 0.0 else "in"
+        return f"the platform's joints stand about {about(p['error'])} mm further {side} than in the machine file"

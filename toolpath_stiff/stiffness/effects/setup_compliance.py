@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, sizes_in_words
 
 FloatArray = NDArray[np.float64]
 
@@ -54,3 +54,8 @@ class SetupCompliance(Effect):
         form = np.zeros((len(path), 12, 12))
         form[path.setup == p["setup"], 6:9, 6:9] = np.diag([p["x"], p["y"], p["z"]])
         return form
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """Which part gives way, by how much."""
+        sizes = sizes_in_words([(p[axis], f"nm/N along {axis.upper()}") for axis in "xyz"])
+        return f"set-up {p['setup']} (riser or fixture) gives way by about {sizes}"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, sizes_in_words
 
 FloatArray = NDArray[np.float64]
 
@@ -52,3 +53,8 @@ class SpindleCompliance(Effect):
         own = np.diag([p["radial"], p["radial"], p["axial"]])
         form[:, 6:9, 6:9] = path.rotation @ own @ np.swapaxes(path.rotation, 1, 2)
         return form
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """Which part gives way, by how much."""
+        sizes = sizes_in_words([(p["radial"], "nm/N across"), (p["axial"], "nm/N along")])
+        return f"spindle, holder and tool give way by about {sizes} the tool axis"

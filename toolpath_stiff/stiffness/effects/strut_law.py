@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 
 FloatArray = NDArray[np.float64]
 
@@ -41,3 +42,11 @@ class StrutLawCurvature(Effect):
         length = path.struts.lengths
         x = (2.0 * length - law.length_1 - law.length_2) / (law.length_2 - law.length_1)
         return np.asarray(np.expm1(-p["curvature"] * (1.0 - x * x)) / law.stiffness(length))
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What is off, to which side, by how much."""
+        side = "stiffer" if p["curvature"] > 0.0 else "softer"
+        return (
+            f"midway between the strut law's two lengths struts are about {about(p['curvature'])} % {side} than on "
+            "its straight line"
+        )

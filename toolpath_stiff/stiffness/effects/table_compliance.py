@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, sizes_in_words
 
 FloatArray = NDArray[np.float64]
 
@@ -59,3 +60,10 @@ class TableCompliance(Effect):
         form = np.zeros((len(path), 12, 12))
         form[:, 6:9, 6:9] = np.diag([p["x"], p["y"], p["z"]]) + p["rocking"] * np.swapaxes(moment, 1, 2) @ moment
         return form
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """Which part gives way, by how much."""
+        sizes = sizes_in_words(
+            [*((p[axis], f"nm/N along {axis.upper()}") for axis in "xyz"), (p["rocking"], "nrad/(N m) in rocking")]
+        )
+        return f"the table gives way by about {sizes}"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 
 FloatArray = NDArray[np.float64]
 
@@ -39,3 +40,8 @@ class ThermalDrift(Effect):
             return stiffness
         deflection = path.force / stiffness + p["rate"] * path.time
         return np.where(deflection > 0.0, path.force / np.where(deflection > 0.0, deflection, 1.0), np.nan)
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What is off, to which side, by how much."""
+        side = "larger" if p["rate"] > 0.0 else "smaller"
+        return f"the indicator drifts by about {about(p['rate'])} um/min towards {side} deflection while it is read"

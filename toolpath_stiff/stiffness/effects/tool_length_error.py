@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, Parameter, about
 
 
 class ToolLengthError(Effect):
@@ -34,3 +35,8 @@ class ToolLengthError(Effect):
     def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
         """Platform joints further above the tip."""
         return machine.with_changes(platform_joints=machine.platform_joints + np.array([0.0, 0.0, p["error"]]))
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What is off, to which side, by how much."""
+        side = "longer" if p["error"] > 0.0 else "shorter"
+        return f"the tool is about {about(p['error'])} mm {side} than the length that was entered"

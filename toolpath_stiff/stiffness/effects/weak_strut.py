@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 
 FloatArray = NDArray[np.float64]
 
@@ -50,3 +51,8 @@ class WeakStrut(Effect):
         which = int(p["strut"]) - 1
         more[:, which] = (1.0 / p["factor"] - 1.0) / path.machine.strut_law.stiffness(path.struts.lengths[:, which])
         return more
+
+    def finding(self, p: Mapping[str, Any]) -> str:
+        """What is off, to which side, by how much."""
+        change = 100.0 * (p["factor"] - 1.0)
+        return f"strut {p['strut']} is about {about(change)} % too {'soft' if change < 0.0 else 'stiff'}"

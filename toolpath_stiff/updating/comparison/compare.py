@@ -1,7 +1,7 @@
 """`tps compare`: how far the model is from the measurements, where, and how much of it is more than scatter.
 
-Errors are those of the paper, (model - measured) / measured: positive where the model is too stiff. What is tested are
-residuals r = ln(measured / modelled), on which noise and effects are both additive.
+What is tested are residuals r = ln(measured / modelled), on which noise and effects are both additive. How errors are
+counted and which sign they have: `baseline`.
 """
 
 from __future__ import annotations
@@ -31,15 +31,18 @@ from toolpath_stiff.updating.comparison.residual_structure import (
     find_structure,
 )
 from toolpath_stiff.updating.comparison.residual_variables import Label, Variable, directions, labels, planes, variables
+from toolpath_stiff.updating.inference.baseline import Baseline, deviation_percent, error_figures
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.fit import Fit
 from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, Noise, covariance, noise_models
 from toolpath_stiff.updating.inference.predict import Predictor, scaled_law
+from toolpath_stiff.updating.inference.scatter import Scatter
 from toolpath_stiff.updating.readings.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 HINTS = 3  # patterns named where none stands out
-GAUSS_NEWTON_STEPS = 8
 FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
 TELLS_LAW = 0.01  # smallest over largest singular value from which data tell the law's two constants apart
 
@@ -90,10 +93,8 @@ class _Answer:
     noise: Noise
     scattering: Scattering
     structure: Structure
-    far: NDArray[np.int64]
     refitted: Structure | None
-    law: FloatArray | None
-    log_refitted: FloatArray | None
+    law: Fit | None
     model_free: list[dict[str, Any]]
 
 
@@ -153,14 +154,13 @@ def compare(
         spread = covariance(model, predictor, joints)
         scattering = Scattering(model, spread, data.clamp, place, draws, seed)
         structure = find_structure(residual, looked_for, scattering)
-        far = far_off(residual, scattering, structure, looked_for)[1]
-        refitted = law = log_refitted = None
-        if len(data) >= FEWEST_TO_REFIT and np.linalg.cond(law_columns) < 1.0 / TELLS_LAW:
-            refitted = find_structure(residual, looked_for, scattering, law_columns.T, most=0)
-            same = (place[:, None] == place[None, :]) * structure.excess**2
-            law, log_refitted = _refit(predictor, spread + same, np.setdiff1d(np.arange(len(data)), far))
+        refitted = law = None
+        if len(data) >= FEWEST_TO_REFIT:
+            law = Baseline.of(Problem(predictor, Scatter.of(model, spread), spread)).refitted
+            if np.linalg.cond(law_columns) < 1.0 / TELLS_LAW:
+                refitted = find_structure(residual, looked_for, scattering, law_columns.T, most=0)
         free = assess(checks, data, spread, scattering.draws(0.0))
-        return _Answer(model, scattering, structure, far, refitted, law, log_refitted, free)
+        return _Answer(model, scattering, structure, refitted, law, free)
 
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         answers = list(pool.map(answer, noises))
@@ -180,35 +180,6 @@ def _places(data: Measurements) -> NDArray[np.int64]:
     columns += [data.tool_extension[:, None], setup.reshape(-1, 1)]
     found = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
     return np.asarray(found.reshape(-1), dtype=np.int64)
-
-
-def _refit(predictor: Predictor, spread: FloatArray, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-    """The strut law's logarithms that fit some rows best under a covariance, and (n,) ln(N/m) with them."""
-    measured = np.log(predictor.data.stiffness)
-    inverse = np.zeros_like(spread)
-    inverse[np.ix_(rows, rows)] = np.linalg.inv(spread[np.ix_(rows, rows)])
-    law = np.zeros(2)
-    log_model = predictor.log_stiffness()
-    for _ in range(GAUSS_NEWTON_STEPS):
-        columns = predictor.law_columns(log_model, law)
-        step = np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ (measured - log_model))
-        trial = predictor.log_stiffness(law + step)
-        if not np.isfinite(trial).all():
-            break
-        law, log_model = law + step, trial
-        if float(np.abs(step).max()) < 1e-9:
-            break
-    return law, log_model
-
-
-def error_figures(residual: FloatArray) -> dict[str, float]:
-    """Errors of the model in per cent: mean of the size as the paper counts it, bias (positive: too stiff), rms."""
-    error = 100.0 * np.expm1(-residual)
-    return {
-        "mean_abs_error_percent": float(np.abs(error).mean()),
-        "bias_percent": float(error.mean()),
-        "rms_percent": float(np.sqrt((error**2).mean())),
-    }
 
 
 def _figures(residual: FloatArray, answers: list[_Answer], rows: NDArray[np.bool_]) -> dict[str, Any]:
@@ -353,7 +324,7 @@ def _far_off_entries(
             "reading": i + 1,
             "point": str(data.point[i]),
             "direction": str(directions(data)[i]),
-            "off_percent": float(100.0 * np.expm1(rest[i])),
+            "off_percent": float(deviation_percent(rest[i])),
             "standard_deviations": float(ratio[i]),
         }
         for i in far.tolist()
@@ -361,17 +332,17 @@ def _far_off_entries(
 
 
 def _refit_figures(predictor: Predictor, one: _Answer) -> dict[str, Any] | None:
-    """What refitting the strut law's two constants would leave; None if the data cannot tell them."""
-    if one.law is None or one.log_refitted is None or one.refitted is None:
+    """What refitting the strut law's two constants would leave, as in a diagnosis; None with too few readings."""
+    if one.law is None:
         return None
-    law = scaled_law(predictor.machine.strut_law, one.law)
+    law = scaled_law(predictor.machine.strut_law, one.law.law)
     return {
-        **error_figures(np.log(predictor.data.stiffness) - one.log_refitted),
+        **error_figures(one.law.residual),
         "strut_law": {
             "at_mm": [mm_from_m(law.length_1), mm_from_m(law.length_2)],
             "N_per_um": [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6],
         },
-        "excess_scatter_percent": 100.0 * one.refitted.excess,
+        "excess_scatter_percent": None if one.refitted is None else 100.0 * one.refitted.excess,
     }
 
 
@@ -392,6 +363,6 @@ def _assumptions(answers: list[_Answer]) -> list[str]:
         f"struts alike to {100 * noise.strut_spread:.2g} %, joints where the machine file has them to "
         f"{mm_from_m(noise.joint_error):.2g} mm (standard deviations, assumed)",
         f"{100 * noise.outliers:.2g} % of the readings wild, {noise.outlier_width:g} times wider (assumed)",
-        "the strut law is that of the machine file, not refitted",
+        "findings and pictures: the machine file as given, its strut law not refitted",
         f"scatter from place to place beyond the noise is looked for from {100 * EXCESSES[1]:.2g} % up",
     ]

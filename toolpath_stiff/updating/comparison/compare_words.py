@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.updating.comparison.residual_patterns import sentence
 from toolpath_stiff.updating.comparison.residual_structure import SIGNIFICANT, Found, Pattern, Structure
 from toolpath_stiff.updating.comparison.residual_variables import Variable
+from toolpath_stiff.updating.inference.baseline import errors_text
 
 FloatArray = NDArray[np.float64]
 
@@ -63,14 +64,13 @@ def merged_findings(
 
 
 def overall_text(document: dict[str, Any]) -> str:
-    """Error, bias and what scatter explains, in two or three sentences."""
+    """Error, bias and what scatter explains, in a few sentences."""
     figures = document["baseline"]
-    bias = figures["bias_percent"]
-    side = "too stiff" if bias > 0 else "too soft"
+    bias, refit = figures["bias_percent"], figures["strut_law_refitted"]
     text = (
-        f"The model is {figures['mean_abs_error_percent']:.2f} % off in the mean, {abs(bias):.1f} % {side} on balance "
-        f"(rms {figures['rms_percent']:.1f} %, {document['readings']} reading"
-        f"{'' if document['readings'] == 1 else 's'})."
+        f"Mean error {errors_text(figures['mean_abs_error_percent'], refit and refit['mean_abs_error_percent'])} "
+        f"({document['readings']} reading{'' if document['readings'] == 1 else 's'}). As given, {_balance(bias)}, "
+        f"rms {figures['rms_percent']:.1f} %."
     )
     parts = []
     for noise in document["noise"]:
@@ -86,3 +86,10 @@ def overall_text(document: dict[str, Any]) -> str:
     if not document["findings"]:
         text += " No pattern stands out from scatter."
     return text
+
+
+def _balance(bias: float) -> str:
+    """To which side the machine differs from its model, %."""
+    if abs(bias) < 0.05:
+        return "neither softer nor stiffer than modelled on balance"
+    return f"{abs(bias):.1f} % {'softer' if bias < 0.0 else 'stiffer'} than modelled on balance"

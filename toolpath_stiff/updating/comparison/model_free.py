@@ -3,7 +3,7 @@
 - Threefold symmetry: a tensor that a turn by 120 degrees leaves alone is isotropic across the axis, so that X and Y are
   equally stiff on the axis of a machine whose three legs are alike; and a pose turned by 120 degrees about the axis has
   the same stiffness along the turned direction, and the same 1/k_x + 1/k_y.
-- Proportionality (Hooke): the stiffness does not hang on the size of the load.
+- Proportionality (Hooke): the stiffness does not depend on the size of the load.
 - Set-ups: one pose and direction measured in two set-ups differ only by what the set-ups add.
 - Reciprocity (Maxwell, Betti): C_xy = C_yx; needs the displacement across the load, which these data do not carry.
 
@@ -241,7 +241,7 @@ def _proportionality(data: Measurements) -> Iterator[Check]:
                 "proportionality",
                 np.log(2.0) * x / float((x**2).sum()),
                 f"Load doubled, {name}: {{percent}}",
-                "readings hang on the load: contacts, clearance and a drifting indicator make it stiffer with load, "
+                "readings depend on the load: contacts, clearance and a drifting indicator make it stiffer with load, "
                 "friction softer",
             )
 

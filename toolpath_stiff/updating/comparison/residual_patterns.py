@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.updating.comparison.residual_structure import Found, Pattern
+from toolpath_stiff.stiffness.effects.contract import about
+from toolpath_stiff.updating.comparison.residual_structure import SIGNIFICANT, Found, Pattern
 from toolpath_stiff.updating.comparison.residual_variables import Label, Variable, directions, varies
 from toolpath_stiff.updating.readings.measurements import Measurements
 
@@ -22,6 +23,8 @@ BoolArray = NDArray[np.bool_]
 FEWEST = 2  # readings in a level; a single one is a reading, not a pattern
 CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose curvature is looked for too
 ALL = "all"
+NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
+SHARE = "share_of_strut_"  # of the compliance; the strut's number follows
 
 
 def patterns(data: Measurements, numbers: list[Variable], names: list[Label]) -> list[Pattern]:
@@ -95,31 +98,56 @@ def sentence(
 
     `first`: nothing was found before it, so that what it says is what the readings show as they are.
     """
-    who = {ALL: "Every direction", "oblique": "Oblique directions"}.get(pattern.direction, pattern.direction)
+    who = {ALL: "all directions", "oblique": "oblique directions"}.get(pattern.direction, f"along {pattern.direction}")
     mean, count = float(residual[pattern.rows].mean()), int(pattern.rows.sum())
     readings = f"{count} reading{'' if count == 1 else 's'}"
     if pattern.kind == "level":
         return _level_words(found, pattern, who, mean, readings, first)
     x = pattern.values[pattern.rows]
     values = numbers[pattern.variable].values[pattern.rows]
-    unit = f" {numbers[pattern.variable].unit}".rstrip()
     if pattern.kind == "curve":
         middle, ends = found.coefficient * float(x.min()), found.coefficient * float(x.max())
         size = percent(middle - ends)
         how = "stiffer" if middle > ends else "softer"
         return (
-            f"{who} {how} against the model at middling values of {pattern.place} than at its extremes, by "
+            f"{_capital(who)} {how} against the model at middling values of {pattern.place} than at its extremes, by "
             f"{abs(size):.2g} % ({readings})"
         ), size
     low, high = int(np.argmin(values)), int(np.argmax(values))
     first_end, last_end = mean + found.coefficient * float(x[low]), mean + found.coefficient * float(x[high])
     size = percent(last_end - first_end)
-    becomes = "stiffer" if size > 0 else "softer"
-    return (
-        f"{who} {becomes} against the model as {pattern.place} grows: {signed(percent(first_end))} at "
-        f"{_short(values[low], values)}{unit}, {signed(percent(last_end))} at {_short(values[high], values)}{unit} "
-        f"({readings})"
-    ), size
+    unit = f" {numbers[pattern.variable].unit}".rstrip()
+    text = (
+        f"{who} {'stiffer' if size > 0 else 'softer'} against the model as {pattern.place} grows, from "
+        f"{signed(percent(first_end))} at {_short(values[low], values)}{unit} to {signed(percent(last_end))} at "
+        f"{_short(values[high], values)}{unit} ({readings})"
+    )
+    sure = found.p_adjusted < SIGNIFICANT
+    cause = (
+        _as_if(pattern, first_end, last_end, float(values[low]) / 100.0, float(values[high]) / 100.0) if sure else ""
+    )
+    return (f"{cause}: {text}" if cause else _capital(text)), size
+
+
+def _as_if(pattern: Pattern, first: float, last: float, low: float, high: float) -> str:
+    """Which strut of what stiffness would make such a course from its low to its high share of the compliance, or "".
+
+    A strut's stiffness times f adds share (1 / f - 1) to the compliance, and nothing where the share is nothing.
+    """
+    if not pattern.variable.startswith(SHARE) or pattern.direction != ALL or high <= low:
+        return ""
+    change = last - first
+    without = first - change * low / (high - low)
+    softer = 1.0 + float(np.expm1(-change)) / (high - low)
+    if softer <= 0.0 or abs(without) > NOUGHT * abs(change):
+        return ""
+    off = 100.0 * (1.0 / softer - 1.0)
+    strut = pattern.variable.removeprefix(SHARE)
+    return f"As if strut {strut} were about {about(off)} % too {'soft' if off < 0.0 else 'stiff'}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _short(value: float, values: FloatArray) -> str:
@@ -134,15 +162,16 @@ def _level_words(
 ) -> tuple[str, float]:
     place = f" {pattern.place}" if pattern.place else " everywhere" if pattern.direction == ALL else ""
     size, own = percent(mean), percent(found.coefficient)
-    side = "below" if size < 0 else "above"
+    whole = f"{abs(size):.2g} % {_side(size)} than modelled"
     if first or (mean * found.coefficient > 0 and abs(mean) > 0.5 * abs(found.coefficient)):
-        how = "too soft" if size < 0 else "too stiff"
-        return f"{who} {how}{place}: measured {abs(size):.2g} % {side} the model ({readings})", size
-    how = "softer" if own < 0 else "stiffer"
+        return f"{_capital(who)} {whole}{place} ({readings})", size
     return (
-        f"{who} {how}{place} than the findings above would have it, by {abs(own):.2g} %: measured {abs(size):.2g} % "
-        f"{side} the model ({readings})"
+        f"{_capital(who)} {abs(own):.2g} % {_side(own)}{place} than the findings above explain: {whole} ({readings})"
     ), own
+
+
+def _side(change: float) -> str:
+    return "softer" if change < 0.0 else "stiffer"
 
 
 def percent(log_ratio: float) -> float:

@@ -18,6 +18,7 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.effects.registry import known_effects
 from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.inference.baseline import Baseline
 from toolpath_stiff.updating.inference.confounding import Confounding, Detectable, confounding, detectable_sizes
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fit import Fit, refine
@@ -49,8 +50,8 @@ class Diagnosis:
         What was diagnosed, with the effects that these data can test.
     cannot_test
         Effect -> missing columns; empty where nothing in these data depends on the effect.
-    base, fits
-        The refitted base model; effect or "a + b" -> final fit, for all that were offered.
+    as_given, base, fits
+        The machine file as it stands; its strut law refitted; effect or "a + b" -> final fit of all that were offered.
     held_out_base, held_out
         Errors at left-out points.
     confounding, detectable
@@ -67,6 +68,7 @@ class Diagnosis:
     machine: Machine
     effects: tuple[Effect, ...]
     cannot_test: dict[str, tuple[str, ...]]
+    as_given: Fit
     base: Fit
     fits: dict[str, Fit]
     held_out_base: HeldOut
@@ -88,13 +90,17 @@ class Diagnosis:
 
     @property
     def explanations(self) -> tuple[str, ...]:
-        """Hypotheses left standing under any noise model, the most likely first: effects, `none`, "a + b"."""
-        return tuple(dict.fromkeys(name for judgement in self.judgements.values() for name in judgement.explanations))
+        """Hypotheses left standing under any noise model, the most likely first: effects, `none`, "a + b".
+
+        One alone where one is the answer.
+        """
+        most = 1 if self.verdict == "identified" else None
+        return tuple(dict.fromkeys(name for one in self.judgements.values() for name in one.explanations[:most]))
 
     @property
     def before(self) -> FloatArray:
-        """(n,) ln measured - ln modelled of the base model with its strut law refitted."""
-        return self.base.residual
+        """(n,) ln measured - ln modelled of the machine file as given."""
+        return self.as_given.residual
 
     @property
     def best(self) -> str | None:
@@ -103,9 +109,11 @@ class Diagnosis:
         return offered[0] if offered else None
 
     @property
-    def after(self) -> FloatArray | None:
-        """(n,) residual of the best explanation."""
-        return None if self.best is None else self.fits[self.best].residual
+    def after(self) -> FloatArray:
+        """(n,) residual of the best explanation; with the strut law refitted where there is none, or none is needed."""
+        if self.best is None or self.verdict == "adequate":
+            return self.base.residual
+        return self.fits[self.best].residual
 
     @property
     def winner(self) -> tuple[ActiveEffect, ...]:
@@ -202,7 +210,7 @@ def diagnose(
     # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
     main = max(judgements.values(), key=lambda judgement: judgement.noise.typical)
     say("final fits, errors held out by point")
-    base = refine(main.problem, main.base)
+    baseline = Baseline.of(main.problem)
     fits = dict(main.fits)
     for family in main.families:
         if family.best is not None and family.name not in fits:
@@ -210,8 +218,8 @@ def diagnose(
     tested = {family.name for family in main.families}
     cannot |= {effect.name: () for effect in effects if effect.name not in tested}
     return Diagnosis(
-        verdict, plausible, judgements, main, data, machine, effects, cannot, base, fits,
-        held_out(base, data.point), {name: held_out(fit, data.point) for name, fit in fits.items()},
+        verdict, plausible, judgements, main, data, machine, effects, cannot, baseline.as_given, baseline.refitted,
+        fits, held_out(baseline.refitted, data.point), {name: held_out(fit, data.point) for name, fit in fits.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
         tuple(files) or tuple(dict.fromkeys(data.file.tolist())), seed,

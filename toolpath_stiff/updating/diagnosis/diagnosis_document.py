@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.hints import Asked
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
+from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, joined
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.updating.diagnosis.diagnosis_words import next_steps, verdict_text, why
 from toolpath_stiff.updating.inference.averaged_interval import averaged_interval
+from toolpath_stiff.updating.inference.baseline import error_figures
 from toolpath_stiff.updating.inference.candidates import Component
 from toolpath_stiff.updating.inference.confounding import CONFOUNDED
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
@@ -24,6 +25,7 @@ from toolpath_stiff.updating.inference.verdict import ADEQUATE, FALSE_ALARM, HEL
 
 FloatArray = NDArray[np.float64]
 
+SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
 
 
@@ -40,6 +42,7 @@ def document(diagnosis: Diagnosis, command: str = "", asked: Asked | None = None
         "candidates": _candidates(diagnosis),
         "pairs": _pairs(diagnosis),
         "plausible": list(diagnosis.plausible),
+        "explanations": list(diagnosis.explanations),
         "best": diagnosis.best,
         "why": why(diagnosis),
         "cannot_test": [
@@ -85,21 +88,22 @@ def json_number(value: float, digits: int = 5) -> float | None:
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
+def rounded_errors(residual: FloatArray) -> dict[str, float | None]:
+    """`error_figures` as a document has them."""
+    return {name: json_number(value) for name, value in error_figures(residual).items()}
+
+
 def _errors(fit: Fit) -> dict[str, Any]:
-    return {"mean_abs_error_percent": json_number(100.0 * float(fit.errors.mean()))}
+    return {"mean_abs_error_percent": json_number(100.0 * float(fit.errors.mean())), "finding": joined(fit.findings)}
 
 
 def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
-    relative = np.expm1(-diagnosis.base.residual)
-    as_given = np.expm1(diagnosis.predictor.log_stiffness() - diagnosis.main.problem.observed)
     held = diagnosis.held_out_base
     law = diagnosis.machine.strut_law
     factors = np.exp(diagnosis.base.law)
     deviations = np.sqrt(np.diag(diagnosis.base.covariance)[:2])
     return {
-        "mean_abs_error_percent": json_number(100.0 * float(np.abs(relative).mean())),
-        "bias_percent": json_number(100.0 * float(relative.mean())),
-        "rms_percent": json_number(100.0 * float(np.sqrt(np.mean(relative**2)))),
+        **rounded_errors(diagnosis.base.residual),
         "held_out_error_percent": json_number(100.0 * held.mean_error),
         "held_out_rms_percent": json_number(100.0 * held.rms),
         "noise_percent": json_number(100.0 * diagnosis.noise.typical),
@@ -107,10 +111,10 @@ def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
         "probability": json_number(diagnosis.main.probability.get(NONE, 0.0)),
         "probability_outside": json_number(diagnosis.main.probability.get(OUTSIDE, 0.0)),
         "adequate": bool(diagnosis.main.base_gate.probability > FALSE_ALARM),
-        "as_given": {
-            "mean_abs_error_percent": json_number(100.0 * float(np.abs(as_given).mean())),
-            "bias_percent": json_number(100.0 * float(as_given.mean())),
-        },
+        "words": row_words(diagnosis, NONE),
+        # Nothing is fitted: leaving points out changes nothing.
+        "as_given": rounded_errors(diagnosis.as_given.residual)
+        | {"held_out_error_percent": json_number(100.0 * float(diagnosis.as_given.errors.mean()))},
         "law": [
             {
                 "length_mm": json_number(float(mm_from_m(length)), 7),
@@ -127,13 +131,11 @@ def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     main = diagnosis.main
-    best = max((f.log_evidence for f in main.families), default=0.0)
-    best = max(best, main.base.log_evidence)
     ranked = sorted(main.families, key=lambda f: (-main.probability.get(f.name, 0.0), -f.log_evidence, f.name))
-    return [_candidate(diagnosis, family, best) for family in ranked]
+    return [_candidate(diagnosis, family) for family in ranked]
 
 
-def _candidate(diagnosis: Diagnosis, family: Family, best: float) -> dict[str, Any]:
+def _candidate(diagnosis: Diagnosis, family: Family) -> dict[str, Any]:
     main = diagnosis.main
     fit = diagnosis.fits.get(family.name)
     gate = main.gates.get(family.name)
@@ -144,13 +146,14 @@ def _candidate(diagnosis: Diagnosis, family: Family, best: float) -> dict[str, A
         "link": family.effect.link,
         "probability": json_number(main.probability.get(family.name, 0.0)),
         "log_evidence": json_number(family.log_evidence - main.base.log_evidence),
-        "words": words(2.0 * (best - family.log_evidence)),
+        "words": row_words(diagnosis, family.name),
     }
     if fit is None or not any(size.any() for size in fit.sizes):
         return common | {
             "parameters": {},
             "choice": {},
             "mean_abs_error_percent": json_number(100.0 * float(diagnosis.base.errors.mean())),
+            "finding": "",
             "held_out_error_percent": json_number(100.0 * diagnosis.held_out_base.mean_error),
             "held_out_rms_percent": json_number(100.0 * diagnosis.held_out_base.rms),
             "held_out_gain_in_se": 0.0,
@@ -163,7 +166,7 @@ def _candidate(diagnosis: Diagnosis, family: Family, best: float) -> dict[str, A
     bounded = fit.at_upper_bound()
     remark = f"{', '.join(bounded)} at its bound" if bounded else ""
     if not remark and gate is None and not base_passes:
-        remark = "others explain the data far better"
+        remark = "not tested further"
     return common | {
         "parameters": parameters(fit, family),
         "choice": dict(fit.candidates[0].choice),
@@ -178,18 +181,31 @@ def _candidate(diagnosis: Diagnosis, family: Family, best: float) -> dict[str, A
     }
 
 
-def words(twice_log_ratio: float) -> str:
-    """How a hypothesis stands against the best, by twice the log ratio of their evidences (RadVel's wording)."""
-    if twice_log_ratio <= 1e-9:
+def row_words(diagnosis: Diagnosis, name: str) -> str:
+    """How a hypothesis stands: by its odds against the likeliest, unless a gate has settled it."""
+    main = diagnosis.main
+    probability = main.probability.get(name, 0.0)
+    base_passes = main.base_gate.probability > FALSE_ALARM
+    if base_passes:
+        return "enough" if name == NONE else "no more than chance" if probability >= SHOWN else "not needed"
+    gate = main.base_gate if name == NONE else main.gates.get(name)
+    if probability < SHOWN and gate is not None and gate.probability <= (FALSE_ALARM if name == NONE else ADEQUATE):
+        return "does not fit"
+    said = words(probability, max(main.probability.values(), default=0.0))
+    return "closest" if said == "best" and main.verdict == "unexplained" else said
+
+
+def words(probability: float, best: float) -> str:
+    """How a hypothesis stands against the likeliest one, by twice the logarithm of the odds (RadVel's wording)."""
+    if probability < SHOWN:
+        return "ruled out"
+    if probability >= best:
         return "best"
-    for limit, text in (
-        (2.0, "nearly indistinguishable"),
-        (4.0, "somewhat disfavoured"),
-        (10.0, "strongly disfavoured"),
-    ):
-        if twice_log_ratio < limit:
+    twice = 2.0 * float(np.log(best / probability))
+    for limit, text in ((2.0, "nearly indistinguishable"), (4.0, "somewhat disfavoured")):
+        if twice < limit:
             return text
-    return "ruled out"
+    return "strongly disfavoured"
 
 
 def parameters(fit: Fit, family: Family | None = None) -> dict[str, Any]:
@@ -255,6 +271,7 @@ def _pairs(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "effects": list(pair.names),
                 "probability": json_number(diagnosis.main.probability.get(name, 0.0)),
                 "log_evidence": json_number(pair.log_evidence - diagnosis.main.base.log_evidence),
+                "words": row_words(diagnosis, name),
                 "parameters": pair_parameters(fit),
                 **_errors(fit),
                 "held_out_error_percent": json_number(100.0 * held.mean_error),

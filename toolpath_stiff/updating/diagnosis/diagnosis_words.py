@@ -3,54 +3,93 @@
 from __future__ import annotations
 
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
+from toolpath_stiff.updating.inference.baseline import errors_text
 from toolpath_stiff.updating.inference.confounding import CONFOUNDED
-from toolpath_stiff.updating.inference.verdict import FALSE_ALARM, NONE, Judgement
+from toolpath_stiff.updating.inference.verdict import FALSE_ALARM, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:
-    """The verdict in one or two sentences."""
-    base = 100.0 * float(diagnosis.base.errors.mean())
-    names = [name for name in diagnosis.plausible if name != NONE]
+    """The verdict in one or two sentences, the cause first."""
     if diagnosis.verdict == "adequate":
-        tail = ""
-        if names:
-            tail = f" These data could hardly show: {_listed(names)}."
-        return (
-            f"Nothing is missing that these data could show: the model's mean error of {base:.3g} % is what "
-            f"their scatter explains.{tail}"
-        )
+        return f"Nothing is missing that these data could show: what is left is scatter.{_not_excluded(diagnosis)}"
     if diagnosis.verdict == "identified":
-        best = " + ".join(names) if " + ".join(names) in diagnosis.fits else diagnosis.best
-        assert best is not None
-        after = 100.0 * float(diagnosis.fits[best].errors.mean())
-        held = 100.0 * diagnosis.held_out[best].mean_error
-        return (
-            f"{_listed(names)} {'is' if len(names) == 1 else 'are'} missing: with "
-            f"{'it' if len(names) == 1 else 'them'} the mean error falls from {base:.3g} to {after:.3g} % "
-            f"(held out: {held:.3g} %)."
-        )
+        best = diagnosis.explanations[0]
+        return f"{_capital(_cause(diagnosis, best))}. Mean error: {_errors(diagnosis, best)}."
     if diagnosis.verdict == "ambiguous":
-        if len({j.verdict for j in diagnosis.judgements.values()}) > 1:
+        if _noise_decides(diagnosis):
             parts = [
                 f"{j.noise.name} noise ({100 * j.noise.typical:.2g} %): {j.verdict}"
-                + (f" ({_listed(list(j.plausible))})" if j.plausible else "")
+                + (f" ({joined(list(j.explanations))})" if j.explanations else "")
                 for j in diagnosis.judgements.values()
             ]
-            return "The verdict hangs on the noise, which these data do not tell. " + "; ".join(parts) + "."
-        return f"These explain the data about equally well: {_listed(_with_chances(diagnosis))}."
+            return "The verdict depends on the noise, which these data do not tell. " + "; ".join(parts) + "."
+        return _rivals(diagnosis)
     form = diagnosis.main.form
     return (
-        f"Something is missing, and nothing in the catalogue accounts for it: a mean error of {base:.3g} % against "
-        f"{80.0 * diagnosis.noise.typical:.2g} % from noise."
+        "Something is missing, and nothing in the catalogue accounts for it. Mean error: "
+        f"{_errors(diagnosis)}; scatter alone leaves {80.0 * diagnosis.noise.typical:.2f} %."
         + (f" What is left forms a pattern {form}." if form else "")
+        + _closest(diagnosis)
     )
 
 
-def _with_chances(diagnosis: Diagnosis) -> list[str]:
-    """The explanations, each with its probability."""
-    chance = diagnosis.main.probability
-    return [f"{name} ({100.0 * chance.get(name, 0.0):.2g} %)" for name in diagnosis.explanations]
+def _closest(diagnosis: Diagnosis) -> str:
+    """Of unexplained data: what of the catalogue would explain them, were nothing outside it as likely."""
+    named = {name: chance for name, chance in diagnosis.main.probability.items() if name in diagnosis.fits}
+    best = max(named, key=lambda name: named[name], default="")
+    if not best or named[best] < STANDS:
+        return ""
+    outside = diagnosis.main.probability.get(OUTSIDE, 0.0)
+    return f" Closest: {_cause(diagnosis, best)}, but {_percent(outside)} remain for something else."
+
+
+def _noise_decides(diagnosis: Diagnosis) -> bool:
+    """Whether the guesses of the noise lead to different answers."""
+    return len({(j.verdict, j.explanations) for j in diagnosis.judgements.values()}) > 1
+
+
+def _cause(diagnosis: Diagnosis, name: str) -> str:
+    """An explanation as an engineer says it, its effects and its probability after it."""
+    chance = diagnosis.main.probability.get(name, 0.0)
+    if name == NONE:
+        return f"nothing is missing (probability {_percent(chance)})"
+    fit = diagnosis.fits.get(name)
+    said = f"{joined(fit.findings)} " if fit is not None else ""
+    return f"{said}({name}, probability {_percent(chance)})"
+
+
+def _percent(chance: float) -> str:
+    return "more than 99 %" if chance > 0.99 else f"{100.0 * chance:.2g} %"
+
+
+def _rivals(diagnosis: Diagnosis) -> str:
+    """Explanations that stand beside each other."""
+    causes = [_cause(diagnosis, name) for name in diagnosis.explanations]
+    chances = [diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations]
+    if len(causes) < 2:
+        return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
+    if chances[0] < POSITIVE * chances[1]:
+        return f"These explain the data about equally well: either {', or '.join(causes)}."
+    return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
+
+
+def _not_excluded(diagnosis: Diagnosis) -> str:
+    """Of an adequate model: effects that may be there all the same."""
+    names = [name for name in diagnosis.explanations if name != NONE]
+    return f" Not ruled out either, but no more than chance would show: {joined(names)}." if names else ""
+
+
+def _errors(diagnosis: Diagnosis, name: str = "") -> str:
+    """Mean errors as given, with the strut law refitted, with an explanation."""
+    as_given, refitted = (100.0 * float(fit.errors.mean()) for fit in (diagnosis.as_given, diagnosis.base))
+    rest = [(f"with {name}", 100.0 * float(diagnosis.fits[name].errors.mean()))] if name else []
+    return errors_text(as_given, refitted, rest)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def why(diagnosis: Diagnosis) -> list[str]:
@@ -66,7 +105,7 @@ def why(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict == "unexplained":
         tested = [f"{name} (p = {g.probability:.2g})" for name, g in list(main.gates.items())[:4]]
         if tested:
-            found.append(f"even the best explanations leave what noise does not: {', '.join(tested)}")
+            found.append(f"the best of the catalogue leave more than noise would: {', '.join(tested)}")
     return found
 
 
@@ -76,14 +115,16 @@ def _base_text(judgement: Judgement, several: bool) -> str:
     under = f"under the {judgement.noise.name} noise " if several else ""
     if gate.probability > FALSE_ALARM:
         return (
-            f"{under}the model alone passes: p = {gate.probability:.2g}; weighted squares {gate.squares:.4g}, as large "
-            f"or larger in {100 * gate.squares_probability:.2g} % of simulated campaigns; no structure is left (p = "
+            f"{under}the model without a further effect explains the data: p = {gate.probability:.2g}; weighted "
+            f"squares {gate.squares:.4g}, as large or larger in {100 * gate.squares_probability:.2g} % of simulated "
+            f"campaigns; no structure is left (p = "
             f"{gate.structure_probability:.2g}); the best of all effects gains no more than chance (p = "
             f"{gate.gain_probability:.2g})"
         )
     return (
-        f"{under}the model alone fails: p = {gate.probability:.2g} (squares {gate.squares_probability:.2g}, structure "
-        f"{gate.structure_probability:.2g}, gain of the best effect {gate.gain_probability:.2g}); what sticks out most "
+        f"{under}the model without a further effect does not explain the data: p = {gate.probability:.2g} (squares "
+        f"{gate.squares_probability:.2g}, structure {gate.structure_probability:.2g}, gain of the best effect "
+        f"{gate.gain_probability:.2g}); what stands out most "
         f"is a pattern {gate.worst}"
     )
 
@@ -96,6 +137,8 @@ def _confounded(diagnosis: Diagnosis) -> list[str]:
     for i, first in enumerate(plausible):
         for second in plausible[:i]:
             value = float(diagnosis.confounding.matrix[names.index(first), names.index(second)])
+            if not _rival_names(diagnosis, first, second):
+                continue
             if value > CONFOUNDED:
                 found.append(
                     f"{second} and {first} have the same signature on these poses, loads and directions: correlation "
@@ -111,17 +154,22 @@ def _confounded(diagnosis: Diagnosis) -> list[str]:
     return found
 
 
+def _rival_names(diagnosis: Diagnosis, first: str, second: str) -> bool:
+    """Whether one explanation has the first effect without the second, and another the second without the first."""
+    sets = [set(name.split(" + ")) for name in diagnosis.explanations]
+    return any(first in s and second not in s for s in sets) and any(second in s and first not in s for s in sets)
+
+
 def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     """What to do next, as hints: commands run as they stand."""
     if diagnosis.verdict == "identified" and diagnosis.best is not None:
         names = [name for name in diagnosis.plausible if name != NONE]
-        # The diagnosis weighs every effect with the strut law refitted: the update is to do the same.
-        own = [*options(add=names), "--strut-law", "-o", asked.updated_machine]
+        own = [*options(add=names), "-o", asked.updated_machine]
         return [hint("add it" if len(names) == 1 else "add them", asked.command("update", *own))]
     if diagnosis.verdict == "ambiguous":
         found = [hint("measure what tells them apart", asked.command("plan"))]
         if len(diagnosis.judgements) > 1:
-            found.insert(0, "repeat a few readings, re-clamped, or state --noise: the verdict hangs on the scatter")
+            found.insert(0, "repeat a few readings, re-clamped, or state --noise: the verdict depends on the scatter")
         return found
     if diagnosis.verdict == "unexplained":
         file = asked.new_effect
@@ -131,11 +179,3 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
             hint("and try it", asked.command("diagnose", effects=[file])),
         ]
     return ["use the model; `detectable` lists what could still be there unseen"]
-
-
-def _listed(names: list[str]) -> str:
-    if not names:
-        return "nothing"
-    if len(names) == 1:
-        return names[0]
-    return ", ".join(names[:-1]) + " and " + names[-1]

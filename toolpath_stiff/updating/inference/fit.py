@@ -65,6 +65,16 @@ class Fit:
         return tuple(c.active(s) for c, s in zip(self.candidates, self.sizes, strict=True))
 
     @property
+    def findings(self) -> tuple[str, ...]:
+        """Each effect with its size as a clause in an engineer's words."""
+        found = []
+        for candidate, sizes in zip(self.candidates, self.sizes, strict=True):
+            parts = zip(candidate.components, sizes, strict=True)
+            values = {c.parameter.name: c.value(float(size)) / c.parameter.si for c, size in parts}
+            found.append(candidate.effect.finding({**dict(candidate.choice), **values}))
+        return tuple(found)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects."""
         return tuple(c.name for c in self.candidates)
@@ -256,17 +266,17 @@ class _Search:
     ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
         """The step, halved until the fit gets no worse; None for the residual where nothing helps."""
 
-        def badness(at: FloatArray, logs: FloatArray) -> float:
+        def misfit(at: FloatArray, logs: FloatArray) -> float:
             return float(at @ scatter.inverse @ at + (logs @ logs) / LAW_PRIOR**2)
 
-        before = badness(residual, law)
+        before = misfit(residual, law)
         for _ in range(10):
             new_law = law + step[:2] if self.law_free else law
             moved = flat.copy()
             moved[list(self.free)] += step[2:]
             moved = self.bounded(moved)
             new = self.residual(new_law, moved)
-            if np.isfinite(new).all() and badness(new, new_law) <= before + 1e-9:
+            if np.isfinite(new).all() and misfit(new, new_law) <= before + 1e-9:
                 return new_law, moved, new
             step = 0.5 * step
         return law, flat, None

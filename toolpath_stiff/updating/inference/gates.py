@@ -38,7 +38,7 @@ class Gate:
     Attributes
     ----------
     probability
-        Of a worse look than this if the model were right.
+        Of residuals that look worse than these if the model were right.
     squares, simulated
         Weighted sum of squares, and (DRAWS,) simulated ones.
     structure_probability, worst

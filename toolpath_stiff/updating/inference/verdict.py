@@ -4,8 +4,8 @@ Two gates. Absolute: a hypothesis must leave residuals that its own noise explai
 posterior probabilities decide; only a name far ahead of all others is given as the answer.
 
 adequate      nothing is missing that these data could show
-identified    one effect (or one pair) explains the data, and no other does
-ambiguous     several explain them equally well
+identified    one effect (or one pair) explains the data, far likelier than any other
+ambiguous     several explain them, and none is far likelier than the others
 unexplained   something is missing, and nothing in the catalogue accounts for it
 """
 
@@ -40,7 +40,7 @@ STANDS = 0.05  # probability from which something outside the catalogue, or anot
 TESTED = 4  # candidates, besides all those that matter, that go through the absolute gate
 FAR = 8.0  # log evidence behind the best adequate candidate at which the others cannot matter
 SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alone
-# Odds below which a second effect is not spoken of where one suffices: "positive" evidence begins at 3 (Kass and
+# Odds below which a second effect is not considered where one suffices: "positive" evidence begins at 3 (Kass and
 # Raftery 1995, Bayes factors).
 POSITIVE = 3.0
 
@@ -112,7 +112,7 @@ def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Seque
         likely = _smallest_set(posterior)
         likely = likely if NONE in likely else (*likely, NONE)
         return work.judgement("adequate", likely, noise, base_gate, posterior, "")
-    # The base model stays in the running if only the gain of the best candidate, not its own residuals, spoke against.
+    # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
     none_stands = min(base_gate.squares_probability, base_gate.structure_probability) > ADEQUATE
     names = work.adequate_singles(none_stands)
     if names:
@@ -121,7 +121,7 @@ def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Seque
             posterior = work.posterior(none_stands, names)
         likely = _smallest_set(posterior)
         verdict = "identified" if max(posterior.values()) >= NAMED else "ambiguous"
-        if posterior[NONE] > 0.5:  # what spoke against the model is likelier chance than any effect
+        if posterior[NONE] > 0.5:  # what counts against the model is likelier chance than any effect
             verdict = "adequate"
         return work.judgement(verdict, likely, noise, base_gate, posterior, "")
     return work.beyond_singles(noise, base_gate)

@@ -11,6 +11,7 @@ import numpy as np
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.inference.baseline import AS_GIVEN, LAW_REFITTED, Baseline, error_figures
 from toolpath_stiff.updating.inference.candidates import Component
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
 from toolpath_stiff.updating.inference.fit import Fit, fit_effects, refine
@@ -120,6 +121,17 @@ def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: 
         covariance = np.diag([LAW_PRIOR**2] * 2 + [(UNKNOWN_SIZE * size) ** 2 for size in sizes])
         found.append(Rival(name, (0.0, 0.0), (ActiveEffect(effect, values),), covariance))
     return found
+
+
+def errors_so_far(problem: Problem, rivals: Sequence[Rival]) -> dict[str, float]:
+    """Mean errors on the data so far, %: as given, strut law refitted, then with each rival that is an effect."""
+    baseline = Baseline.of(problem)
+    found = {AS_GIVEN: baseline.as_given.residual, LAW_REFITTED: baseline.refitted.residual}
+    for rival in rivals:
+        if rival.effects:
+            modelled = problem.predictor.log_stiffness(np.asarray(rival.law), rival.effects)
+            found[f"with {rival.name}"] = problem.observed - modelled
+    return {name: error_figures(residual)["mean_abs_error_percent"] for name, residual in found.items()}
 
 
 def usual_size(component: Component) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.updating.diagnosis.diagnose import make_problem
-from toolpath_stiff.updating.inference.bounded_fit import base_fit
+from toolpath_stiff.updating.inference.baseline import AS_GIVEN, LAW_REFITTED, Baseline
 from toolpath_stiff.updating.inference.fit import Fit
 from toolpath_stiff.updating.inference.held_out import HeldOut, held_out
 from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, noise_models
@@ -60,7 +60,8 @@ def update_by_mean_error(
     worst = max(noise_models(data, noise, strut_spread), key=lambda one: one.typical)
     problem, _ = make_problem(machine, data, worst, effect_files)
     predictor = problem.predictor
-    given = base_fit(problem, law_free=False)
+    baseline = Baseline.of(problem)
+    given = baseline.as_given
     say("leaving points out, drawing points anew")
     last = Fit(
         (), (), (), found.law, problem.observed - predictor.log_stiffness(found.law),
@@ -69,7 +70,10 @@ def update_by_mean_error(
     )  # fmt: skip
     left_out = HeldOut(leave_points_out(predictor, found.law), np.zeros((0, 2)), data.point)
     steps = (
-        Step("as given", given, held_out(given, data.point)),
+        Step(AS_GIVEN, given, held_out(given, data.point)),
         Step("strut law by mean error", last, left_out),
     )
-    return Update(machine, data, worst, problem, steps, (), (), False, False, "mean-error"), found
+    refitted = Step(LAW_REFITTED, baseline.refitted, held_out(baseline.refitted, data.point))
+    return Update(
+        machine, data, worst, problem, steps, refitted, (), (), False, False, law_asked=True, objective="mean-error"
+    ), found

@@ -1,4 +1,8 @@
-"""Update a machine: fit the effects that a user names (or that the data ask for), and judge whether the data bear them.
+"""Update a machine: fit the effects that a user names (or that the data ask for), and judge whether data support them.
+
+Everything starts from the machine file as given and then from its strut law refitted, which every effect is added to
+unless the law is kept. Effects that are given together are steps in the order in which each lets the error fall; where
+there is no such order, they are one step.
 
 An effect is supported if
 
@@ -23,6 +27,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.updating.diagnosis.diagnose import FEWEST, make_problem, testable_effects
+from toolpath_stiff.updating.inference.baseline import AS_GIVEN, LAW_REFITTED, Baseline
 from toolpath_stiff.updating.inference.bounded_fit import add_effect, base_fit, log_posterior
 from toolpath_stiff.updating.inference.candidates import Candidate
 from toolpath_stiff.updating.inference.discrepancy import discrepancy_forms
@@ -54,7 +59,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Support:
-    """Whether the data bear an effect.
+    """Whether the data support an effect.
 
     Attributes
     ----------
@@ -98,13 +103,15 @@ class Update:
     problem
         Model and scatter.
     steps
-        From the machine file as it stands to the last model.
+        The ladder, from the machine file as it stands to the last model.
+    refitted
+        The strut law refitted alone: the second step, unless the law is kept.
     supports
         Of every effect that was asked for, or that `auto` took.
     turned_down
         Of the effects that `auto` tried last and did not take.
-    forced, auto
-        As asked.
+    forced, auto, law_asked
+        As asked; whether a refitted strut law alone is an update.
     objective
         "likelihood", or "mean-error" for the paper's own estimation.
     """
@@ -114,21 +121,23 @@ class Update:
     noise: Noise
     problem: Problem
     steps: tuple[Step, ...]
+    refitted: Step
     supports: tuple[Support, ...]
     turned_down: tuple[Support, ...]
     forced: bool
     auto: bool
+    law_asked: bool = False
     objective: str = "likelihood"
 
     @property
     def last(self) -> Step:
-        """The last model of the ladder."""
-        return self.steps[-1]
+        """The last model of the ladder; the machine file as given where nothing is to be changed."""
+        return self.steps[-1] if self.changed else self.steps[0]
 
     @property
     def changed(self) -> bool:
-        """Whether anything was fitted."""
-        return len(self.steps) > 1
+        """Whether there is something to be written."""
+        return bool(self.steps[-1].fit.names) or self.law_asked
 
     @property
     def accepted(self) -> bool:
@@ -152,6 +161,7 @@ def update(
     additions: Sequence[Addition] = (),
     *,
     strut_law: bool = False,
+    keep_law: bool = False,
     auto: bool = False,
     force: bool = False,
     noise: float | tuple[float, float] | None = None,
@@ -167,13 +177,15 @@ def update(
     machine, data
         The model and n readings.
     additions
-        The effects to be added, in this order.
+        The effects to be added.
     strut_law
-        Fit the strut law's two stiffnesses along.
+        Write the refitted strut law even if no effect is added.
+    keep_law
+        Keep the strut law of the machine file; else its two stiffnesses are fitted along with every effect.
     auto
-        Go on adding effects while the data bear them.
+        Go on adding effects while the data support them.
     force
-        Keep what the data do not bear.
+        Keep what the data do not support.
     noise, strut_spread, effect_files, seed, progress
         As in `diagnose`.
 
@@ -182,21 +194,23 @@ def update(
     InputError
         Too few readings, an effect named twice or present already, or nothing to do.
     """
-    _check(machine, data, additions, strut_law, auto)
+    _check(machine, data, additions, strut_law, keep_law, auto)
     say = progress or (lambda text: None)
     # Of several noise models the one with the largest noise, as in a diagnosis.
     worst = max(noise_models(data, noise, strut_spread), key=lambda one: one.typical)
     problem, _ = make_problem(machine, data, worst, effect_files)
-    work = _Work(problem, worst, strut_law, seed, tuple(effect_files), say)
-    steps = [work.step("as given", base_fit(problem, law_free=False))]
-    if strut_law:
-        steps.append(work.step("strut law fitted", base_fit(problem, law_free=True)))
-    for addition in additions:
-        say(f"fitting {addition.effect.name}")
-        steps.append(work.added(steps[-1], addition.candidates(data)))
+    work = _Work(problem, worst, not keep_law, seed, tuple(effect_files), say)
+    baseline = Baseline.of(problem)
+    steps = [work.step(AS_GIVEN, baseline.as_given)]
+    refitted = work.step(LAW_REFITTED, baseline.refitted)
+    if not keep_law:
+        steps.append(refitted)
+    asked = [addition.candidates(data) for addition in additions]
+    steps += work.ladder(steps[-1], asked)
+    names = [candidates[0].name for candidates in asked]
     supports = tuple(
-        work.support(work.without(steps[-1], j), steps[-1].fit, j, additions[j].candidates(data))
-        for j in range(len(additions))
+        work.support(work.without(steps[-1], j), steps[-1].fit, j, asked[names.index(name)])
+        for j, name in enumerate(steps[-1].fit.names)
     )
     turned_down: tuple[Support, ...] = ()
     while auto and len(steps[-1].fit.candidates) < MOST_EFFECTS:
@@ -206,10 +220,14 @@ def update(
             break
         steps.append(better)
         supports = (*supports, tried[-1])
-    return Update(machine, data, worst, problem, tuple(steps), supports, turned_down, force, auto)
+    return Update(machine, data, worst, problem, tuple(steps), refitted, supports, turned_down, force, auto, strut_law)
 
 
-def _check(machine: Machine, data: Measurements, additions: Sequence[Addition], strut_law: bool, auto: bool) -> None:
+def _check(
+    machine: Machine, data: Measurements, additions: Sequence[Addition], strut_law: bool, keep_law: bool, auto: bool
+) -> None:
+    if strut_law and keep_law:
+        raise InputError("--strut-law and --keep-strut-law", expected="one of them")
     if not additions and not strut_law and not auto:
         raise InputError("nothing to update", expected="--add EFFECT, --strut-law or --auto")
     lacking = int(np.isnan(data.stiffness).sum())
@@ -226,6 +244,12 @@ def _check(machine: Machine, data: Measurements, additions: Sequence[Addition], 
         if names.count(name) > 1 or name in present:
             found = "is given twice" if names.count(name) > 1 else f"is in machine {machine.name} already"
             raise InputError(f"--add {name}: the effect {found}", hint="a machine carries an effect once")
+
+
+def _falls(before: Step, after: Step) -> bool:
+    """Whether the mean error falls, in sample and at left-out points."""
+    inside = after.fit.errors.mean() < before.fit.errors.mean()
+    return bool(inside) and not after.held.mean_error >= before.held.mean_error
 
 
 def dispersion(fit: Fit) -> float:
@@ -259,6 +283,27 @@ class _Work:
         """A rung higher."""
         fit = add_effect(self.problem, before.fit, candidates, self.law_free)
         return self.step(f"+ {fit.candidates[-1].label}", fit)
+
+    def ladder(self, start: Step, asked: Sequence[Sequence[Candidate]]) -> list[Step]:
+        """Steps that add the effects asked for, each lower than the one before; one step if no order does."""
+        rest, steps = list(asked), [start]
+        while rest:
+            self.say(f"fitting {', '.join(candidates[0].name for candidates in rest)}")
+            trials = [self.added(steps[-1], candidates) for candidates in rest]
+            best = min(range(len(rest)), key=lambda k: trials[k].fit.errors.mean())
+            if len(asked) > 1 and not _falls(steps[-1], trials[best]):
+                return [self.together(start, asked)]
+            steps.append(trials[best])
+            rest.pop(best)
+        return steps[1:]
+
+    def together(self, before: Step, asked: Sequence[Sequence[Candidate]]) -> Step:
+        """Several effects as one step."""
+        fit = before.fit
+        for candidates in asked:
+            fit = add_effect(self.problem, fit, candidates, self.law_free)
+        labels = [candidate.label for candidate in fit.candidates[-len(asked) :]]
+        return self.step(f"+ {' + '.join(labels)}", fit)
 
     def without(self, full: Step, j: int) -> Step:
         """The model with all effects but one, fitted again."""
@@ -318,7 +363,7 @@ class _Work:
         return Support(name, in_se, fall, error, after.held.mean_error, gained, threshold, tuple(reasons))
 
     def next_effect(self, before: Step) -> tuple[Step | None, tuple[Support, ...]]:
-        """The most likely effect that the data bear on top of a step, and the supports of all that were tried."""
+        """The most likely effect that the data support on top of a step, and the supports of all that were tried."""
         _, families, _ = self.field(before.fit)
         tried: list[Support] = []
         for family in [f for f in families if f.best is not None][:TRIED]:

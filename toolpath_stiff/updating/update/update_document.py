@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison.residual_variables import directions
-from toolpath_stiff.updating.diagnosis.diagnosis_document import interval, json_number
+from toolpath_stiff.updating.diagnosis.diagnosis_document import interval, json_number, rounded_errors
+from toolpath_stiff.updating.inference.baseline import LAW_REFITTED, deviation_percent, errors_text
 from toolpath_stiff.updating.inference.fit import NORMAL_95, Fit
 from toolpath_stiff.updating.inference.held_out import gain_in_standard_errors
 from toolpath_stiff.updating.inference.predict import scaled_law
@@ -54,9 +56,10 @@ def document(
     uncertainty = updated.uncertainty if updated is not None else None
     return {
         "verdict": verdict,
-        "text": _text(update, verdict, steps),
+        "text": _text(update, verdict),
         "objective": update.objective,
         "baseline": steps[0],
+        "strut_law_refitted": rounded_errors(update.refitted.fit.residual),
         "steps": steps,
         "support": [_support(one) for one in update.supports],
         "turned_down": [_support(one) for one in update.turned_down],
@@ -92,31 +95,35 @@ def _verdict(update: Update) -> str:
     return UPDATED
 
 
-def _text(update: Update, verdict: str, steps: list[dict[str, Any]]) -> str:
-    first, last = steps[0], steps[-1]
-    errors = _fell("mean error", first["mean_abs_error_percent"], last["mean_abs_error_percent"])
-    if last["held_out_error_percent"] is not None and first["held_out_error_percent"] is not None:
-        held = _fell("at left-out points", first["held_out_error_percent"], last["held_out_error_percent"])
-        errors += f", {held}"
-    names = " and ".join(last["effects"])
+def _text(update: Update, verdict: str) -> str:
+    """What was done, the cause first, then the error step by step."""
     if verdict == NOTHING:
-        return "These data bear no further effect: the machine stays as it is."
+        return f"These data support no further effect: the machine stays as it is. Mean error: {_errors(update)}."
+    fit = update.steps[-1].fit
+    errors = f"Mean error: {_errors(update)}{_left_out(update)}."
     against = "; ".join(f"{one.effect}: {', and '.join(one.reasons)}" for one in update.supports if not one.supported)
     if verdict == REFUSED:
-        return f"The data do not bear {against}. (--force writes it all the same.) With it, {errors}."
+        return f"The data do not support {against}. (--force writes it all the same.) {errors}"
     if verdict == FORCED:
-        return f"Added by force, although the data do not bear it ({against}). {_capital(errors)}."
-    if not names:
-        return f"Strut law fitted; no effect added. {_capital(errors)}."
-    return f"Added {names}. {_capital(errors)}."
+        return f"Added by force, although the data do not support it ({against}). {errors}"
+    if not fit.names:
+        return f"Strut law refitted; no effect added. {errors}"
+    cause = joined(fit.findings)
+    return f"{cause[:1].upper()}{cause[1:]} ({joined(fit.names)} added). {errors}"
 
 
-def _fell(what: str, before: float, after: float) -> str:
-    return f"{what} from {before:.2f} to {after:.2f} %"
+def _errors(update: Update) -> str:
+    """Mean error of every step; of a law that is kept also what refitting it would leave."""
+    steps = [(step.name.replace("+ ", "with ", 1), 100.0 * float(step.fit.errors.mean())) for step in update.steps]
+    law = [(f"({LAW_REFITTED} alone)", 100.0 * float(update.refitted.fit.errors.mean()))]
+    shown = steps[1:] if update.refitted in update.steps or update.objective != "likelihood" else [*law, *steps[1:]]
+    return errors_text(steps[0][1], None, shown)
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+def _left_out(update: Update) -> str:
+    """The last model's error at left-out points."""
+    held = 100.0 * update.steps[-1].held.mean_error
+    return f" ({held:.2f} % at left-out points)" if np.isfinite(held) else ""
 
 
 def _step(update: Update, k: int) -> dict[str, Any]:
@@ -126,13 +133,14 @@ def _step(update: Update, k: int) -> dict[str, Any]:
     found: dict[str, Any] = {
         "name": step.name,
         "effects": list(step.fit.names),
-        **_errors(step.fit.residual),
+        **rounded_errors(step.fit.residual),
+        "findings": list(step.fit.findings),
         "held_out_error_percent": json_number(100.0 * held.mean_error),
         "held_out_rms_percent": json_number(100.0 * held.rms),
         "by_direction": {
             name: {
                 "readings": int((along == name).sum()),
-                **_errors(step.fit.residual[along == name]),
+                **rounded_errors(step.fit.residual[along == name]),
                 "held_out_error_percent": json_number(100.0 * float(held.errors[along == name].mean())),
             }
             for name in np.unique(along).tolist()
@@ -148,16 +156,6 @@ def _step(update: Update, k: int) -> dict[str, Any]:
         found["held_out_gain_in_se"] = json_number(gain, 3)
         found["held_out_se_percent"] = json_number(100.0 * abs(fall / gain), 3) if gain else None
     return found
-
-
-def _errors(residual: FloatArray) -> dict[str, Any]:
-    """Of (modelled - measured) / measured."""
-    relative = np.expm1(-residual)
-    return {
-        "mean_abs_error_percent": json_number(100.0 * float(np.abs(relative).mean())),
-        "bias_percent": json_number(100.0 * float(relative.mean())),
-        "rms_percent": json_number(100.0 * float(np.sqrt(np.mean(relative**2)))),
-    }
 
 
 def _law(machine: Machine, step: Step, widening: float) -> list[dict[str, Any]]:
@@ -220,13 +218,13 @@ def _support(one: Support) -> dict[str, Any]:
 def _assumptions(update: Update) -> list[str]:
     found = [
         f"noise: {update.noise.origin}",
-        "'as given' nothing is fitted, so leaving points out changes nothing: where the machine file's figures were "
+        "as given, nothing is fitted, so leaving points out changes nothing: where the machine file's figures were "
         "fitted to these readings, its error at left-out points looks better than it is",
     ]
     if update.objective != "likelihood":
         found.append(
-            "smallest mean |model - measured| / measured, as the paper counts it; standard deviations by a bootstrap "
-            "over the measuring points"
+            "smallest mean |modelled - measured| / measured, as the paper counts it; standard deviations by a "
+            "bootstrap over the measuring points"
         )
         return found
     found.append(
@@ -243,7 +241,7 @@ def _assumptions(update: Update) -> list[str]:
 
 
 def residuals_csv(update: Update) -> str:
-    """One row a reading: measured, modelled before and after, errors, and the error where its point was left out."""
+    """One row a reading: measured, modelled as given and after, deviations, that where its point was left out."""
     data, before, after = update.data, update.steps[0].fit.residual, update.last.fit.residual
     held = update.last.held.residual
     out = io.StringIO()
@@ -251,8 +249,8 @@ def residuals_csv(update: Update) -> str:
     table.writerow(
         [
             "file", "line", "point", "setup", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx",
-            "dy", "dz", "measured_N_per_mm", "before_N_per_mm", "after_N_per_mm", "before_error_percent",
-            "after_error_percent", "left_out_error_percent", "wild",
+            "dy", "dz", "measured_N_per_mm", "as_given_N_per_mm", "after_N_per_mm", "as_given_deviation_percent",
+            "after_deviation_percent", "left_out_deviation_percent", "wild",
         ]
     )  # fmt: skip
     along = directions(data)
@@ -260,7 +258,7 @@ def residuals_csv(update: Update) -> str:
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
         modelled = [measured * float(np.exp(-residual[i])) for residual in (before, after)]
-        errors = [100.0 * float(np.expm1(-residual[i])) for residual in (before, after, held)]
+        errors = [float(deviation_percent(residual[i])) for residual in (before, after, held)]
         table.writerow(
             [
                 data.file[i], data.line[i], data.point[i], data.setup[i], along[i],

@@ -1,0 +1,308 @@
+"""Compare, diagnose, update, plan tell one story: the same baseline, the same sign, words that agree with figures."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.effects.cases import CATALOGUE
+from tests.stiffness.cases import nist
+from tests.updating.cases import campaign, diagnosed, table_1
+from toolpath_stiff.report import compare_text, diagnose_text, update_text
+from toolpath_stiff.report.compare_page import QUESTIONS as COMPARE_QUESTIONS
+from toolpath_stiff.report.compare_page import compare_html
+from toolpath_stiff.report.compare_variables import stiffness_deviation_percent
+from toolpath_stiff.report.diagnose_page import diagnose_html
+from toolpath_stiff.report.diagnose_words import explanations, headline, is_plausible, model_rows
+from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+from toolpath_stiff.updating.comparison.compare import Comparison, compare
+from toolpath_stiff.updating.diagnosis import diagnosis_words
+from toolpath_stiff.updating.diagnosis.diagnosis_document import document as diagnosis_document
+from toolpath_stiff.updating.diagnosis.diagnosis_document import words
+from toolpath_stiff.updating.inference.verdict import NONE
+from toolpath_stiff.updating.planning.plan_between import errors_so_far, rivals_of
+from toolpath_stiff.updating.readings.measurements import Measurements
+from toolpath_stiff.updating.update.additions import parse_addition
+from toolpath_stiff.updating.update.update import _Work, update
+from toolpath_stiff.updating.update.update_document import document as update_document
+from toolpath_stiff.updating.update.update_document import residuals_csv
+
+# Seed, layout, what is hidden, its size: one of each verdict.
+CASES = {
+    "adequate": (100, "paper", "none", None),
+    "identified": (7, "paper", "table_compliance", 0.1),
+    "ambiguous": (7, "paper", "spindle_compliance", 0.1),
+    "unexplained": (7, "paper", "cable_drag", 0.1),
+}
+PROVENANCE = {"command": "tps update a.csv", "data_sha256": "0" * 64}
+MEAN = "mean_abs_error_percent"
+
+
+def compared(data: Measurements) -> Comparison:
+    return compare(nist(), data, draws=100)
+
+
+@cache
+def told(verdict: str) -> dict[str, Any]:
+    """The document of a diagnosis."""
+    return diagnosis_document(diagnosed(*CASES[verdict]), "tps diagnose a.csv")
+
+
+def updated(data: Measurements, *names: str, **options: Any) -> dict[str, Any]:
+    """The document of an update."""
+    found = update(nist(), data, [parse_addition(name, data) for name in names], **options)
+    machine = found.fitted(PROVENANCE) if found.accepted else None
+    return update_document(found, machine, files=["a.csv"], machine_file=None, provenance=PROVENANCE, seed=0)
+
+
+# -- one baseline ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("verdict", CASES)
+def test_all_commands_start_from_the_same_two_errors(verdict):
+    diagnosis = diagnosed(*CASES[verdict])
+    comparison = compared(diagnosis.data).document["baseline"]
+    steps = updated(diagnosis.data, auto=True)["steps"]
+    plan = list(errors_so_far(diagnosis.main.problem, rivals_of(diagnosis.main)).values())
+    as_given = [comparison[MEAN], told(verdict)["baseline"]["as_given"][MEAN], steps[0][MEAN], plan[0]]
+    refitted = [comparison["strut_law_refitted"][MEAN], told(verdict)["baseline"][MEAN], steps[1][MEAN], plan[1]]
+    # Documents hold five digits, texts two decimals.
+    assert as_given == pytest.approx([as_given[0]] * 4, rel=5e-5)
+    assert refitted == pytest.approx([refitted[0]] * 4, rel=5e-5)
+    assert [step["name"] for step in steps[:2]] == ["as given", "strut law refitted"]
+
+
+def test_every_text_prints_these_two_errors():
+    diagnosis, found = diagnosed(*CASES["identified"]), told("identified")
+    comparison = compared(diagnosis.data)
+    update_told = updated(diagnosis.data, diagnosis.best)
+    story = f"as given {found['baseline']['as_given'][MEAN]:.2f} %, strut law refitted {found['baseline'][MEAN]:.2f} %"
+    last = f", with {diagnosis.best} {found['candidates'][0][MEAN]:.2f} %"
+    texts = [
+        (compare_text.terminal_text(comparison.document), ""),
+        (compare_html(comparison, dict.fromkeys(COMPARE_QUESTIONS, b"")), ""),
+        (diagnose_text.terminal_text(found), last),
+        (diagnose_html(found, {}), last),
+        (update_text.terminal_text(update_told), last),
+    ]
+    for text, rest in texts:
+        assert story + rest in re.sub(r"\s+", " ", text)
+
+
+def test_a_kept_law_is_said_beside_the_refitted_one():
+    data = diagnosed(*CASES["identified"]).data
+    kept = updated(data, "table_compliance", keep_law=True, force=True)
+    assert [step["name"] for step in kept["steps"]] == ["as given", "+ table_compliance"]
+    assert f"(strut law refitted alone) {told('identified')['baseline'][MEAN]:.2f} %" in kept["text"]
+
+
+def test_nothing_added_leaves_the_machine_file_as_it_is():
+    """The refitted law is shown, and it is not written unless it is asked for."""
+    found = update(nist(), table_1(), auto=True)
+    assert not found.accepted and not found.changed
+    assert [step.name for step in found.steps] == ["as given", "strut law refitted"]
+    assert found.last is found.steps[0]
+    assert update(nist(), table_1(), strut_law=True).accepted
+
+
+# -- one sign ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("factor", "sign"), [(0.8, -1.0), (1.2, 1.0)])
+def test_minus_is_softer_than_modelled_everywhere(factor, sign):
+    data = campaign(50, layout="paper")[0]
+    data = replace(data, stiffness=factor * data.stiffness)
+    found = compared(data)
+    signs = [found.document["baseline"]["bias_percent"]]
+    for by in ("by_direction", "by_plane", "by_setup"):
+        signs += [one["bias_percent"] for one in found.document[by].values()]
+    signs += [one["size_percent"] for one in found.document["findings"][:1]]
+    signs += [one["statistic"] for one in found.document["findings"][:1]]
+    rows = list(csv.DictReader(io.StringIO(compare_text.residuals_csv(found))))
+    signs += [np.mean([float(row["deviation_percent"]) for row in rows])]
+    signs += [float(found.residual.mean())]  # what every picture of residuals draws, as 100 (exp r - 1)
+    compliance = np.mean(1.0 / data.stiffness) / np.mean(np.exp(-found.log_model))
+    signs += [stiffness_deviation_percent(float(compliance))]
+    found_update = update(nist(), data, strut_law=True)
+    told_update = update_document(
+        found_update, None, files=[], machine_file=None, provenance=PROVENANCE, seed=0
+    )["steps"][0]  # fmt: skip
+    signs += [told_update["bias_percent"], *(one["bias_percent"] for one in told_update["by_direction"].values())]
+    rows = list(csv.DictReader(io.StringIO(residuals_csv(found_update))))
+    signs += [np.mean([float(row["as_given_deviation_percent"]) for row in rows])]
+    assert (np.sign(signs) == sign).all()
+    side = "softer" if sign < 0 else "stiffer"
+    text = compare_text.terminal_text(found.document)
+    assert f"{side} than modelled on balance" in text
+    assert "too soft" not in text and "too stiff" not in text
+
+
+def test_pages_say_which_sign_they_have():
+    rule = "(measured - modelled) / modelled, minus: softer than modelled"
+    found = compared(table_1())
+    assert rule in compare_html(found, dict.fromkeys(COMPARE_QUESTIONS, b""))
+    assert rule in compare_text.terminal_text(found.document)
+    assert rule in diagnose_html(told("identified"), {"before_after.png": b""})
+
+
+# -- verdict, table and picture ----------------------------------------------------------------------------------------
+
+
+def texts(found: dict[str, Any]) -> str:
+    return re.sub(r"\s+", " ", " ".join([headline(found), found["text"], diagnose_text.terminal_text(found)]))
+
+
+@pytest.mark.parametrize("verdict", CASES)
+def test_what_is_said_of_a_row_agrees_with_its_probability_and_the_verdict(verdict):
+    found = told(verdict)
+    rows = [*model_rows(found)[1:], *found["pairs"], *found["candidates"]]
+    for row in rows:
+        if row.get("words") in ("best", "nearly indistinguishable", "somewhat disfavoured"):
+            assert row["probability"] >= 0.005
+            assert verdict != "unexplained" or row["words"] != "best"
+        if row.get("words") == "nearly indistinguishable":
+            assert "no other" not in texts(found)
+    marked = {" + ".join(row.get("effects") or [row["effect"]]) for row in rows if is_plausible(row, found)}
+    assert marked == set(explanations(found))
+    if "equally well" in texts(found):
+        assert len(found["explanations"]) > 1
+
+
+def test_words_follow_the_odds():
+    assert words(0.6, 0.6) == "best"
+    assert words(0.5, 0.6) == "nearly indistinguishable"
+    # Odds of 4 to 1 are 2 ln 4 = 2.8; of 10 to 1, 4.6.
+    assert words(0.15, 0.6) == "somewhat disfavoured"
+    assert words(0.06, 0.6) == "strongly disfavoured"
+    assert words(0.004, 0.004) == "ruled out"
+
+
+def test_a_pair_is_shaded_and_its_members_are_not():
+    found = {"explanations": ["weak_strut + gauge_scale"], "plausible": ["weak_strut", "gauge_scale"]}
+    assert is_plausible({"effects": ["weak_strut", "gauge_scale"]}, found)
+    assert not is_plausible({"effect": "weak_strut"}, found)
+    assert not is_plausible({"effect": "gauge_scale"}, found)
+
+
+def ambiguous(**chances: float) -> SimpleNamespace:
+    """As much of a diagnosis as its sentence needs."""
+    names = tuple(name.replace("_and_", " + ") for name in chances)
+    main = SimpleNamespace(probability=dict(zip(names, chances.values(), strict=True)), verdict="ambiguous")
+    main.explanations = names
+    fits = {name: SimpleNamespace(findings=tuple(f"{one} gives way" for one in name.split(" + "))) for name in names}
+    return SimpleNamespace(
+        verdict="ambiguous", explanations=names, plausible=names, fits=fits, main=main, judgements={"measured": main}
+    )
+
+
+def test_several_explain_equally_well_only_if_there_are_several():
+    alone = diagnosis_words.verdict_text(ambiguous(spindle_and_table=0.92))
+    assert "equally well" not in alone
+    assert alone.startswith("Spindle gives way and table gives way (spindle + table, probability 92 %)")
+    two = diagnosis_words.verdict_text(ambiguous(spindle=0.6, table=0.4))
+    assert two.startswith("These explain the data about equally well: either spindle gives way (spindle, prob")
+    lopsided = diagnosis_words.verdict_text(ambiguous(spindle=0.85, table=0.1))
+    assert "equally well" not in lopsided and lopsided.startswith("Most likely spindle gives way")
+
+
+# -- in an engineer's words --------------------------------------------------------------------------------------------
+
+
+def test_a_weak_strut_is_told_as_an_engineer_tells_it():
+    assert find_effect("weak_strut").finding({"strut": 4, "factor": 0.8179}) == "strut 4 is about 18 % too soft"
+    found = told("identified")
+    assert found["text"].startswith("The table gives way by about ")
+    assert headline(found).startswith("The table gives way by about ")
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_effect_says_its_size_with_a_unit(name):
+    effect = find_effect(name)
+    values: dict[str, Any] = {}
+    for one in effect.parameters:
+        chosen = "riser" if one.kind == "text" else max(1, int(one.bounds[0]))
+        values[one.name] = chosen if one.discrete else one.typical[1]
+    said = effect.finding(values)
+    assert re.search(r"\d (%|mm|um|um/min|nm/N|N/um|kN m/rad|nrad)", said), said
+    assert said[0].islower() and not said.endswith(".")
+    assert "e+" not in said and "nan" not in said
+    for one in effect.parameters:  # what it acts on is named
+        if one.discrete and one.name != "direction":
+            assert str(values[one.name]) in said
+    smaller = {**values, **{p.name: p.typical[0] for p in effect.parameters if not p.discrete}}
+    assert effect.finding(smaller) != said
+
+
+def test_a_users_own_effect_has_a_finding_without_writing_one():
+    class Own(Effect):
+        name, title, link, equation, source = "own", "a cable pulls", "instrument", "k (1 + s)", "made up"
+        parameters = (Parameter("scale", "%", 0.01, (-50.0, 50.0), (-20.0, 20.0), "made up"),)
+
+    assert Own().finding({"scale": 21.834}) == "a cable pulls, scale 21.8 %"
+
+
+def test_a_share_of_a_strut_is_told_as_the_strut():
+    """Residuals of a strut 25 % too soft: with a share s of the compliance, 1 / (1 + s / 3) of the stiffness."""
+    data = campaign(60, layout="tilted")[0]
+    plain = compared(data)
+    share = next(one.values for one in plain.numbers if one.name == "share_of_strut_2") / 100.0
+    scatter = np.exp(0.25 * plain.residual)
+    softened = replace(data, stiffness=scatter * np.exp(plain.log_model) / (1.0 + share / 3.0))
+    said = " ".join(one["text"] for one in compared(softened).document["findings"])
+    sizes = re.findall(r"As if strut (\d) were about (\d+) % too soft: ", said)
+    assert [int(strut) for strut, _ in sizes] == [2]
+    assert int(sizes[0][1]) == pytest.approx(25, abs=3)
+
+
+# -- effects given together --------------------------------------------------------------------------------------------
+
+
+def ladder(errors: dict[frozenset[str], float], *names: str) -> list[tuple[str, ...]]:
+    """Which effects each step holds, of a fit that would leave these errors."""
+
+    def step(held: tuple[str, ...]) -> SimpleNamespace:
+        value = errors[frozenset(held)]
+        fit = SimpleNamespace(errors=np.array([value]), names=held)
+        return SimpleNamespace(fit=fit, held=SimpleNamespace(mean_error=value))
+
+    work = object.__new__(_Work)
+    work.say = lambda text: None
+    work.added = lambda before, candidates: step((*before.fit.names, candidates[0].name))
+    work.together = lambda before, asked: step((*before.fit.names, *(one[0].name for one in asked)))
+    asked = [[SimpleNamespace(name=name)] for name in names]
+    return [one.fit.names for one in work.ladder(step(()), asked)]
+
+
+def test_effects_that_only_together_help_are_one_step():
+    sets = {"": 4.59, "a": 5.82, "b": 4.9, "ab": 1.91}
+    errors = {frozenset(names): value for names, value in sets.items()}
+    assert ladder(errors, "a", "b") == [("a", "b")]
+
+
+def test_effects_are_ordered_so_that_each_step_falls():
+    sets = {"": 4.59, "a": 5.82, "b": 3.0, "ab": 1.91}
+    errors = {frozenset(names): value for names, value in sets.items()}
+    assert ladder(errors, "a", "b") == [("b",), ("b", "a")]
+
+
+def test_a_real_ladder_falls_whatever_the_order():
+    data = campaign(9, "tilted", "two")[0]
+    for names in (("gauge_scale:direction=Y", "contact_nonlinearity"), ("contact_nonlinearity", "gauge_scale")):
+        found = updated(data, *names)
+        for key in (MEAN, "held_out_error_percent"):
+            assert all(later[key] < earlier[key] for earlier, later in pairwise(found["steps"]))
+        assert set(found["steps"][-1]["effects"]) == {"contact_nonlinearity", "gauge_scale"}
+
+
+def test_none_is_an_explanation_too():
+    assert is_plausible({"effect": NONE}, {"explanations": [NONE]})
