@@ -15,6 +15,7 @@ from pathlib import PurePath
 PROGRAM = "tps"
 MACHINE, STRUT_SPREAD = "nist", 0.01  # what commands take unless told
 NO_MATTER = ("--out", "--jobs")  # each takes a value
+PRINTED = "--json"  # what is printed, not what is written
 NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
 
 
@@ -24,11 +25,11 @@ def command_line(*words: object) -> str:
 
 
 def without_destination(words: Sequence[str]) -> list[str]:
-    """The words of a command line but for options that change no result: where it goes, how many threads make it."""
+    """The words of a command line but for options that change no result: destination, threads, what is printed."""
     return [
         word
         for word, before in zip(words, ["", *words], strict=False)
-        if word.partition("=")[0] not in NO_MATTER and before not in NO_MATTER
+        if word.partition("=")[0] not in NO_MATTER and before not in NO_MATTER and word != PRINTED
     ]
 
 
