@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import command_line
 from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -242,8 +243,8 @@ def _possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> 
     InputError
         With these effects and the pose; a fit walks away from there.
     """
-    names = [active.effect.name for active in model.effects if guard.is_foreign(active.effect)]
-    if not names or not len(compliance):
+    foreign = [active.effect for active in model.effects if guard.is_foreign(active.effect)]
+    if not foreign or not len(compliance):
         return compliance
     finite = np.asarray(np.isfinite(compliance).all(axis=(1, 2)))
     eigenvalues = np.linalg.eigvalsh(np.where(finite[:, None, None], compliance, np.eye(compliance.shape[1])))
@@ -254,9 +255,10 @@ def _possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> 
     if not bad.any():
         return compliance
     x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[int(np.argmax(bad))])
-    those = f"effect{'s' if len(names) > 1 else ''} {', '.join(names)}"
+    those = f"effect{'s' if len(foreign) > 1 else ''} {', '.join(effect.name for effect in foreign)}"
+    check = command_line("effects", "check", guard.file_of(foreign[0]))
     raise InputError(
         f"with {those} the tip has no positive stiffness at X{x:g} Y{y:g} Z{z:g} mm",
         expected="a compliance that is positive definite",
-        hint="`tps effects check FILE.py` tries an effect by itself",
+        hint=f"`{check}` tries an effect by itself",
     )
