@@ -30,7 +30,7 @@ def part(tmp_path, monkeypatch):
 def test_analyze_writes_the_reports(part, capsys):
     assert main(["analyze", "part.nc"]) == 0
     out = part.parent / "reports" / "part"
-    assert sorted(p.name for p in out.iterdir()) == [
+    assert sorted(p.name for p in out.glob("[!.]*")) == [
         "path.png", "profile.png", "report.html", "samples.csv", "summary.json",
     ]  # fmt: skip
     printed = capsys.readouterr().out

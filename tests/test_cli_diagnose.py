@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from toolpath_stiff import rig
-from toolpath_stiff.cli.diagnose import OWN_FILES
+from toolpath_stiff.cli.diagnose import DATA, PICTURES
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.results_folder import MANIFEST
 
 EFFECT = '''
 from toolpath_stiff.stiffness.effects import Effect, Parameter
@@ -69,8 +70,8 @@ def test_it_writes_a_report_and_says_what_it_found(strut):
     out, said, told = strut
     assert "weak_strut" in said and "IDENTIFIED" in said
     assert "Traceback" not in told
-    written = {file.name for file in out.iterdir()}
-    assert {"diagnose.json", "residuals.csv", "report.html"} <= written <= set(OWN_FILES)
+    written = {file.name for file in out.iterdir()} - {MANIFEST}
+    assert {"diagnose.json", "residuals.csv", "report.html"} <= written <= {*DATA, *PICTURES}
     for name in written:
         assert name in said
     found = json.loads((out / "diagnose.json").read_text("utf-8"))

@@ -171,7 +171,7 @@ def test_every_command_on_the_machine_warns(here, capsys):
     machine = ["--machine", "riser.toml", "--no-plots"]
     assert main(["map", *machine, "--points", "3"]) == 0
     assert WAITS in capsys.readouterr().out
-    assert WAITS in json.loads((here / "reports/map/map.json").read_text())["warnings"][0]
+    assert WAITS in json.loads((here / "reports/riser-map/map.json").read_text())["warnings"][0]
     assert main(["map", *machine, "--points", "3", "--setup", "riser"]) == 0
     assert "machine nist with setup_compliance, set-up riser" in capsys.readouterr().out
     assert main(["pose", "0", "0", "800", *machine[:2]]) == 0

@@ -20,6 +20,7 @@ RANK = {
     "errors": 0,
     "hints": 0,
     "files": 1,
+    "results_folder": 2,
     "column_files": 1,
     "tables": 2,
     "nc": 2,
@@ -35,7 +36,7 @@ RANK = {
 }
 # The same within `updating`.
 UPDATING_RANK = {"readings": 0, "inference": 1, "comparison": 2, "planning": 2, "diagnosis": 3, "update": 4}
-RIG_MAY_IMPORT = {"units", "errors", "files", "rig"}
+RIG_MAY_IMPORT = {"units", "errors", "files", "results_folder", "rig"}
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
 
 

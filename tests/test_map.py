@@ -49,13 +49,13 @@ def test_command_writes_table_picture_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["map", "--z", "1200", "--x", "-150:150", "--y", "-150:150", "--points", "11"]) == 0
     assert "maxima at" in capsys.readouterr().out
-    out = tmp_path / "reports/map"
+    out = tmp_path / "reports/nist-map"
     rows = list(csv.DictReader((out / "map.csv").open()))
     assert list(rows[0]) == ["x_mm", "y_mm", "z_mm", "stiffness_N_per_mm", "reachable"] and len(rows) == 121
     assert (out / "map.png").read_bytes().startswith(b"\x89PNG")
     page = (out / "map.html").read_text()
     HTMLParser().feed(page)
-    assert "http" not in page and "__DATA__" not in page
+    assert "://" not in page and "{{" not in page
     assert len(json.loads((out / "map.json").read_text())["slices"][0]["circle"]["maxima_deg"]) == 3
 
 
@@ -66,7 +66,7 @@ def test_out_of_reach_is_marked(tmp_path, monkeypatch, capsys):
     summary = json.loads(capsys.readouterr().out)
     assert [s["z_mm"] for s in summary["slices"]] == [400, 1200]
     assert 0 < summary["slices"][0]["reachable_share"] < 1
-    rows = list(csv.DictReader((tmp_path / "reports/map/map.csv").open()))
+    rows = list(csv.DictReader((tmp_path / "reports/nist-map/map.csv").open()))
     for row in rows:
         assert (row["reachable"] == "1") == (row["stiffness_N_per_mm"] != "")
 

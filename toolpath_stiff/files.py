@@ -12,8 +12,10 @@ from toolpath_stiff.errors import InputError
 
 NOT_WINDOWS = frozenset(b"\x81\x8d\x8f\x90\x9d")  # bytes that Windows' Latin-1 (cp1252) leaves undefined
 
+Content = str | bytes | Iterable[str | bytes]
 
-def write_atomically(path: str | Path, content: str | bytes | Iterable[str | bytes]) -> Path:
+
+def write_atomically(path: str | Path, content: Content) -> Path:
     """Write text (UTF-8, line feeds as they are), bytes or pieces of text; folders are made as needed.
 
     A symbolic link is followed. A device or pipe (`/dev/stdout`) is written to, never replaced by a file.
@@ -27,7 +29,7 @@ def write_atomically(path: str | Path, content: str | bytes | Iterable[str | byt
     try:
         if target.exists() and not target.is_file() and not target.is_dir():
             with target.open("wb") as stream:
-                stream.writelines(_encoded(content))
+                stream.writelines(encoded(content))
         else:
             _write_then_rename(target.resolve(), content)
     except OSError as error:
@@ -35,12 +37,12 @@ def write_atomically(path: str | Path, content: str | bytes | Iterable[str | byt
     return target
 
 
-def _write_then_rename(target: Path, content: str | bytes | Iterable[str | bytes]) -> None:
+def _write_then_rename(target: Path, content: Content) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.writelines(_encoded(content))
+            stream.writelines(encoded(content))
         Path(temporary).chmod(0o666 & ~_umask())
         Path(temporary).replace(target)
     except BaseException:
@@ -48,7 +50,8 @@ def _write_then_rename(target: Path, content: str | bytes | Iterable[str | bytes
         raise
 
 
-def _encoded(content: str | bytes | Iterable[str | bytes]) -> Iterator[bytes]:
+def encoded(content: Content) -> Iterator[bytes]:
+    """The content as bytes, piece by piece: text as UTF-8."""
     if isinstance(content, bytes):
         yield content
     else:

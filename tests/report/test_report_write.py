@@ -11,7 +11,8 @@ import pytest
 from tests.report.factory import make_analysis, short
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.report import page as page_module
-from toolpath_stiff.report.write import OWN_FILES, write_analysis
+from toolpath_stiff.report.write import write_analysis
+from toolpath_stiff.results_folder import MANIFEST
 
 PLOTS = {"samples.csv", "summary.json", "path.png", "profile.png", "report.html"}
 
@@ -28,8 +29,7 @@ def tree(folder):
 def test_all_files_are_written_and_nothing_else(analysis, tmp_path):
     files = write_analysis(analysis, tmp_path / "deep" / "out")
     assert {f.name for f in files} == PLOTS
-    assert set(tree(tmp_path)) == {f"deep/out/{name}" for name in PLOTS}
-    assert PLOTS | {"samples.parquet"} == set(OWN_FILES)
+    assert set(tree(tmp_path)) == {f"deep/out/{name}" for name in {*PLOTS, MANIFEST}}
 
 
 def test_the_same_analysis_writes_the_same_bytes(analysis, tmp_path):
@@ -77,9 +77,8 @@ def test_out_of_reach_is_null_in_json_an_empty_cell_in_csv_and_a_null_in_parquet
 def test_old_files_of_ours_go_and_foreign_ones_stay(analysis, tmp_path):
     write_analysis(analysis, tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
-    (tmp_path / "summary.json").write_text("old")
     write_analysis(analysis, tmp_path, plots=False)
-    assert set(tree(tmp_path)) == {"samples.csv", "summary.json", "notes.txt"}
+    assert set(tree(tmp_path)) == {"samples.csv", "summary.json", "notes.txt", MANIFEST}
     assert json.loads((tmp_path / "summary.json").read_text())["samples"] == len(analysis.samples)
 
 

@@ -192,7 +192,7 @@ def test_without_data_a_first_campaign_is_written(tmp_path, capsys):
     assert main(["plan", "--machine", "nist", "--out", str(tmp_path / "p"), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document == json.loads((tmp_path / "p" / "plan.json").read_text())
-    assert sorted(f.name for f in (tmp_path / "p").iterdir()) == ["plan.csv", "plan.json", "plan.png"]
+    assert sorted(f.name for f in (tmp_path / "p").glob("[!.]*")) == ["plan.csv", "plan.json", "plan.png"]
     assert (tmp_path / "p" / "plan.png").read_bytes().startswith(b"\x89PNG")
     assert document["kind"] == "campaign" and document["poses"] == 24
     assert len(document["visits"]) == len({row["clamp"] for row in read_csv(tmp_path / "p" / "plan.csv")})
@@ -205,7 +205,7 @@ def test_between_two_effects_fitted_to_the_data(tmp_path, capsys):
     document = json.loads(first)
     assert [rival["name"] for rival in document["rivals"]] == ["frame_compliance", "none"]
     assert document["poses"] == 3 == len(document["visits"])
-    assert sorted(f.name for f in tmp_path.iterdir()) == ["plan.csv", "plan.json"]
+    assert sorted(f.name for f in tmp_path.glob("[!.]*")) == ["plan.csv", "plan.json"]
     assert {row["stiffness_N_per_mm"] for row in read_csv(tmp_path / "plan.csv")} == {""}
     content = (tmp_path / "plan.csv").read_bytes()
     assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +18,7 @@ from toolpath_stiff.cli.arguments import (
     positive_number,
     read_program_for,
 )
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
+from toolpath_stiff.cli.outputs import Destination, add_replace_option, destination
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
@@ -151,10 +150,9 @@ def load_models(args: argparse.Namespace) -> Models:
 def analyse_and_write(
     args: argparse.Namespace,
     file: str,
-    folder: Path,
+    target: Destination,
     models: Models,
     progress: Progress | None = None,
-    replaced: Sequence[Path] = (),
 ) -> Report:
     """Analyse a program and write its report folder. Raises `TpsError`, with nothing written."""
     from toolpath_stiff.analysis.path_analysis import analyse, required_stiffness_missed
@@ -174,19 +172,19 @@ def analyse_and_write(
     if models.second is not None:
         second = analyse(models.second, read_program_for(args, file, models.second.machine), **options)
     required = None if args.require is None else n_per_m_from_n_per_mm(args.require)
-    keep(replaced, quiet=args.json)
     files = write_analysis(
         analysis,
-        folder,
+        target.folder,
         plots=not args.no_plots,
         table=args.format,
         required=required,
         other=second,
         show_plunges=args.show_plunges,
+        rules=target.rules,
     )
     return Report(
         program=program,
-        summary=json.loads((folder / "summary.json").read_text(encoding="utf-8")),
+        summary=json.loads((target.folder / "summary.json").read_text(encoding="utf-8")),
         second=second,
         missed=required_stiffness_missed(analysis, required) if required is not None else [],
         files=files,
@@ -196,12 +194,11 @@ def analyse_and_write(
 def _run_single(args: argparse.Namespace, file: str) -> int:
     """Analyse, write, print; the exit code."""
     from toolpath_stiff.cli.progress import progress_bar
-    from toolpath_stiff.report.write import OWN_FILES
+    from toolpath_stiff.report.write import names_of
 
-    folder = Path(args.out) if args.out else Path("reports") / Path(file).stem
-    replaced = check_written(args, (folder / name for name in OWN_FILES))
+    target = destination(args, "analyze", [file]).check(names_of(not args.no_plots, args.format))
     with progress_bar(f"{Path(file).name}: samples", quiet=args.json) as progress:
-        report = analyse_and_write(args, file, folder, load_models(args), progress, replaced)
+        report = analyse_and_write(args, file, target, load_models(args), progress)
     if args.json:
         json.dump(report.summary, sys.stdout, indent=2)
         sys.stdout.write("\n")

@@ -15,17 +15,17 @@ from pathlib import Path
 
 from toolpath_stiff.cli.analyze import BELOW_REQUIRED, Models, analyse_and_write, load_models
 from toolpath_stiff.cli.arguments import controller_for
-from toolpath_stiff.cli.outputs import check_written, keep
+from toolpath_stiff.cli.outputs import Destination, inputs_of
 from toolpath_stiff.cli.programs import RESERVED, FolderCount, Found, Listed, report_folders
 from toolpath_stiff.cli.progress import say
 from toolpath_stiff.cli.workers import answers, one_thread
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.report.batch import PAGE_MARK, TABLE_MARK, Outcome, figures_of, summary_csv, terminal_summary
+from toolpath_stiff.report.batch import Outcome, figures_of, summary_csv, terminal_summary
 from toolpath_stiff.report.wording import plain
+from toolpath_stiff.results_folder import STAGE, Rules
 
 INCOMPLETE = 1  # exit code: a program failed, or samples were left out
 INDEX, SUMMARY = RESERVED
-MARK_WITHIN = 1000  # bytes of a file of ours, within which it says so
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,11 @@ class Setting:
 
     args: argparse.Namespace
     out: Path
+    rules: Rules
+
+    def target(self, folder: Path | None = None) -> Destination:
+        """Where the overview goes, or the report of a program."""
+        return Destination(self.out if folder is None else self.out / folder, "analyze", self.rules)
 
 
 def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence[FolderCount], jobs: int) -> int:
@@ -45,16 +50,16 @@ def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
         An argument is wrong; nothing has been started then.
     """
     one_thread()
-    programs, setting = report_folders(found), Setting(args, Path(args.out or "reports"))
-    replaced = check_written(args, (setting.out / name for name in RESERVED))
+    inputs = (*(one.file for one in found), *inputs_of(args))
+    setting = Setting(args, Path(args.out or "reports"), Rules(inputs=inputs, replace=args.replace))
+    programs = report_folders(found)
     _check(setting)
     if not args.json:
         for count in counts:
             print(plain(str(count)), flush=True)
     with _folders_for(setting.out, programs):
         outcomes = _outcomes(programs, setting, jobs)
-        keep(replaced, quiet=args.json)
-        files = _write_overview(setting.out, outcomes)
+        files = _write_overview(setting, outcomes)
     if args.json:
         _print_json(setting.out, programs, outcomes)
     else:
@@ -73,23 +78,7 @@ def _check(setting: Setting) -> None:
     controller_for(setting.args)
     if setting.args.interpreter == "linuxcnc":
         find_rs274(setting.args.rs274)
-    for name, mark in ((INDEX, PAGE_MARK), (SUMMARY, TABLE_MARK)):
-        _check_ours(setting.out / name, mark)
-
-
-def _check_ours(file: Path, mark: str) -> None:
-    """A file of that name that an earlier run did not write is somebody's, and stays."""
-    try:
-        with file.open("rb") as stream:
-            beginning = stream.read(MARK_WITHIN)
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise InputError(f"cannot write {str(file)!r}: {error.strerror}") from None
-    if mark.encode() not in beginning:
-        raise InputError(
-            f"{str(file)!r} is there already and not from `tps analyze`", hint="choose another folder with --out"
-        )
+    setting.target().check(RESERVED)
 
 
 @contextmanager
@@ -147,7 +136,7 @@ def _size(file: str) -> int:
 def _sweep(folder: Path, process: int) -> None:
     """Remove what a process that died was writing."""
     for place in (folder, folder.parent):
-        for left in place.glob(f".tps-{process}-*"):
+        for left in place.glob(f"{STAGE.format(process=process)}*"):
             shutil.rmtree(left, ignore_errors=True)
 
 
@@ -162,9 +151,8 @@ def start_worker(setting: Setting) -> Callable[[Listed], Outcome]:
 
 
 def _analyse(setting: Setting, program: Listed, models: Models) -> Outcome:
-    folder = setting.out / program.folder
     try:
-        report = analyse_and_write(setting.args, program.file, folder, models)
+        report = analyse_and_write(setting.args, program.file, setting.target(program.folder), models)
     except TpsError as error:
         return Outcome(program.name, program.file, _reason(program, str(error)))
     except MemoryError:
@@ -185,11 +173,10 @@ def _reason(program: Listed, message: str) -> str:
     return line if program.file in line else f"{program.file}: {line}"
 
 
-def _write_overview(out: Path, outcomes: Sequence[Outcome]) -> list[Path]:
+def _write_overview(setting: Setting, outcomes: Sequence[Outcome]) -> list[Path]:
     from toolpath_stiff.report.batch_page import batch_page
-    from toolpath_stiff.report.write import write_folder
 
-    return write_folder(out, {INDEX: batch_page(outcomes), SUMMARY: summary_csv(outcomes)})
+    return setting.target().write({INDEX: batch_page(outcomes), SUMMARY: summary_csv(outcomes)})
 
 
 def _print_json(out: Path, programs: Sequence[Listed], outcomes: Sequence[Outcome]) -> None:

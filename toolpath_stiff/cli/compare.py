@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 
 from toolpath_stiff.cli.arguments import limit_threads
 from toolpath_stiff.cli.measurement_arguments import (
@@ -14,7 +13,8 @@ from toolpath_stiff.cli.measurement_arguments import (
     asked,
     check_seed,
 )
-from toolpath_stiff.cli.outputs import check_written, keep
+from toolpath_stiff.cli.outputs import destination
+from toolpath_stiff.files import Content
 from toolpath_stiff.hints import hint
 
 EPILOG = """\
@@ -29,9 +29,9 @@ Files written to --out: compare.json, residuals.csv, report.html, measured_model
 machine.png, variables.png, load_path.png.
 """
 
-OWN_FILES = (
-    "compare.json", "residuals.csv", "report.html", "measured_modelled.png", "strips.png", "planes.png", "machine.png",
-    "variables.png", "load_path.png",
+DATA = ("compare.json", "residuals.csv")
+PICTURES = (
+    "report.html", "measured_modelled.png", "strips.png", "planes.png", "machine.png", "variables.png", "load_path.png",
 )  # fmt: skip
 
 
@@ -47,11 +47,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare, write, say where the model fails."""
     check_seed(args.seed)
-    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
+    target = destination(args, "compare", args.data, "-compare").check(DATA if args.no_plots else (*DATA, *PICTURES))
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.report.compare_text import residuals_csv, terminal_text
-    from toolpath_stiff.report.write import write_folder
     from toolpath_stiff.updating.comparison.compare import compare
     from toolpath_stiff.updating.readings.measurements import read_measurements
 
@@ -61,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         effect_files=args.effects, seed=args.seed, jobs=args.jobs,
     )  # fmt: skip
     found.document["next"] = [hint("which effect would explain it", asked(args).command("diagnose"))]
-    contents: dict[str, str | bytes] = {
+    contents: dict[str, Content] = {
         "compare.json": json.dumps(found.document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "residuals.csv": residuals_csv(found),
     }
@@ -70,8 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
         pictures = compare_pictures(found)
         contents |= {**pictures, "report.html": compare_html(found, pictures)}
-    keep(replaced, quiet=args.json)
-    written = write_folder(args.out, contents, OWN_FILES)
+    written = target.write(contents)
     if args.json:
         print(contents["compare.json"], end="")
     else:

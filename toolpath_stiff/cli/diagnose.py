@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import (
@@ -21,8 +20,9 @@ from toolpath_stiff.cli.measurement_arguments import (
     asked,
     check_seed,
 )
-from toolpath_stiff.cli.outputs import check_written, keep
+from toolpath_stiff.cli.outputs import destination
 from toolpath_stiff.cli.progress import say
+from toolpath_stiff.files import Content
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
@@ -39,9 +39,9 @@ diagnose.json, residuals.csv, ladder.png, confounding.png, detectable.png, befor
 report.html.
 """
 
-OWN_FILES = (
-    "diagnose.json", "residuals.csv", "ladder.png", "confounding.png", "detectable.png", "before_after.png",
-    "envelope.png", "report.html",
+DATA = ("diagnose.json", "residuals.csv")
+PICTURES = (
+    "ladder.png", "confounding.png", "detectable.png", "before_after.png", "envelope.png", "report.html",
 )  # fmt: skip
 
 
@@ -63,10 +63,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write, say what was found. Any verdict is success."""
     check_seed(args.seed)
-    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
+    target = destination(args, "diagnose", args.data, "-diagnose").check(DATA if args.no_plots else (*DATA, *PICTURES))
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.report.write import write_folder
     from toolpath_stiff.updating.diagnosis.diagnose import diagnose
     from toolpath_stiff.updating.diagnosis.diagnosis_document import document
     from toolpath_stiff.updating.readings.measurements import read_measurements
@@ -79,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     )  # fmt: skip
     found = document(diagnosis, args.command_line, asked(args))
     _complete(found, diagnosis, args)
-    contents: dict[str, str | bytes] = {
+    contents: dict[str, Content] = {
         "diagnose.json": json.dumps(found, indent=2, ensure_ascii=False) + "\n",
         "residuals.csv": _residuals(diagnosis),
     }
@@ -87,8 +86,7 @@ def run(args: argparse.Namespace) -> int:
         say("drawing")
         contents |= _pictures(found, diagnosis)
     say("")
-    keep(replaced, quiet=args.json)
-    written = write_folder(args.out, contents, OWN_FILES)
+    written = target.write(contents)
     if args.json:
         print(contents["diagnose.json"], end="")
     else:
@@ -145,7 +143,7 @@ def _residuals(diagnosis: Diagnosis) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _pictures(found: dict[str, Any], diagnosis: Diagnosis) -> dict[str, str | bytes]:
+def _pictures(found: dict[str, Any], diagnosis: Diagnosis) -> dict[str, Content]:
     from toolpath_stiff.report.diagnose_page import diagnose_html
     from toolpath_stiff.report.diagnose_pictures import confounding_png, detectable_png, envelope_png, ladder_png
     from toolpath_stiff.report.update_pictures import before_after_png

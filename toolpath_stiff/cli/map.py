@@ -6,7 +6,6 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import (
@@ -17,8 +16,9 @@ from toolpath_stiff.cli.arguments import (
     model_for,
     range_argument,
 )
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
+from toolpath_stiff.cli.outputs import add_replace_option, destination
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import Content
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis.stiffness_map import StiffnessMap
@@ -32,7 +32,7 @@ examples:
 
 files written to --out: map.csv (x_mm,y_mm,z_mm,stiffness_N_per_mm,reachable), map.json, map.png, map.html (3-D)
 """
-OWN_FILES = ("map.csv", "map.json", "map.png", "map.html")
+DATA, PICTURES = ("map.csv", "map.json"), ("map.png", "map.html")
 FARTHEST_MM = 1e5
 OUT_OF_REACH = 1
 
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tilt", type=_angles, default=(0.0, 0.0, 0.0), metavar="A,B,C", help="roll, pitch, yaw, degrees"
     )
-    parser.add_argument("--out", default="reports/map", metavar="DIR", help="folder (default: reports/map)")
+    parser.add_argument("--out", metavar="DIR", help="folder (default: reports/<machine>-map)")
     add_replace_option(parser, force=False)
     parser.add_argument("--no-plots", action="store_true", help="only map.csv and map.json")
     add_machine_options(parser)
@@ -84,12 +84,11 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.analysis.loads import parse_load
     from toolpath_stiff.analysis.stiffness_map import map_stiffness
     from toolpath_stiff.cli.progress import progress_bar
-    from toolpath_stiff.files import write_atomically
     from toolpath_stiff.units import m_from_mm, rad_from_deg
 
     if not 2 <= args.points <= 2001:
         raise InputError(f"--points {args.points}", expected="2 to 2001")
-    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
+    target = destination(args, "map", [args.machine], "-map").check(DATA if args.no_plots else (*DATA, *PICTURES))
     heights = args.slices or [args.z]
     if max(abs(v) for v in (*args.x, *args.y, *heights)) > FARTHEST_MM:
         raise InputError("a map beyond 100 m", expected="mm")
@@ -109,10 +108,7 @@ def run(args: argparse.Namespace) -> int:
             progress,
         )
     summary = map_summary(model, found)
-    out = Path(args.out)
-    keep(replaced, quiet=args.json)
-    files = [write_atomically(out / "map.csv", map_csv(found))]
-    files.append(write_atomically(out / "map.json", json.dumps(summary, indent=2) + "\n"))
+    contents: dict[str, Content] = {"map.csv": map_csv(found), "map.json": json.dumps(summary, indent=2) + "\n"}
     if not args.no_plots:
         from toolpath_stiff.report.map_page import map_page
         from toolpath_stiff.report.map_picture import map_picture
@@ -120,8 +116,9 @@ def run(args: argparse.Namespace) -> int:
 
         title = machine_text({**summary, "machine": model.machine.title})
         headed = model.machine.with_changes(title=title)
-        files.append(write_atomically(out / "map.png", map_picture(headed, found)))
-        files.append(write_atomically(out / "map.html", map_page(headed, found, summary["warnings"])))
+        contents["map.png"] = map_picture(headed, found)
+        contents["map.html"] = map_page(headed, found, summary["warnings"])
+    files = target.write(contents)
     if args.json:
         json.dump(summary, sys.stdout, indent=2)
         print()

@@ -40,12 +40,16 @@ def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and
     )  # fmt: skip
 
 
-def add_output_arguments(parser: argparse.ArgumentParser, command: str, kept: str, *, force: bool = True) -> None:
-    """--seed, --jobs, --out, --replace (--force), --no-plots, --json; `kept` is what --no-plots writes still."""
+def add_output_arguments(
+    parser: argparse.ArgumentParser, command: str, kept: str, *, force: bool = True, of: str = "DATA"
+) -> None:
+    """--seed, --jobs, --out, --replace (--force), --no-plots, --json; `kept` is what --no-plots writes still.
+
+    `of` is what the folder is named after.
+    """
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
-    folder = f"reports/{command}"
-    parser.add_argument("--out", default=folder, metavar="DIR", help=f"folder (default: {folder})")
+    parser.add_argument("--out", metavar="DIR", help=f"folder (default: reports/<{of}>-{command})")
     add_replace_option(parser, force=force)
     parser.add_argument("--no-plots", action="store_true", help=f"only {kept}")
     add_json_option(parser, f"print {command}.json to standard output and nothing else")

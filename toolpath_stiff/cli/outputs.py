@@ -7,12 +7,15 @@ same where it has no other meaning) the old file is kept beside the new one.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import check_outputs, keep_old
+from toolpath_stiff.files import Content, check_outputs, keep_old
+from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 
+LONGEST = 60  # letters of a default folder's name; of more files, the first and how many there are
 DESTINATIONS = ("out", "output", "write", "command_line")
 
 
@@ -62,4 +65,47 @@ def keep(replaced: Iterable[Path], quiet: bool = False) -> None:
     for file in replaced:
         kept = keep_old(file)
         if kept is not None and not quiet:
-            print(f"kept the old {file} as {kept}")
+            tell_kept(file, kept)
+
+
+def tell_kept(file: Path, kept: Path) -> None:
+    """Say where an old file is."""
+    print(f"kept the old {file} as {kept}")
+
+
+@dataclass(frozen=True)
+class Destination:
+    """The folder for the results of a run, by what command, and what must not be replaced there."""
+
+    folder: Path
+    command: str
+    rules: Rules
+
+    def check(self, names: Iterable[str]) -> Destination:
+        """Itself, if files of these names could be written. Raises `InputError`."""
+        check_folder(self.folder, names, self.rules)
+        return self
+
+    def write(self, contents: Mapping[str, Content]) -> list[Path]:
+        """Write the files, all or none; see `write_folder`."""
+        return write_folder(self.folder, contents, command=self.command, rules=self.rules)
+
+
+def destination(args: argparse.Namespace, command: str, sources: Sequence[str], suffix: str = "") -> Destination:
+    """The folder of --out, else `reports/<sources><suffix>`, which then belongs to these sources."""
+    rules = Rules(
+        inputs=tuple(inputs_of(args)),
+        of=() if args.out else tuple(sources),
+        replace=args.replace,
+        kept=None if args.json else tell_kept,
+    )
+    return Destination(Path(args.out or f"reports/{joined_names(sources)}{suffix}"), command, rules)
+
+
+def joined_names(sources: Sequence[str]) -> str:
+    """Files by their names without folder, ending and sheet: `first+second`."""
+    from toolpath_stiff.tables import split_name
+
+    names = [Path(split_name(source)[0]).stem for source in sources]
+    joined = "+".join(names)
+    return joined if len(joined) <= LONGEST or len(names) == 1 else f"{names[0]}+{len(names) - 1}"

@@ -21,7 +21,7 @@ from toolpath_stiff.cli.arguments import (
     read_program_for,
 )
 from toolpath_stiff.cli.measurement_arguments import check_seed
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
+from toolpath_stiff.cli.outputs import Destination, add_replace_option, check_written, destination, keep
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,9 +46,8 @@ report.html (click a placement of the front, see the path there).
 """
 FARTHEST_MM = 1e5
 FARTHEST_TURN = 720.0
-OWN_FILES = (
-    "placements.csv", "placement.json", "report.html", "front.png", "profiles.png", "map.png", "setup.pdf",
-)  # fmt: skip
+DATA = ("placements.csv", "placement.json")
+PICTURES = ("report.html", "front.png", "profiles.png", "map.png", "setup.pdf")
 OBJECTIVES = ("balanced", "mean", "range", "weakest")
 
 
@@ -172,9 +171,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--points {args.points}", expected="2 to 1000")
     check_seed(args.seed)
     _check_write(args)
-    out = Path(args.out) if args.out else Path("reports") / f"{Path(args.program).stem}-place"
-    replaced = check_written(args, [args.write, *(out / name for name in OWN_FILES)])
-    earlier = _earlier(out) if args.pick is not None else None
+    replaced = check_written(args, [args.write])
+    target = destination(args, "place", [args.program], "-place").check(DATA if args.no_plots else (*DATA, *PICTURES))
+    earlier = _earlier(target.folder) if args.pick is not None else None
     task = _task(args)
     if earlier is not None:
         placed = place_again(task, earlier, args.pick)
@@ -182,7 +181,7 @@ def run(args: argparse.Namespace) -> int:
         with progress_bar(f"{task.program.name}: search", quiet=args.json) as progress:
             placed = place_program(task, progress)
     keep(replaced, quiet=args.json)
-    files = _write(args, out, placed)
+    files = _write(args, target, placed)
     if placed.rewritten is not None:
         files.append(write_atomically(args.write, placed.rewritten))
     if args.json:
@@ -291,8 +290,7 @@ def _keepouts(args: argparse.Namespace) -> tuple[Keepout, ...]:
     return tuple(boxes)
 
 
-def _write(args: argparse.Namespace, out: Path, placed: Placed) -> list[Path]:
-    from toolpath_stiff.files import write_atomically
+def _write(args: argparse.Namespace, target: Destination, placed: Placed) -> list[Path]:
     from toolpath_stiff.placement.report_data import COLUMNS
 
     summary = placed.summary
@@ -311,7 +309,7 @@ def _write(args: argparse.Namespace, out: Path, placed: Placed) -> list[Path]:
         contents["profiles.png"] = profiles_picture(placed.best, placed.before)
         contents["map.png"] = workspace_picture(placed.best, placed.before)
         contents["setup.pdf"] = setup_sheet(summary, placed.best)
-    return [write_atomically(out / name, content) for name, content in contents.items()]
+    return target.write(contents)
 
 
 def _cell(value: float | None) -> str:

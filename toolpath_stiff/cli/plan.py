@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import finite_number, limit_threads, positive_number
@@ -15,7 +14,7 @@ from toolpath_stiff.cli.measurement_arguments import (
     add_output_arguments,
     check_seed,
 )
-from toolpath_stiff.cli.outputs import check_written, keep
+from toolpath_stiff.cli.outputs import destination
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
@@ -34,7 +33,7 @@ examples:
 
 Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png.
 """
-OWN_FILES = ("plan.csv", "plan.json", "plan.png")
+DATA, PICTURES = ("plan.csv", "plan.json"), ("plan.png",)
 COSTS = ("reading", "pose", "tool", "setup")
 PLAN_POSES, CAMPAIGN_POSES = 6, 24
 CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
@@ -64,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a reading (default 1), a pose (15), another tool (10), another setup (45)",
     )  # fmt: skip
     add_noise_arguments(parser, guess="a high guess, or 2 %% without data")
-    add_output_arguments(parser, "plan", kept="plan.csv and plan.json")
+    add_output_arguments(parser, "plan", kept="plan.csv and plan.json", of="DATA, else machine")
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -95,7 +94,9 @@ def _cost(text: str) -> tuple[str, float]:
 def run(args: argparse.Namespace) -> int:
     """Plan, write the files, say what the plan promises."""
     check_seed(args.seed)
-    replaced = check_written(args, (Path(args.out) / name for name in OWN_FILES))
+    target = destination(args, "plan", args.data or [args.machine], "-plan").check(
+        DATA if args.no_plots else (*DATA, *PICTURES)
+    )
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.stiffness.effects.registry import known_effects
@@ -116,23 +117,13 @@ def run(args: argparse.Namespace) -> int:
         "command": args.command_line,
     }
     text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
-    keep(replaced, quiet=args.json)
-    written = _write(Path(args.out), {"plan.csv": contents["plan.csv"], "plan.json": text, **contents})
+    written = target.write({"plan.csv": contents["plan.csv"], "plan.json": text, **contents})
     if args.json:
         print(text, end="")
     else:
         print(_table(document))
         print("\n".join(["written:", *(f"  {file}" for file in written)]))
     return 0
-
-
-def _write(out: Path, contents: dict[str, str | bytes]) -> list[Path]:
-    """The files; a picture of an earlier plan would contradict the new one."""
-    from toolpath_stiff.files import write_atomically
-
-    if "plan.png" not in contents:
-        (out / "plan.png").unlink(missing_ok=True)
-    return [write_atomically(out / name, content) for name, content in contents.items()]
 
 
 def _menu(args: argparse.Namespace, menu: Menu) -> Menu:

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from toolpath_stiff.cli.arguments import add_json_option
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, inputs_of, keep, tell_kept
 from toolpath_stiff.hints import Asked, hint
+from toolpath_stiff.results_folder import Rules
 
 EPILOG = """\
 examples:
@@ -67,10 +68,9 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff import rig
 
     if args.action == "new":
-        replaced = check_written(args, (Path(args.out) / name for name in FILES))
-        keep(replaced)
+        rules = Rules(inputs=tuple(inputs_of(args)), fresh=True, replace=args.replace, kept=tell_kept)
         count = rig.new_exercise(
-            args.out, args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at
+            args.out, args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at, rules
         )
         print(f"{args.out}: {count} measurements, the nominal machine and the sealed truth")
         print(hint("next", _diagnose(args.out)))

@@ -15,9 +15,10 @@ from toolpath_stiff.cli.measurement_arguments import (
     asked,
     check_seed,
 )
-from toolpath_stiff.cli.outputs import check_written, keep
+from toolpath_stiff.cli.outputs import check_written, destination, keep
 from toolpath_stiff.cli.progress import say
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import Content
 from toolpath_stiff.hints import command_line, hint, options
 
 if TYPE_CHECKING:
@@ -38,10 +39,8 @@ same. Files written to --out: update.json, residuals.csv, machine.toml (unless r
 ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
 """
 
-OWN_FILES = (
-    "update.json", "residuals.csv", "machine.toml", "ladder.png", "before_after.png", "figure3.csv", "figure3.png",
-    "report.html",
-)  # fmt: skip
+DATA, PICTURES = ("update.json", "residuals.csv"), ("ladder.png", "before_after.png", "report.html")
+MACHINE = "machine.toml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,11 +79,12 @@ def run(args: argparse.Namespace) -> int:
     """Fit, judge, write. Refusal is success as well."""
     _check(args)
     args.replace |= args.force
-    replaced = check_written(args, [args.output, *(Path(args.out) / name for name in OWN_FILES)])
+    replaced = check_written(args, [args.output])
+    target = destination(args, "update", args.data, "-update")
+    target.check((*DATA, *(() if args.output else (MACHINE,)), *(() if args.no_plots else PICTURES)))
     limit_threads(args.jobs)
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine, machine_toml
-    from toolpath_stiff.report.write import write_folder
     from toolpath_stiff.updating.readings.measurements import read_measurements
     from toolpath_stiff.updating.update.update_document import document, residuals_csv
 
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     update, search = _update(args, machine, data)
     provenance = _provenance(args, update)
     updated = update.fitted(provenance) if update.accepted else None
-    machine_file = args.output or str(Path(args.out) / "machine.toml")
+    machine_file = args.output or str(target.folder / MACHINE)
     found = document(
         update, updated, files=args.data, machine_file=machine_file if updated is not None else None,
         provenance=provenance, seed=args.seed,
@@ -101,12 +101,12 @@ def run(args: argparse.Namespace) -> int:
     found["next"] = _next(args, updated, machine_file)
     if search is not None:
         found["search"] = _search(search)
-    contents: dict[str, str | bytes] = {
+    contents: dict[str, Content] = {
         "update.json": json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "residuals.csv": residuals_csv(update),
     }
     if updated is not None and args.output is None:
-        contents["machine.toml"] = machine_toml(updated, _preamble(found))
+        contents[MACHINE] = machine_toml(updated, _preamble(found))
     if search is not None:
         contents |= _figure3(args, machine, data)
     if not args.no_plots:
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     written = []
     if updated is not None and args.output is not None:  # first: update.json names it
         written.append(write_atomically(Path(args.output), machine_toml(updated, _preamble(found))))
-    written += write_folder(args.out, contents, OWN_FILES)
+    written += target.write(contents)
     if args.json:
         print(contents["update.json"], end="")
     else:
@@ -225,7 +225,7 @@ def _search(search: StrutLawSearch) -> dict[str, Any]:
     }
 
 
-def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> dict[str, str | bytes]:
+def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> dict[str, Content]:
     """The paper's Figure 3 as data and, unless pictures are off, drawn."""
     from toolpath_stiff.updating.update.strut_law_search import bar_curve, bar_curve_csv
 
@@ -233,7 +233,7 @@ def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> 
         return {}
     say("the platform's bars, soft to rigid")
     curve = bar_curve(machine, data, seed=args.seed, starts=1)
-    found: dict[str, str | bytes] = {"figure3.csv": bar_curve_csv(curve)}
+    found: dict[str, Content] = {"figure3.csv": bar_curve_csv(curve)}
     if not args.no_plots:
         from toolpath_stiff.report.update_pictures import figure3_png
 
@@ -243,7 +243,7 @@ def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> 
     return found
 
 
-def _pictures(found: dict[str, Any], update: Update, figure3: str | bytes | None) -> dict[str, str | bytes]:
+def _pictures(found: dict[str, Any], update: Update, figure3: Content | None) -> dict[str, Content]:
     from toolpath_stiff.report.update_page import update_html
     from toolpath_stiff.report.update_pictures import before_after_png, error_ladder_png
 

@@ -13,9 +13,6 @@ from toolpath_stiff.report.wording import duration, number, only_plunges, plain,
 
 WIDTH = 100  # columns of the terminal
 MOST_NAME = 36  # of them for the name
-# How a summary.csv of ours begins, and what our index.html has in its head: other files of these names are not ours.
-TABLE_MARK = "program,file,status,reason,report,machine,load"
-PAGE_MARK = '<meta name="generator" content="tps analyze">'
 
 # Column of summary.csv -> key of the figures, decimals; the units are in the names.
 COLUMNS: Mapping[str, int | None] = {

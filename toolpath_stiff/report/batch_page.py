@@ -9,13 +9,13 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any
 from urllib.parse import quote
 
 from toolpath_stiff import __version__
-from toolpath_stiff.report.batch import PAGE_MARK, Outcome
+from toolpath_stiff.report.batch import Outcome
 from toolpath_stiff.report.sections import escaped, figures, page, section
+from toolpath_stiff.report.template import asset
 from toolpath_stiff.report.wording import ONLY_PLUNGES, duration, number, only_plunges, plain, shortened
 
 TEXT = 40  # characters of a program's line that are shown
@@ -52,8 +52,8 @@ def batch_page(outcomes: Sequence[Outcome]) -> str:
         sections=[_failures(failed), _table(good)],
         footer=f"toolpath_stiff {__version__}. Stiffness is that of the tool tip along the load.",
         verdict_class="unexplained" if failed else "",
-        head=f"{PAGE_MARK}\n<style>\n{_asset('batch.css')}</style>",
-        script=_asset("batch.js") if good else "",
+        styles=["batch.css"],
+        script=asset("batch.js") if good else "",
     )
 
 
@@ -340,7 +340,3 @@ def _figure(one: Outcome, name: str) -> Any:
 def _link(path: str) -> str:
     """A relative path as an address; names need not be UTF-8, nor free of what addresses take otherwise."""
     return quote(os.fsencode(path))
-
-
-def _asset(name: str) -> str:
-    return resources.files("toolpath_stiff.report").joinpath("assets", name).read_text(encoding="utf-8")

@@ -23,29 +23,45 @@ def regions_picture(study: CaseStudy) -> bytes:
     stiffness = [n_per_mm_from_n_per_m(a.at.stiffness[a.counted]) for a in study.regions.values()]
     low, high = min(float(s.min()) for s in stiffness), max(float(s.max()) for s in stiffness)
     with house_style():
-        figure = new_figure(13.0, 6.4)
+        (left, right), (bottom, top) = _frame(study)
+        panel = 5.9  # inches wide; as high as its scale asks for
+        width, tall = 14.2, panel * (top - bottom) / (right - left)
+        above = tall + 1.65
+        figure = new_figure(width, above)
         drawn = None
         for column, height in enumerate((LOW_MM, HIGH_MM)):
-            axes = figure.add_axes((0.06 + 0.43 * column, 0.1, 0.38, 0.72))
+            place = ((0.75 + (panel + 0.35) * column) / width, 0.6 / above, panel / width, tall / above)
+            axes = figure.add_axes(place)
             for row in study.summary["regions"]:
                 if row["z_mm"] == height:
                     drawn = _path(axes, study, row, low, high)
             axes.set_title(f"z = {height:g} mm")
-            axes.set_xlim(-340, 340)
-            axes.set_ylim(-210, 330)
-            axes.set_aspect("equal")
+            axes.set_xlim(left, right)
+            axes.set_ylim(bottom, top)
             axes.set_xlabel("X mm")
-            axes.set_ylabel("Y mm")
+            axes.set_ylabel("" if column else "Y mm")
+            axes.tick_params(labelleft=not column)
             axes.plot(0, 0, "+", color=MUTED, ms=10)
         if drawn is not None:
-            bar = figure.add_axes((0.915, 0.14, 0.016, 0.64))
+            bar = figure.add_axes((1.0 - 1.0 / width, 0.6 / above, 0.18 / width, tall / above))
             figure.colorbar(drawn, cax=bar, label="tangential stiffness, N/mm")
             bar.yaxis.set_major_formatter(lambda value, _: number(value))
             bar.grid(visible=False)
-        figure.text(0.06, 0.94, "One path in four regions: mean (range) of stiffness, N/mm", fontsize=14, weight="bold")
+        x = 0.25 / width
+        title = "One path in four regions: mean (range) of stiffness, N/mm"
+        figure.text(x, 1.0 - 0.4 / above, title, fontsize=14, weight="bold")
         text = f"{study.summary['program']} on {study.summary['machine']}; path and regions are ours, as Figure 10"
-        figure.text(0.06, 0.895, text, fontsize=10, color=MUTED)
+        figure.text(x, 1.0 - 0.68 / above, text, fontsize=10, color=MUTED)
         return png_bytes(figure)
+
+
+def _frame(study: CaseStudy) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Limits of X and Y in mm that hold the paths of all regions and the machine's axis, with room around them."""
+    points = [mm_from_m(a.samples.position[a.counted, :2]) for a in study.regions.values()]
+    points.append(np.zeros((1, 2)))
+    low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
+    pad = 0.08 * float((high - low).max())
+    return (float(low[0]) - pad, float(high[0]) + pad), (float(low[1]) - pad, float(high[1]) + pad)
 
 
 def _path(axes: Axes, study: CaseStudy, row: dict[str, float | str], low: float, high: float) -> LineCollection:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.report.compare_pictures import heading, near_rows
-from toolpath_stiff.report.figure import GRID, INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import FAINT, GRID, INK, MUTED, PALE_RED, UNREACHABLE_RED, house_style, new_figure
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
+from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import DEVIATION
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.comparison.residual_variables import directions, planes
@@ -30,7 +31,7 @@ MERGED = 0.03  # of the picture's width: poses closer than this in the view shar
 LEFT, PANEL, WIDEST, NARROWEST = 0.8, 3.65, 15.0, 8.6  # inches: margin, a square panel, the picture
 
 
-def machine_png(found: Comparison) -> bytes:
+def machine_png(found: Comparison) -> Drawing:
     """PNG: glyphs on the machine from above, plane by plane, and from the front and the right."""
     data = found.data
     where = planes(data)
@@ -75,7 +76,7 @@ def machine_png(found: Comparison) -> bytes:
             "poses that fall together in a view: their mean",
         )
         _key(figure, axes_shown, width, height)
-        return png_bytes(figure)
+        return drawing(figure)
 
 
 def _relative(place: Place, width: float, height: float) -> Place:
@@ -123,9 +124,9 @@ def _from_above(axes: Axes, found: Comparison) -> None:
     azimuths = np.round(np.degrees(np.arctan2(frame[:, 1], frame[:, 0])), 1)
     for azimuth in np.unique(azimuths):
         direction = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))])
-        axes.plot(*mm_from_m(np.outer(direction, [0.0, 0.86 * half])), color=GRID, lw=1.0, zorder=0)
+        axes.plot(*mm_from_m(np.outer(direction, [0.0, 0.8 * half])), color=GRID, lw=1.0, zorder=0)
         name = "+".join(str(i + 1) for i in np.flatnonzero(azimuths == azimuth))
-        x, y = mm_from_m(0.94 * half * direction)
+        x, y = mm_from_m(0.9 * half * direction)
         axes.annotate(name, (x, y), ha="center", va="center", fontsize=7.5, color=MUTED, zorder=0.5)
     axes.plot(0.0, 0.0, "+", color=MUTED, ms=9, zorder=0.5)
     axes.tick_params(labelsize=8)
@@ -140,13 +141,13 @@ def _whole_machine(axes: Axes, found: Comparison) -> None:
     tip = ((low + high) / 2.0)[None]
     joints = tip[0] + solve_struts(machine, tip).arms[0]
     for joint, vertex in zip(joints, machine.frame_joints, strict=True):
-        axes.plot(*mm_from_m(np.stack([joint, vertex])[:, [0, 2]]).T, color="#b8c1cc", lw=1.6, zorder=1)
+        axes.plot(*mm_from_m(np.stack([joint, vertex])[:, [0, 2]]).T, color=FAINT, lw=1.6, zorder=1)
         axes.plot(*mm_from_m(vertex[[0, 2]]), "o", color=MUTED, ms=4, zorder=2)
         axes.plot(*mm_from_m(np.stack([joint, tip[0]])[:, [0, 2]]).T, color=MUTED, lw=1.6, zorder=2)
     size = mm_from_m(np.maximum(high - low, 0.06))
     corner = mm_from_m((low + high) / 2.0) - size / 2.0
     axes.add_patch(
-        Rectangle((corner[0], corner[2]), size[0], size[2], fc="#f7d9dd", ec=UNREACHABLE_RED, lw=1.2, zorder=0.5)
+        Rectangle((corner[0], corner[2]), size[0], size[2], fc=PALE_RED, ec=UNREACHABLE_RED, lw=1.2, zorder=0.5)
     )
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)

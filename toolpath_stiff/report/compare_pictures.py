@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.report.figure import INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import FAINT, INK, MUTED, UNREACHABLE_RED, WITHIN, house_style, new_figure
 from toolpath_stiff.report.update_pictures import BAND, DIRECTION_COLOURS, RESIDUAL_MAP
+from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison.residual_variables import directions, planes
@@ -16,6 +17,7 @@ from toolpath_stiff.updating.inference.baseline import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
     from toolpath_stiff.updating.comparison.compare import Comparison
@@ -24,6 +26,8 @@ FloatArray = NDArray[np.float64]
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 MOST_CHANGES = 12  # of set-up or file that are marked
+WIDTH = 14.0  # inches
+OPAQUEST = 1.8  # times the largest residual would be drawn opaque: figures stay legible on it
 SIDES = 2.0  # standard deviations of the bars and bands: 95 %
 RESIDUAL_AXIS = f"{DEVIATION}, %; {MINUS_IS_SOFTER}"
 
@@ -52,7 +56,7 @@ def markers(setup: NDArray[np.str_]) -> dict[str, str]:
     return {name: MARKERS[i % len(MARKERS)] for i, name in enumerate(dict.fromkeys(setup.tolist()))}
 
 
-def measured_modelled_png(found: Comparison) -> bytes:
+def measured_modelled_png(found: Comparison) -> Drawing:
     """PNG: measured against modelled stiffness, log-log, colour a direction, marker a set-up, with the 10 % band."""
     data = found.data
     along, shapes = directions(data), markers(data.setup)
@@ -66,10 +70,11 @@ def measured_modelled_png(found: Comparison) -> bytes:
     from matplotlib.colors import to_rgb
 
     with house_style():
-        figure = new_figure(8.6, 8.4)
-        axes = figure.add_axes((0.125, 0.09, 0.83, 0.79))
+        figure = new_figure(WIDTH, 7.3)
+        axes = figure.add_axes((0.95 / WIDTH, 0.65 / 7.3, 5.6 / WIDTH, 5.6 / 7.3))
+        beside = figure.add_axes((7.75 / WIDTH, 0.65 / 7.3, 5.95 / WIDTH, 5.6 / 7.3))
         line = np.array([low, high])
-        axes.fill_between(line, (1 - BAND) * line, (1 + BAND) * line, color="#e3e9f0", zorder=0, label="within 10 %")
+        axes.fill_between(line, (1 - BAND) * line, (1 + BAND) * line, color=WITHIN, zorder=0, label="within 10 %")
         axes.plot(line, line, color=MUTED, lw=1.0, zorder=1)
         for axis, colour in DIRECTION_COLOURS.items():
             for setup, marker in shapes.items():
@@ -82,6 +87,7 @@ def measured_modelled_png(found: Comparison) -> bytes:
                     )  # fmt: skip
         _log_axes(axes, low, high)
         _legend(axes, found, along, shapes)
+        _residuals(beside, found, modelled, along, shapes)
         name = found.noises[-1].name
         heading(
             figure,
@@ -89,26 +95,58 @@ def measured_modelled_png(found: Comparison) -> bytes:
             f"as given; below the line: softer than modelled; bars: {SIDES:g} standard deviations of scatter "
             f"({'the high guess' if name == 'high' else f'noise {name}'})",
         )
-        return png_bytes(figure)
+        return drawing(figure)
 
 
 def _log_axes(axes: Axes, low: float, high: float) -> None:
-    from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
-
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)
-    steps = [1, 2, 5] if high / low > 12.0 else [1, 1.5, 2, 3, 4, 5, 7]
-    ticks = [s * 10.0**e for e in range(2, 8) for s in steps if low <= s * 10.0**e <= high]
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(FixedLocator(ticks))
-        axis.set_minor_locator(NullLocator())
-        axis.set_minor_formatter(NullFormatter())
-        axis.set_major_formatter(lambda value, _: number(value))
+        _log_axis(axis, low, high)
     axes.set_aspect("equal")
     axes.set_xlabel("modelled stiffness, N/mm")
     axes.set_ylabel("measured stiffness, N/mm")
+
+
+def _log_axis(axis: Axis, low: float, high: float) -> None:
+    """Round figures along a logarithmic axis, not so many that they touch."""
+    from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
+
+    steps = [1, 2, 5] if high / low > 12.0 else [1, 1.5, 2, 3, 5, 7]
+    axis.set_major_locator(
+        FixedLocator([s * 10.0**e for e in range(2, 8) for s in steps if low <= s * 10.0**e <= high])
+    )
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_major_formatter(lambda value, _: number(value))
+
+
+def _residuals(
+    axes: Axes, found: Comparison, modelled: FloatArray, along: NDArray[np.str_], shapes: dict[str, str]
+) -> None:
+    """The same readings as residuals: what is within the line's width beside this."""
+    residual = deviation_percent(found.residual)
+    axes.axhspan(-100.0 * BAND, 100.0 * BAND, color=WITHIN, lw=0, zorder=0)
+    axes.axhline(0.0, color=MUTED, lw=1.0, zorder=1)
+    for axis, colour in DIRECTION_COLOURS.items():
+        rows = along == axis
+        if not rows.any():
+            continue
+        for setup, marker in shapes.items():
+            chosen = rows & (found.data.setup == setup)
+            axes.plot(
+                modelled[chosen], residual[chosen], marker, color=colour, ms=4.0 if len(residual) > 100 else 6.5,
+                mec="white", mew=0.5, zorder=3,
+            )  # fmt: skip
+        ends = [float(modelled[rows].min()), float(modelled[rows].max())]
+        axes.plot(ends, [float(np.mean(residual[rows]))] * 2, color=colour, lw=1.6, ls="--", zorder=2)
+    axes.set_xscale("log")
+    _log_axis(axes.xaxis, *axes.get_xlim())
+    axes.set_xlabel("modelled stiffness, N/mm")
+    axes.set_ylabel(RESIDUAL_AXIS)
+    axes.set_title("the difference; dashed: mean of a direction", fontsize=10)
 
 
 def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict[str, str]) -> None:
@@ -129,11 +167,11 @@ def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict
         for setup, marker in list(shapes.items())[: len(MARKERS)]:
             name = shortened(plain(setup) or "(no name)", 30)
             keys.append(Line2D([], [], marker=marker, ls="", color=MUTED, label=f"set-up {name}"))
-    keys.append(Patch(color="#d5dde6", label="within 10 %"))
+    keys.append(Patch(color=WITHIN, label="within 10 %"))
     axes.legend(handles=keys, loc="upper left", frameon=True, framealpha=0.9, edgecolor="none", fontsize=9)
 
 
-def strips_png(found: Comparison) -> bytes:
+def strips_png(found: Comparison) -> Drawing:
     """PNG: residuals in measuring order, one strip a direction, changes of set-up and file marked."""
     data, residual = found.data, deviation_percent(found.residual)
     along, shapes = directions(data), markers(data.setup)
@@ -145,16 +183,16 @@ def strips_png(found: Comparison) -> bytes:
     margin = 0.12 * float(np.ptp(edges))
     with house_style():
         height = 1.3 + 1.9 * len(present)
-        figure = new_figure(12.0, height)
+        figure = new_figure(WIDTH, height)
         for i, axis in enumerate(present):
-            axes = figure.add_axes((0.075, (0.55 + 1.9 * (len(present) - 1 - i)) / height, 0.905, 1.65 / height))
+            axes = figure.add_axes((0.065, (0.55 + 1.9 * (len(present) - 1 - i)) / height, 0.92, 1.65 / height))
             rows = along == axis
             spread = SIDES * found.scatter[rows]
             axes.fill_between(
                 order[rows],
                 deviation_percent(-spread),
                 deviation_percent(spread),
-                color="#e9edf2",
+                color=WITHIN,
                 step="mid",
                 lw=0,
                 zorder=0,
@@ -182,7 +220,7 @@ def strips_png(found: Comparison) -> bytes:
             f"{RESIDUAL_AXIS}, in measuring order; grey: {SIDES:g} standard deviations of scatter; "
             "dashed: another set-up or file",
         )
-        return png_bytes(figure)
+        return drawing(figure)
 
 
 def _changes(axes: Axes, setup: NDArray[np.str_], file: NDArray[np.str_], named: bool) -> None:
@@ -190,7 +228,7 @@ def _changes(axes: Axes, setup: NDArray[np.str_], file: NDArray[np.str_], named:
     changed = np.flatnonzero((setup[1:] != setup[:-1]) | (file[1:] != file[:-1])) + 1
     starts = [0, *changed.tolist()]
     for start in changed.tolist() if len(changed) < MOST_CHANGES else []:
-        axes.axvline(start + 0.5, color="#b8c1cc", lw=0.8, ls="--", zorder=0)
+        axes.axvline(start + 0.5, color=FAINT, lw=0.8, ls="--", zorder=0)
     if named and 1 < len(starts) <= MOST_CHANGES:
         for start in starts:
             text = shortened(plain(str(setup[start])) or "(no name)", 18)
@@ -213,7 +251,7 @@ def _name_far_off(axes: Axes, found: Comparison, axis: str, residual: FloatArray
         )  # fmt: skip
 
 
-def planes_png(found: Comparison) -> bytes:
+def planes_png(found: Comparison) -> Drawing:
     """PNG: mean residual by plane and direction, a signed percentage a cell with its standard error."""
     data = found.data
     along, where = directions(data), planes(data)
@@ -230,12 +268,20 @@ def planes_png(found: Comparison) -> bytes:
                 weights = chosen / chosen.sum()
                 error = 100.0 * float(np.sqrt(weights @ found.covariance @ weights))
                 cells[i, j] = deviation_percent(weights @ found.residual), error, chosen.sum()
+    from matplotlib import colormaps
+
     limit = max(float(np.nanmax(np.abs(cells[..., 0]), initial=0.0, where=np.isfinite(cells[..., 0]))), 1.0)
     with house_style():
-        width, height = max(2.6 + 1.75 * len(columns), 8.2), 1.5 + 0.85 * len(rows)
+        width, height = WIDTH, 1.5 + 0.85 * len(rows)
         figure = new_figure(width, height)
         axes = figure.add_axes((2.2 / width, 0.25 / height, (width - 2.5) / width, 0.85 * len(rows) / height))
-        axes.imshow(cells[..., 0], cmap=RESIDUAL_MAP, vmin=-1.6 * limit, vmax=1.6 * limit, aspect="auto")
+        # Red or blue, the more opaque the further from zero: on a dark page a cell near zero is dark.
+        colours = colormaps[RESIDUAL_MAP](np.where(np.nan_to_num(cells[..., 0]) < 0.0, 0.12, 0.88))
+        colours[..., 3] = np.abs(np.nan_to_num(cells[..., 0])) / (OPAQUEST * limit)
+        axes.pcolormesh(
+            np.arange(len(columns) + 1) - 0.5, np.arange(len(rows) + 1) - 0.5, colours, edgecolors="white", lw=3
+        )
+        axes.set_ylim(len(rows) - 0.5, -0.5)
         for i in range(len(rows)):
             for j in range(len(columns)):
                 mean, error, count = cells[i, j]
@@ -252,14 +298,10 @@ def planes_png(found: Comparison) -> bytes:
         axes.grid(visible=False)
         for side in axes.spines.values():
             side.set_visible(False)
-        axes.set_xticks(np.arange(len(columns) - 1) + 0.5, minor=True)
-        axes.set_yticks(np.arange(len(rows) - 1) + 0.5, minor=True)
-        axes.grid(visible=True, which="minor", color="white", lw=3)
-        axes.tick_params(which="minor", length=0)
         heading(
             figure,
             "Z against X and Y? Upper against lower plane?",
             f"{RESIDUAL_AXIS} (red), blue: stiffer; bold: beyond {SIDES:g} standard errors"
             + ("" if near.all() else f"; without {count_of(int((~near).sum()), 'reading')} far off"),
         )
-        return png_bytes(figure)
+        return drawing(figure)

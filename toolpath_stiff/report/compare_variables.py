@@ -9,8 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.report.compare_pictures import RESIDUAL_AXIS, count_of, heading
-from toolpath_stiff.report.figure import INK, MUTED, UNREACHABLE_RED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import (
+    BLUE,
+    INK,
+    LIGHT_BLUE,
+    MUTED,
+    SECOND_ORANGE,
+    UNREACHABLE_RED,
+    house_style,
+    new_figure,
+)
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
+from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, plain, shortened
 from toolpath_stiff.updating.comparison.residual_structure import SIGNIFICANT
 from toolpath_stiff.updating.comparison.residual_variables import directions
@@ -30,11 +40,11 @@ MOST_NAMES = 8  # levels of a label that are written out
 WIDE = 7.5  # median deviations, some 5 standard deviations: readings further off stand at the edge
 NM_PER_N = 1e9
 LONG_NAME = 10  # letters of a link from which its name, turned, needs more room below
-LINKS = ("#2457a6", "#7ea6d8")  # struts, alternating
-EFFECT, MISSING = "#de6b12", "#9aa5b1"
+LINKS = (BLUE, LIGHT_BLUE)  # struts, alternating
+EFFECT = SECOND_ORANGE
 
 
-def variables_png(found: Comparison) -> bytes:
+def variables_png(found: Comparison) -> Drawing:
     """PNG: residual against each variable, the strongest first; readings far off stand at the edge."""
     limits = _limits(found)
     panels: list[tuple[float, str, Variable | Label]] = []
@@ -73,7 +83,7 @@ def variables_png(found: Comparison) -> bytes:
             f"{RESIDUAL_AXIS}; lines: a direction's own trend; p: of the strongest pattern, corrected for all "
             "that were looked for; triangles: beyond the frame",
         )
-        return png_bytes(figure)
+        return drawing(figure)
 
 
 def _about(test: Mapping[str, Any], name: str) -> bool:
@@ -164,7 +174,7 @@ def _brief(name: str) -> str:
     return name
 
 
-def load_path_png(found: Comparison) -> bytes:
+def load_path_png(found: Comparison) -> Drawing:
     """PNG: compliance of the tip along X, Y, Z, link by link, and what the measurements add or take."""
     shares = found.shares
     compliance = shares.compliance * NM_PER_N
@@ -192,7 +202,7 @@ def load_path_png(found: Comparison) -> bytes:
             f"mean over {poses}; last bars: the model's sum and what was measured along that direction, with "
             f"{DEVIATION} of its stiffness, {MINUS_IS_SOFTER}",
         )
-        return png_bytes(figure)
+        return drawing(figure)
 
 
 def _measured_over_modelled(found: Comparison, rows: NDArray[np.bool_]) -> float:

@@ -30,21 +30,33 @@ from toolpath_stiff.report.diagnose_words import (
     significant,
     size_text,
 )
-from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import (
+    BLUE,
+    CHOSEN,
+    FAINT,
+    INK,
+    MUTED,
+    RAPID_GREY,
+    SECOND_ORANGE,
+    UNREACHABLE_RED,
+    house_style,
+    new_figure,
+)
+from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import plain, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BLUE, PALE_BLUE, GREY, GREEN = "#2457a6", "#e3edfa", "#9aa5b1", "#2f855a"
 ROW = 0.47  # inch a candidate
 OUTSIDE = "outside the catalogue"
+OPAQUE = 0.75  # from here on a cell is dark on a light page, and light on a dark one
 MOST_PAIRS = 5  # of the ladder; all are in diagnose.json
 BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and arrows stand for more
 
 
-def ladder_png(document: Mapping[str, Any]) -> bytes:
+def ladder_png(document: Mapping[str, Any]) -> Drawing:
     """PNG: every explanation with its error at left-out points and its probability, best first."""
     rows = ladder_rows(document)
     height = 1.75 + ROW * len(rows)
@@ -73,8 +85,8 @@ def ladder_png(document: Mapping[str, Any]) -> bytes:
         _ladder_words(words, rows, document)
         for y, row in enumerate(rows):
             if _marked(row, document):
-                shade.axhspan(y - 0.5, y + 0.5, color=PALE_BLUE, lw=0)
-        return png_bytes(figure)
+                shade.axhspan(y - 0.5, y + 0.5, color=CHOSEN, lw=0)
+        return drawing(figure)
 
 
 def ladder_rows(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -103,10 +115,10 @@ def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[
         name = row_name(row)
         small = ", ".join(parameter_texts(row, intervals=False)) or plain(str(row.get("title") or ""))
         offered = is_offered(row, document)
-        colour = INK if offered else GREY
+        colour = INK if offered else RAPID_GREY
         weight = "bold" if _marked(row, document) else "normal"
         axes.text(0.0, y - 0.16, shortened(name, 58), va="center", color=colour, weight=weight)
-        axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=MUTED if offered else GREY, size=8)
+        axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=MUTED if offered else RAPID_GREY, size=8)
 
 
 def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
@@ -159,17 +171,17 @@ def standard_error(base: float | None, outside: float | None, gain_in_se: float 
 
 def _row_colour(row: Mapping[str, Any], document: Mapping[str, Any]) -> str:
     if not is_offered(row, document):
-        return GREY
+        return RAPID_GREY
     if _marked(row, document):
         return BLUE
-    return INK if row.get("effect") in (AS_GIVEN, NONE) else "#52606d"
+    return INK if row.get("effect") in (AS_GIVEN, NONE) else MUTED
 
 
 def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
     axes.set_xlim(0.0, 1.0)
     for y, row in enumerate(rows):
         value = figure_of(row, "probability")
-        axes.barh(y, value or 0.0, height=0.5, color=BLUE if is_offered(row, document) else GREY, zorder=2)
+        axes.barh(y, value or 0.0, height=0.5, color=BLUE if is_offered(row, document) else RAPID_GREY, zorder=2)
         inside = (value or 0.0) > 0.6
         axes.text(
             (value or 0.0) + (-0.03 if inside else 0.03), y, probability_text(value), va="center",
@@ -187,22 +199,32 @@ def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[s
         axes.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if is_offered(row, document) else MUTED)
 
 
-def confounding_png(document: Mapping[str, Any]) -> bytes:
+def confounding_png(document: Mapping[str, Any]) -> Drawing:
     """PNG: how alike the effects' signatures are on this design; effects that cannot be told apart stand in boxes."""
+    from matplotlib.colors import to_rgb
+
     given = document.get("confounding") or {}
     names, matrix, sets = confounding_in_order(given)
-    size = 0.42 * max(len(names), 3)
+    count = max(len(names), 1)
     with house_style():
-        width, height = max(size + 3.6, 7.0), size + 2.9
+        width, left, overhang = 14.0, 2.3, 1.25  # inches; the last name leans over the matrix by the overhang
+        wide, tall = min(width - left - overhang, 1.6 * count), 0.42 * max(count, 3)
+        height = tall + 2.9
         figure = new_figure(width, height)
         _title(
             figure, "What can these data not tell apart?", "1: the same after refitting the strut law; boxed: one set"
         )
-        axes = figure.add_axes((2.3 / width, 0.3 / height, size / width, size / height))
+        axes = figure.add_axes((left / width, 0.3 / height, wide / width, tall / height))
         if not names:
             _nothing(axes, "nothing to compare")
-            return png_bytes(figure)
-        axes.imshow(matrix, cmap="Blues", vmin=0.0, vmax=1.25, aspect="equal")
+            return drawing(figure)
+        # Blue, the more opaque the more alike: on a dark page the cells of what is unlike are dark.
+        cells = np.zeros((*matrix.shape, 4))
+        cells[..., :3], cells[..., 3] = to_rgb(BLUE), np.clip(np.nan_to_num(matrix), 0.0, 1.0) ** 1.5
+        edges = np.arange(count + 1) - 0.5
+        axes.pcolormesh(edges, edges, cells, edgecolors="none")
+        axes.set_xlim(-0.5, count - 0.5)
+        axes.set_ylim(count - 0.5, -0.5)
         axes.set_xticks(range(len(names)), names, rotation=50, ha="left", rotation_mode="anchor", color=INK, size=9)
         axes.xaxis.tick_top()
         axes.set_yticks(range(len(names)), names, color=INK, size=9)
@@ -213,12 +235,12 @@ def confounding_png(document: Mapping[str, Any]) -> bytes:
             value = matrix[i, j]
             if i != j and np.isfinite(value) and value > 0.5:
                 axes.text(
-                    j, i, f"{value:.2f}".replace("0.", ".", 1), ha="center", va="center", size=8,
-                    color="white" if value > 0.85 else INK,
+                    j, i, f"{value:.2f}".replace("0.", ".", 1), ha="center", va="center", size=9,
+                    color="white" if value > OPAQUE else INK,
                 )  # fmt: skip
         for start, count in sets:
             axes.add_patch(_box(start - 0.5, count))
-        return png_bytes(figure)
+        return drawing(figure)
 
 
 def _box(corner: float, count: int) -> Any:
@@ -267,7 +289,7 @@ def _chain(places: list[int], matrix: np.ndarray[Any, np.dtype[np.float64]]) -> 
     return chain
 
 
-def detectable_png(document: Mapping[str, Any]) -> bytes:
+def detectable_png(document: Mapping[str, Any]) -> Drawing:
     """PNG: the smallest size of each effect that these data would show, as the change of stiffness that it makes."""
     from matplotlib.ticker import LogLocator, NullLocator
 
@@ -280,16 +302,16 @@ def detectable_png(document: Mapping[str, Any]) -> bytes:
     rows = [*seen, *never]
     height = 1.7 + 0.32 * max(len(rows), 3)
     with house_style():
-        figure = new_figure(11.0, height)
+        figure = new_figure(14.0, height)
         _title(
             figure,
             "What could be there unseen?",
             "smallest size seen with 80 % power at 5 % family-wise, and the change it makes; less stays unseen",
         )
-        axes = figure.add_axes((0.33, 0.58 / height, 0.62, 1.0 - 1.55 / height))
+        axes = figure.add_axes((3.6 / 14.0, 0.58 / height, 9.9 / 14.0, 1.0 - 1.55 / height))
         if not rows:
             _nothing(axes, "not computed")
-            return png_bytes(figure)
+            return drawing(figure)
         sizes = [value for e in seen if (value := figure_of(e, "rms_percent") or 0.0) > 0.0] or [1.0]
         # From a tenth of a per cent to far beyond the readings: equal steps of the logarithm.
         start, reach = 0.7 * min(sizes), 4.0 * max(sizes)
@@ -311,17 +333,17 @@ def detectable_png(document: Mapping[str, Any]) -> bytes:
                 if largest is not None:
                     text += f", which change the stiffness by {percent(largest)}"
                 axes.annotate(
-                    text, (start, y), (6, 0), textcoords="offset points", va="center", size=9.5, color="#a3333d"
+                    text, (start, y), (6, 0), textcoords="offset points", va="center", size=9.5, color=UNREACHABLE_RED
                 )
         axes.set_yticks(range(len(rows)), [shortened(hidden_name(e), 42) for e in rows], color=INK)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
         axes.spines[["top", "right"]].set_visible(False)
         axes.set_xlabel("change of stiffness that this size makes, rms over the readings, %")
-        return png_bytes(figure)
+        return drawing(figure)
 
 
-def envelope_png(document: Mapping[str, Any]) -> bytes | None:
+def envelope_png(document: Mapping[str, Any]) -> Drawing | None:
     """PNG: the base model's weighted sum of squares among simulated ones; None where `gates` does not hold them."""
     from matplotlib.ticker import MaxNLocator, NullLocator
 
@@ -331,7 +353,7 @@ def envelope_png(document: Mapping[str, Any]) -> bytes | None:
         return None
     observed = figure_of(gates, "squares")
     with house_style():
-        figure = new_figure(8.4, 4.2)
+        figure = new_figure(14.0, 4.2)
         _title(
             figure,
             "Is the model without a further effect good enough?",
@@ -341,7 +363,7 @@ def envelope_png(document: Mapping[str, Any]) -> bytes | None:
         shown = simulated[simulated > 0.0]
         ends = [*shown, observed] if observed is not None and observed > 0.0 else [*shown]
         # Wild readings and a noise that is itself uncertain give a long tail: equal steps of the logarithm.
-        axes.hist(shown, bins=np.geomspace(0.98 * min(ends), 1.02 * max(ends), 41).tolist(), color="#b8c4d6", zorder=2)
+        axes.hist(shown, bins=np.geomspace(0.98 * min(ends), 1.02 * max(ends), 41).tolist(), color=FAINT, zorder=2)
         axes.set_xscale("log")
         low, high = axes.get_xlim()
         ticks = MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high)
@@ -360,11 +382,11 @@ def envelope_png(document: Mapping[str, Any]) -> bytes | None:
             for name, key in (("all", "baseline"), ("squares", "squares"), ("structure", "structure"), ("gain", "gain"))
         ]
         said = [f"{name} {significant(value, 2)}" for name, value in chances if value is not None]
-        figure.text(0.25 / 8.4, 1.0 - 0.93 / 4.2, f"p values: {', '.join(said) or '-'}", size=9.5, color=MUTED)
+        figure.text(0.25 / 14.0, 1.0 - 0.93 / 4.2, f"p values: {', '.join(said) or '-'}", size=9.5, color=MUTED)
         axes.set_yticks([])
         axes.grid(visible=False, axis="y")
         axes.spines[["top", "right", "left"]].set_visible(False)
-        return png_bytes(figure)
+        return drawing(figure)
 
 
 def _title(figure: Figure, text: str, note: str) -> None:

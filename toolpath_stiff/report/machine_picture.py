@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.report.figure import house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import BLUE, house_style, new_figure, png_bytes
 from toolpath_stiff.stiffness.platform_truss import HUB, TIP, platform_bars, platform_nodes
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
@@ -19,7 +20,10 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-STRUT, PLATFORM, TOOL, FRAME = "#2457a6", "#5b6675", "#c2410c", "#9aa4b1"
+STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
+TOP = 0.84  # of the picture's height, below the headings
+BELOW = -0.1  # of the picture's height: the views' empty rims lie beyond it
+ZOOMS = np.arange(1.5, 0.5, -0.05)  # of a view, the largest at which its axes and labels stay in its half
 
 
 def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> bytes:
@@ -27,11 +31,13 @@ def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> bytes
     joints = pose[:3] + struts.arms[0]
     nodes = pose[:3] + platform_nodes(machine.platform_joints) @ rotation_matrices(pose[3:]).T
     with house_style():
-        figure = new_figure(14.0, 8.0)
-        whole = figure.add_axes((-0.05, -0.07, 0.59, 0.92), projection="3d")
+        figure = new_figure(14.0, 7.2)
+        whole = figure.add_axes((0.0, BELOW, 0.5, 1.0), projection="3d")
         _draw_whole(whole, machine, mm_from_m(joints), mm_from_m(nodes), struts)
-        detail = figure.add_axes((0.53, -0.04, 0.45, 0.89), projection="3d")
+        detail = figure.add_axes((0.5, BELOW, 0.5, 1.0), projection="3d")
         _draw_platform(detail, machine, mm_from_m(nodes))
+        for axes in (whole, detail):
+            _fit(figure, axes)
         _heading(figure, machine, pose)
         return png_bytes(figure)
 
@@ -65,8 +71,30 @@ def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArr
         axes.text(*at, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=_LABEL)
     _truss(axes, machine, nodes, lw=1.2)
     axes.scatter(*nodes[TIP], color=TOOL, s=30, depthshade=False)
-    axes.set_title("whole machine: struts with length and stiffness", fontsize=10, color="#374151")
+    axes.set_title("whole machine: struts with length and stiffness", fontsize=10, color="#374151", y=0.85 - BELOW)
     _finish(axes, np.vstack([frame, nodes]))
+
+
+def _fit(figure: Figure, axes: Any) -> None:
+    """Zoom a view so that it fills its half of the picture with nothing beyond it."""
+    span = [high - low for low, high in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
+    room = axes.get_window_extent()
+    for zoom in ZOOMS:
+        axes.set_box_aspect(span, zoom=float(zoom))
+        figure.draw_without_rendering()
+        low, high = _extent(axes)
+        if room.x0 <= low[0] and high[0] <= room.x1 and low[1] >= 0.0 and high[1] <= TOP * figure.bbox.height:
+            return
+
+
+def _extent(axes: Any) -> tuple[FloatArray, FloatArray]:
+    """Lower left and upper right corner in pixels of a view: its box, its figures and what the axes are called."""
+    corners = np.array(list(product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim(), (1.0,))))
+    seen = corners @ axes.get_proj().T  # homogeneous
+    boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    ends = [box.get_points() for box in boxes if box is not None]
+    points = np.concatenate([axes.transData.transform(seen[:, :2] / seen[:, 3:]), *ends])
+    return points.min(axis=0), points.max(axis=0)
 
 
 _LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
@@ -79,7 +107,7 @@ def _draw_platform(axes: Any, machine: Machine, nodes: FloatArray) -> None:
     for node, name in zip(nodes, names, strict=True):
         axes.scatter(*node, color=TOOL if name == "tool tip" else PLATFORM, s=30, depthshade=False)
         axes.text(*node, f"  {name}", fontsize=8.5, color="#1f2937")
-    axes.set_title("platform: 19 bars, hub and tool", fontsize=10, color="#374151")
+    axes.set_title("platform: 19 bars, hub and tool", fontsize=10, color="#374151", y=0.85 - BELOW)
     _finish(axes, nodes)
 
 
@@ -97,7 +125,8 @@ def _finish(axes: Any, points: FloatArray) -> None:
         getattr(axes, f"set_{axis}lim")(lo - 0.05 * width, lo + 1.05 * width)
         getattr(axes, f"set_{axis}label")(f"{axis.upper()} mm", fontsize=9, color="#4b5563")
         getattr(axes, f"{axis}axis").pane.set_facecolor("#f8fafc")
-    axes.set_box_aspect(1.1 * span)
+    axes.patch.set_visible(False)
+    axes.zaxis.labelpad = 8.0
     axes.tick_params(labelsize=7.5, colors="#6b7280")
     axes.locator_params(nbins=5)
     axes.view_init(elev=18, azim=-62)

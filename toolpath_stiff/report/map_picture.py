@@ -15,6 +15,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.text import Text
 
 FloatArray = NDArray[np.float64]
 
@@ -25,7 +26,8 @@ ACROSS = 3  # panels in a row
 def map_picture(machine: Machine, found: StiffnessMap) -> bytes:
     """PNG of every slice, one colour scale for all."""
     slices = len(found.z)
-    columns, rows = min(slices, ACROSS), -(-slices // ACROSS)
+    rows = -(-slices // ACROSS)
+    columns = -(-slices // rows)  # rows filled evenly: four slices are two and two
     wide = float(np.ptp(found.x)) / float(np.ptp(found.y))
     side = 7.6 if slices == 1 else 4.6
     width, height = columns * side * min(wide, 1.6) + 1.9, rows * side + 1.5
@@ -41,13 +43,17 @@ def map_picture(machine: Machine, found: StiffnessMap) -> bytes:
             right=1 - 1.5 / width,
             bottom=0.6 / height,
             top=top,
-            wspace=0.18,
-            hspace=0.22,
+            wspace=0.15,
+            hspace=0.14,
         )
         drawn = None
         for i in range(slices):
             axes = figure.add_subplot(grid[i // columns, i % columns])
             drawn = _slice(axes, machine, found, i, stiffness[i], low, high)
+            below, first = i + columns >= slices, i % columns == 0
+            axes.set_xlabel("X mm" if below else "")
+            axes.set_ylabel("Y mm" if first else "")
+            axes.tick_params(labelbottom=below, labelleft=first)
         bar = figure.add_axes((1 - 1.2 / width, 0.6 / height, 0.2 / width, top - 0.6 / height))
         if drawn is not None:
             figure.colorbar(drawn, cax=bar, label="stiffness along the load, N/mm")
@@ -67,9 +73,6 @@ def _slice(
     """One height: colours, contours, the edge of reach, the directions of the joints."""
     x, y = mm_from_m(found.x), mm_from_m(found.y)
     mesh = axes.pcolormesh(x, y, stiffness, cmap=COLOUR_MAP, vmin=low, vmax=high, shading="gouraud", rasterized=True)
-    if np.nanmax(stiffness) > np.nanmin(stiffness):
-        lines = axes.contour(x, y, stiffness, levels=CONTOURS, colors="white", linewidths=0.7, alpha=0.9)
-        axes.clabel(lines, fontsize=7, fmt=number)
     if not found.reachable[i].all() and found.reachable[i].any():
         axes.contour(x, y, found.reachable[i].astype(float), levels=[0.5], colors="#d64545", linewidths=1.5)
     axes.set_facecolor("#eceff3")
@@ -78,21 +81,36 @@ def _slice(
     axes.set_aspect("equal")
     axes.grid(visible=False)
     axes.set_title(f"z = {mm_from_m(found.z[i]):g} mm", fontsize=10)
-    axes.set_xlabel("X mm")
-    axes.set_ylabel("Y mm")
-    _directions(axes, mm_from_m(machine.frame_joints), x, y)
+    names = _directions(axes, mm_from_m(machine.frame_joints), x, y)
+    if np.nanmax(stiffness) > np.nanmin(stiffness):
+        lines = axes.contour(x, y, stiffness, levels=CONTOURS, colors="white", linewidths=0.7, alpha=0.9)
+        _keep_apart(axes, axes.clabel(lines, fontsize=7, fmt=number), names)
     return mesh
 
 
-def _directions(axes: Axes, joints: FloatArray, x: FloatArray, y: FloatArray) -> None:
-    """Where the struts meet the frame: at their place, or as arrows at the rim if that is outside."""
+def _keep_apart(axes: Axes, figures: list[Text], names: list[Text]) -> None:
+    """Take away a contour's figure that would lie on a name, on another figure or across the frame."""
+    room = axes.get_window_extent()
+    taken = [name.get_window_extent() for name in names]
+    for one in figures:
+        box = one.get_window_extent()
+        inside = room.x0 < box.x0 and box.x1 < room.x1 and room.y0 < box.y0 and box.y1 < room.y1
+        if not inside or any(box.overlaps(other) for other in taken):
+            one.remove()
+        else:
+            taken.append(box)
+
+
+def _directions(axes: Axes, joints: FloatArray, x: FloatArray, y: FloatArray) -> list[Text]:
+    """Where the struts meet the frame: at their place, or as arrows at the rim if that is outside; their names."""
+    names: list[Text] = []
     seen: list[FloatArray] = []
     for i, joint in enumerate(joints[:, :2]):
         inside = x[0] <= joint[0] <= x[-1] and y[0] <= joint[1] <= y[-1]
         unit = joint / max(float(np.hypot(*joint)), 1e-9)
         if inside:
             axes.plot(*joint, "^", color=INK, ms=6)
-            axes.annotate(f"strut {i + 1}", joint, fontsize=7, xytext=(4, 4), textcoords="offset points")
+            names.append(axes.annotate(f"strut {i + 1}", joint, fontsize=7, xytext=(4, 4), textcoords="offset points"))
             continue
         if any(float(unit @ other) > 0.999 for other in seen):
             continue
@@ -104,6 +122,10 @@ def _directions(axes: Axes, joints: FloatArray, x: FloatArray, y: FloatArray) ->
         tip, tail = middle + 0.985 * reach * unit, middle + 0.90 * reach * unit
         axes.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.4})
         label = "struts " + ", ".join(map(str, same)) if len(same) > 1 else f"strut {same[0]}"
-        at = middle + 0.84 * reach * unit
-        box = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.2}
-        axes.text(float(at[0]), float(at[1]), label, fontsize=7, ha="center", va="center", color=INK, bbox=box)
+        at = middle + 0.88 * reach * unit
+        box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.2}
+        # Beside the arrow's tail, towards the middle: an arrow along X would lie beneath a centred name.
+        side = "center" if abs(unit[0]) < 0.9 else "left" if unit[0] < 0.0 else "right"
+        level = "center" if abs(unit[1]) < 0.4 else "bottom" if unit[1] < 0.0 else "top"
+        names.append(axes.text(float(at[0]), float(at[1]), label, fontsize=7, ha=side, va=level, color=INK, bbox=box))
+    return names

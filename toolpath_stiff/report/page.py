@@ -12,12 +12,11 @@ import html
 import json
 import re
 from collections.abc import Mapping
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.report.page_data import page_data
 from toolpath_stiff.report.page_tables import page_tables
-from toolpath_stiff.report.sections import script_hash
+from toolpath_stiff.report.template import asset, filled, script_hash, style
 from toolpath_stiff.report.wording import headline_text, number, plain
 
 if TYPE_CHECKING:
@@ -50,15 +49,15 @@ def page(
         How the switch stands that lets plunges set the axis and the colour scale.
     """
     data = page_data(analysis, required, other)
-    script = '\n"use strict";\n(() => {\n' + "".join(_asset(name) for name in SCRIPTS) + "})();\n"
+    script = '\n"use strict";\n(() => {\n' + "".join(asset(name) for name in SCRIPTS) + "})();\n"
     program = html.escape(plain(str(summary["program"])))
     return filled(
-        _asset("report.html"),
+        asset("report.html"),
         {
             "title": f"{program}: stiffness along the path",
             "program": program,
             "heading": html.escape(_heading(summary)),
-            "style": _asset("report.css"),
+            "style": style("report.css"),
             "script": script,
             "script_hash": script_hash(script),
             "data": json_for_script(data),
@@ -78,15 +77,6 @@ def json_for_script(value: Any) -> str:
         text = text.replace(character, f"\\u{ord(character):04x}")
     # A lone surrogate (a byte that was no text) cannot be written as UTF-8, and browsers stumble over it.
     return re.sub("[\ud800-\udfff]", "\N{REPLACEMENT CHARACTER}", text)
-
-
-def filled(template: str, parts: Mapping[str, str]) -> str:
-    """The template with its {{names}} replaced in one pass, so that nothing inserted is looked at again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
-
-
-def _asset(name: str) -> str:
-    return resources.files("toolpath_stiff.report").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def _heading(summary: Mapping[str, Any]) -> str:

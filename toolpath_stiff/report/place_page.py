@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,9 @@ from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.batch import Keepout
 from toolpath_stiff.placement.drawn_path import DrawnPath, drawn_path
 from toolpath_stiff.placement.report_data import placement_of
-from toolpath_stiff.report.page import filled, json_for_script
+from toolpath_stiff.report.page import json_for_script
 from toolpath_stiff.report.page_data import class_colours
-from toolpath_stiff.report.sections import script_hash
+from toolpath_stiff.report.template import asset, filled, script_hash, style
 from toolpath_stiff.report.wording import machine_text, number, plain
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
@@ -71,11 +70,11 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
         "colours": class_colours(0.0, 0.93),
         "colours_dark": class_colours(0.22, 1.0),
     }
-    script = '\n"use strict";\n(() => {\n' + _asset("place.js") + "})();\n"
+    script = '\n"use strict";\n(() => {\n' + asset("place.js") + "})();\n"
     name = html.escape(plain(summary["program"]))
     about = f"machine {machine_text(summary)} · load {summary['load']}, {summary['force_N']:g} N"
     return filled(
-        _asset("place.html"),
+        asset("place.html"),
         {
             "program": name,
             "about": html.escape(plain(about)),
@@ -83,6 +82,7 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
             "load": html.escape(summary["load"]),
             "note": _note(path),
             "warnings": _warnings(summary),
+            "style": style(),
             "script": script,
             "script_hash": script_hash(script),
             "data": json_for_script(data),
@@ -157,7 +157,3 @@ def _note(path: DrawnPath) -> str:
         f"Drawn are {number(shown)} of the {number(path.samples)} samples of the cutting path, joined by straight "
         "lines, each with the stiffness that was evaluated there; the figures in the table are of all samples." + scale
     )
-
-
-def _asset(name: str) -> str:
-    return resources.files("toolpath_stiff.report").joinpath("assets", name).read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.wording import plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m
-from toolpath_stiff.updating.planning.plan_map import GapMap
+from toolpath_stiff.updating.planning.plan_map import GapMap, group_of, height_groups
 from toolpath_stiff.updating.planning.plan_menu import Visits
 
 if TYPE_CHECKING:
@@ -30,8 +30,11 @@ MARKS = (
     ("X", "#999999"),
 )
 PANEL = 3.5  # inches a side
-MOST_PANELS = 5
+MOST_ACROSS = 5  # panels in a row
+NARROWEST = 8.0  # inches, for the headings
+ROOM = 1.2  # half a panel, of the farthest pose: marks lean and have labels
 CLOSE = 0.06  # m between marks whose labels would cover each other
+SHORT = 6  # letters of a label that has room on either side
 ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
 
 
@@ -55,33 +58,38 @@ def plan_picture(
         Headings.
     """
     poses = visits.pose[list(chosen)]
-    levels = gap.levels if gap is not None else _levels(poses[:, 2])
-    rows = 1 if gap is None else 2
-    nearest = np.abs(poses[:, 2, None] - levels[None]).argmin(axis=1)
-    width, height = len(levels) * PANEL + 2.0, rows * (PANEL + 0.35) + 1.9
-    half = 1.08 * max(mm_from_m(float(np.abs(poses[:, :2]).max())), mm_from_m(gap.x[-1]) if gap is not None else 1.0)
+    groups = height_groups(poses[:, 2])
+    panel_of = group_of(poses[:, 2], groups)
+    tilted = poses[:, 3:5].any(axis=1)
+    kinds_of_panel = ("",) if gap is None else (", vertical", f", tilted {deg_from_rad(gap.max_tilt):.3g}°")
+    across = _across(len(groups))
+    rows = -(-len(groups) // across) * len(kinds_of_panel)
+    right = 0.35 if gap is None else 1.2
+    width = max(across * PANEL + 0.75 + right, NARROWEST)
+    height = rows * (PANEL + 0.35) + 1.9
+    farthest = max(mm_from_m(float(np.abs(poses[:, :2]).max())), mm_from_m(gap.x[-1]) if gap is not None else 1.0)
     numbers = _numbers(visits, chosen)
     with house_style():
         figure = new_figure(width, height)
         grid = figure.add_gridspec(
-            rows, len(levels), left=0.75 / width, right=1 - 1.2 / width, bottom=1.05 / height,
+            rows, across, left=0.75 / width, right=1 - right / width, bottom=1.05 / height,
             top=1 - 1.15 / height, wspace=0.12, hspace=0.2,
         )  # fmt: skip
         highest = 0.0 if gap is None else float(np.nanmax([_top(gap.vertical), _top(gap.tilted), 1e-6]))
         drawn: Any = None
-        for row in range(rows):
-            for column, level in enumerate(levels):
+        for which, group in enumerate(groups):
+            for leaning, words in enumerate(kinds_of_panel):
+                row, column = which // across * len(kinds_of_panel) + leaning, which % across
                 axes = figure.add_subplot(grid[row, column])
-                words = "" if gap is None else (", vertical", f", tilted {deg_from_rad(gap.max_tilt):.3g}°")[row]
                 if gap is not None:
-                    drawn = _map(axes, gap, (gap.vertical, gap.tilted)[row][column], highest)
-                tilted = poses[:, 3:5].any(axis=1)
-                own = (nearest == column) & ((tilted == bool(row)) | (gap is None))
-                _marks(axes, poses, kinds, numbers, np.flatnonzero(own), half)
-                axes.set_title(f"z = {mm_from_m(float(level)):.4g} mm{words}", fontsize=10)
-                axes.set_xlabel("X mm" if row == rows - 1 else "")
+                    drawn = _map(axes, gap, (gap.vertical, gap.tilted)[leaning][which], highest)
+                own = (panel_of == which) & ((tilted == bool(leaning)) | (gap is None))
+                _marks(axes, poses, kinds, numbers, np.flatnonzero(own), ROOM * farthest)
+                axes.set_title(f"{_height_text(group)}{words}", fontsize=10)
+                below = which + across >= len(groups) and leaning == len(kinds_of_panel) - 1
+                axes.set_xlabel("X mm" if below else "")
                 axes.set_ylabel("Y mm" if column == 0 else "")
-                axes.tick_params(labelleft=column == 0, labelbottom=row == rows - 1)
+                axes.tick_params(labelleft=column == 0, labelbottom=below)
         if drawn is not None:
             bar = figure.add_axes((1 - 0.95 / width, 1.05 / height, 0.18 / width, 1 - 2.2 / height))
             figure.colorbar(drawn, cax=bar, label="gap at one pose, standard deviations")
@@ -92,10 +100,15 @@ def plan_picture(
         return png_bytes(figure)
 
 
-def _levels(z: FloatArray) -> FloatArray:
-    """The most frequent heights, rising; poses at others are drawn at the nearest."""
-    levels, counts = np.unique(np.round(z, 4), return_counts=True)
-    return np.sort(levels[np.argsort(-counts, kind="stable")[:MOST_PANELS]])
+def _across(panels: int) -> int:
+    """Panels in a row: as many as fit, the rows filled evenly."""
+    return -(-panels // -(-panels // MOST_ACROSS))
+
+
+def _height_text(group: FloatArray) -> str:
+    """A panel's height, or the heights put together in it."""
+    low, high = (f"{mm_from_m(float(group[end])):.5g}" for end in (0, -1))
+    return f"z = {low} mm" if low == high else f"z = {low} to {high} mm"
 
 
 def _top(values: FloatArray) -> float:
@@ -136,6 +149,8 @@ def _marks(
             near = [j for j in own if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
             place = list(dict.fromkeys(numbers[j] for j in near)).index(numbers[k]) % 4
             left, above = (x > 0.25 * half) != (place >= 2), place % 2 == 0
+            if lean.any() and place == 0 and len(numbers[k]) < SHORT:  # not upon the line
+                left, above = bool(lean[0] > 0.0), bool(lean[1] <= 0.0)
             axes.annotate(
                 numbers[k],
                 (x, y),
@@ -169,7 +184,7 @@ def _legend(figure: Any, kinds: Sequence[str]) -> None:
         loc="lower left",
         bbox_to_anchor=(left, 0.0),
         handletextpad=0.2,
-        ncol=len(names),
+        ncol=min(len(names), 6),
         frameon=False,
         fontsize=9,
         borderaxespad=0.6,

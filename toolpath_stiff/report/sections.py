@@ -7,13 +7,12 @@ script of its own, where it has one.
 from __future__ import annotations
 
 import base64
-import hashlib
 import html
-import re
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
 
 from toolpath_stiff.hints import parted
+from toolpath_stiff.report.template import asset, filled, script_hash, style
+from toolpath_stiff.report.vector import Drawing
 from toolpath_stiff.report.wording import plain
 
 Row = tuple[str, Sequence[str]]  # class of the row, its cells
@@ -22,11 +21,6 @@ Row = tuple[str, Sequence[str]]  # class of the row, its cells
 def escaped(value: object) -> str:
     """Text as HTML."""
     return html.escape(plain(str(value)))
-
-
-def script_hash(script: str) -> str:
-    """The source expression of Content Security Policy Level 3, section 2.3.1."""
-    return "sha256-" + base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
 def section(title: str, body: str) -> str:
@@ -48,16 +42,20 @@ def hint_list(hints: Sequence[object]) -> str:
 
 
 def picture(name: str, pictures: Mapping[str, bytes | str], questions: Mapping[str, tuple[str, str]]) -> str:
-    """A PNG under the question that it answers, with how it is read; nothing where it was not drawn."""
+    """A picture under the question that it answers, with how it is read; nothing where it was not drawn."""
     content = pictures.get(name)
     if not isinstance(content, bytes):
         return ""
     question, reading = questions[name]
-    source = base64.b64encode(content).decode("ascii")
-    image = f'<img alt="{escaped(question)}" src="data:image/png;base64,{source}">'
-    # The picture shows its question itself, for whoever opens it alone.
+    if isinstance(content, Drawing):
+        image = content.svg
+    else:
+        image = f'<img alt="" src="data:image/png;base64,{base64.b64encode(content).decode("ascii")}">'
+    # The picture shows its question itself, for whoever opens it alone. A tabindex lets the keyboard scroll it.
     return (
-        f'<section><h2 class="unseen">{escaped(question)}</h2>{image}<p class="muted">{escaped(reading)}</p></section>'
+        f'<section><h2 class="unseen">{escaped(question)}</h2>'
+        f'<div class="picture" role="img" aria-label="{escaped(question)}" tabindex="0">{image}</div>'
+        f'<p class="muted">{escaped(reading)}</p></section>'
     )
 
 
@@ -86,11 +84,12 @@ def figures(found: Iterable[tuple[str, str]]) -> str:
 
 def page(
     title: str, verdict: str, headline: str, text: str, about: Sequence[str], figures: str, warnings: Sequence[str],
-    sections: Iterable[str], footer: str, verdict_class: str = "", head: str = "", script: str = "",
+    sections: Iterable[str], footer: str, verdict_class: str = "", styles: Sequence[str] = (), script: str = "",
 ) -> str:  # fmt: skip
-    """The whole page. `figures`, `sections`, `footer` and `head` (more of it) are HTML, the others text.
+    """The whole page. `figures`, `sections` and `footer` are HTML, the others text.
 
-    `script` is the only one that may run; most pages have none.
+    `styles`: style sheets in `assets/` beyond those of all such pages. `script` is the only one that may run; most
+    pages have none.
     """
     parts = {
         "title": escaped(title),
@@ -103,9 +102,8 @@ def page(
         "warnings": "\n".join(f'<p class="warning">{escaped(warning)}</p>' for warning in warnings),
         "sections": "\n".join(part for part in sections if part),
         "footer": footer,
-        "head": head,
+        "style": style("sections.css", *styles),
         "script": f"<script>{script}</script>\n" if script else "",
         "script_policy": f"; script-src '{script_hash(script)}'" if script else "",
     }
-    template = resources.files("toolpath_stiff.report").joinpath("assets", "sections.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
+    return filled(asset("sections.html"), parts)

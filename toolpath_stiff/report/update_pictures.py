@@ -16,7 +16,18 @@ from toolpath_stiff.report.diagnose_words import (
     percent,
     significant,
 )
-from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import (
+    BLUE,
+    GREEN,
+    INK,
+    MUTED,
+    PURPLE,
+    SECOND_ORANGE,
+    WITHIN,
+    house_style,
+    new_figure,
+)
+from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.inference.baseline import LAW_REFITTED, deviation_percent
@@ -29,9 +40,8 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-BLUE = "#2457a6"
 RESIDUAL_MAP = "RdBu"  # red: measured softer than modelled, blue: stiffer
-DIRECTION_COLOURS = {"X": "#2457a6", "Y": "#de6b12", "Z": "#2f855a", "oblique": "#7b4fa0"}
+DIRECTION_COLOURS = {"X": BLUE, "Y": SECOND_ORANGE, "Z": GREEN, "oblique": PURPLE}
 ALONG = 0.99  # cosine from which a direction counts as that axis: 8 degrees
 MOST_LEVELS = 3  # rows of maps; more heights are put together
 SHOWN = 0.98  # share of the residuals that the colour scale holds
@@ -46,7 +56,7 @@ def before_after_png(
     after: FloatArray | None,
     *,
     names: tuple[str, str] | None = None,
-) -> bytes:
+) -> Drawing:
     """PNG: where model and measurements differ, seen from above, before and after, and measured against modelled.
 
     Parameters
@@ -73,8 +83,9 @@ def before_after_png(
     columns, rows = [d for d in DIRECTION_COLOURS if (directions == d).any()], np.unique(levels)
     limit = _limit(halves)
     block = MAP * len(columns) + 0.3
-    width = max(1.1 + len(halves) * block + 0.9, 11.0 if len(halves) > 1 else 8.0)
-    height = 1.35 + MAP * len(rows) + 0.4 + 4.0
+    alone = len(halves) == 1
+    width = 14.0 if alone else max(1.1 + len(halves) * block + 0.9, 11.0)
+    height = max(1.35 + MAP * len(rows) + 0.4, 5.4) if alone else 1.35 + MAP * len(rows) + 0.4 + 4.0
     question = "Did the error fall, and what remains?" if len(halves) > 1 else "Where does the model fail?"
     wide = f"{2.4 * _reach(data):.0f} mm wide"
     refitted = figure_of(base, "mean_abs_error_percent")
@@ -115,8 +126,10 @@ def before_after_png(
         )  # fmt: skip
         figure.colorbar(points, cax=bar, extend="both").set_label(f"{DEVIATION}, %", size=9)
         bar.grid(visible=False)
-        _scatter_pair(figure, data, halves, directions)
-        return png_bytes(figure)
+        beside = 0.95 + block + 1.85
+        places = [(beside, 0.55, width - beside - 0.3, height - 1.85)] if alone else _below(width, len(halves))
+        _scatter_pair(figure, data, halves, directions, places)
+        return drawing(figure)
 
 
 def last_model(document: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -206,25 +219,31 @@ def _spread(places: FloatArray, step: float) -> FloatArray:
     return out
 
 
+def _below(width: float, count: int) -> list[tuple[float, float, float, float]]:
+    """Diagrams beside each other below the maps, inches."""
+    step = (width - 1.6) / count
+    return [(0.95 + half * step, 0.55, step - 0.75, 3.2) for half in range(count)]
+
+
 def _scatter_pair(
     figure: Figure,
     data: Measurements,
     halves: Sequence[FloatArray],
     directions: NDArray[np.str_],
+    places: Sequence[tuple[float, float, float, float]],
 ) -> None:
-    """Measured against modelled, both on the same scales."""
+    """Measured against modelled, both on the same scales; `places` (x, y, width, height) in inches."""
     width, height = figure.get_size_inches()
     measured = n_per_mm_from_n_per_m(data.stiffness)
     modelled = [measured * np.exp(-residual) for residual in halves]
     values = np.concatenate([measured, *modelled])
     values = values[np.isfinite(values)]
     low, high = 0.93 * float(values.min()), 1.07 * float(values.max())
-    side = 3.2
-    step = max((width - 1.6) / len(halves), side + 0.8)
     for half, stiffness in enumerate(modelled):
-        axes = figure.add_axes(((0.95 + half * step) / width, 0.55 / height, (step - 0.75) / width, side / height))
+        x, y, wide, tall = places[half]
+        axes = figure.add_axes((x / width, y / height, wide / width, tall / height))
         line = np.array([low, high])
-        axes.fill_between(line, line * (1.0 - BAND), line * (1.0 + BAND), color="#eef1f4", lw=0, zorder=1)
+        axes.fill_between(line, line * (1.0 - BAND), line * (1.0 + BAND), color=WITHIN, lw=0, zorder=1)
         axes.plot(line, line, color=MUTED, lw=1.0, zorder=2)
         for direction, colour in DIRECTION_COLOURS.items():
             chosen = directions == direction
@@ -265,7 +284,7 @@ def error_ladder_png(
     noise_floor_percent: float | None = None,
     title: str = "How the error falls",
     turned_down: Sequence[Mapping[str, Any]] = (),
-) -> bytes:
+) -> Drawing:
     """PNG: mean error from the first model to the last, in sample and at left-out points, with the noise floor.
 
     Parameters
@@ -283,7 +302,7 @@ def error_ladder_png(
     taken = len(steps)
     steps = [*steps, *turned_down]
     with house_style():
-        figure = new_figure(max(7.0, 2.4 + 1.9 * len(steps)), 5.2)
+        figure = new_figure(max(11.0, 2.4 + 1.9 * len(steps)), 5.2)
         width, height = figure.get_size_inches()
         figure.text(0.25 / width, 1.0 - 0.4 / height, plain(title), size=14, weight="bold")
         axes = figure.add_axes((0.85 / width, 0.95 / height, 1.0 - 1.15 / width, 1.0 - 1.75 / height))
@@ -299,7 +318,7 @@ def error_ladder_png(
             at[:taken], inside[:taken], "s--", color=MUTED, lw=1.3, ms=6, mfc="white", label="in sample", zorder=3
         )
         if taken < len(steps):
-            axes.axvspan(taken - 0.5, len(steps) - 0.3, color="#eef1f4", lw=0, zorder=0)
+            axes.axvspan(taken - 0.5, len(steps) - 0.3, color=WITHIN, lw=0, zorder=0)
             axes.text(taken - 0.45, 0.97, "tried from there, not taken", color=MUTED, size=9, va="top",
                       transform=axes.get_xaxis_transform())  # fmt: skip
             axes.plot(at[taken:], held[taken:], "o", color=BLUE, ms=9, mfc="white", zorder=4)
@@ -335,7 +354,7 @@ def error_ladder_png(
         axes.grid(visible=False, axis="x")
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(frameon=False, ncol=3, loc="lower left", bbox_to_anchor=(-0.01, 1.0))
-        return png_bytes(figure)
+        return drawing(figure)
 
 
 def _step_text(step: Mapping[str, Any]) -> str:
@@ -350,7 +369,7 @@ def figure3_png(
     error_percent: Sequence[float] | FloatArray,
     printed_points: Sequence[tuple[float, float]] = (),
     refitted_percent: Sequence[float] | FloatArray = (),
-) -> bytes:
+) -> Drawing:
     """PNG of the paper's Figure 3: mean error against the stiffness of the platform's bars.
 
     Parameters
@@ -366,7 +385,7 @@ def figure3_png(
     """
     bars, errors = np.asarray(bars_N_per_m, dtype=float), np.asarray(error_percent, dtype=float)
     with house_style():
-        figure = new_figure(9.0, 5.2)
+        figure = new_figure(11.0, 5.2)
         figure.text(0.03, 0.93, "How stiff must the platform be taken?", size=14, weight="bold")
         figure.text(0.03, 0.88, "Figure 3 of Clinton, Zhang and Wavering (1997), computed here", size=9.5, color=MUTED)
         axes = figure.add_axes((0.09, 0.13, 0.87, 0.68))
@@ -385,4 +404,4 @@ def figure3_png(
         axes.set_xlabel("stiffness of each platform bar, N/m")
         axes.set_ylabel("mean |modelled - measured| / measured, %")
         axes.legend(frameon=False)
-        return png_bytes(figure)
+        return drawing(figure)

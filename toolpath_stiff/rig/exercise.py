@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import write_atomically
+from toolpath_stiff.files import Content, write_atomically
+from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 from toolpath_stiff.rig.campaign import clamp_of
 from toolpath_stiff.rig.case import again, draw_case
 from toolpath_stiff.rig.effects import CATALOGUE
@@ -18,7 +19,8 @@ from toolpath_stiff.rig.outside import OUTSIDE
 from toolpath_stiff.rig.seal import score, seal, unseal
 from toolpath_stiff.rig.tables import csv_text, read_plan
 
-MEASUREMENTS, MACHINE, SEALED = "measurements.csv", "machine.toml", "sealed.bin"
+MEASUREMENTS, MACHINE, SEALED = FILES = "measurements.csv", "machine.toml", "sealed.bin"
+NO_OTHER = Rules(fresh=True)
 
 
 def new_exercise(
@@ -29,15 +31,22 @@ def new_exercise(
     noise: float = 0.02,
     machine: str = "nist",
     plan_file: str | None = None,
+    rules: Rules = NO_OTHER,
 ) -> int:
-    """Write a blind exercise; returns the number of rows. Raises `InputError`; then nothing is written."""
+    """Write a blind exercise; returns the number of rows. Raises `InputError`; then nothing is written.
+
+    `rules`: what must not be replaced. An exercise in the folder is not, by default: its sealed truth would be lost.
+    """
+    check_folder(folder, FILES, rules)
     nominal = load_nominal(machine)
     plan = None if plan_file is None else read_plan(plan_file, nominal)
     case = draw_case(seed, layout, hidden, noise, nominal, plan)
-    target = Path(folder)
-    write_atomically(target / MACHINE, nominal.text)
-    write_atomically(target / MEASUREMENTS, csv_text(case.rows))
-    write_atomically(target / SEALED, seal(case, seed, layout))
+    contents: dict[str, Content] = {
+        MACHINE: nominal.text,
+        MEASUREMENTS: csv_text(case.rows),
+        SEALED: seal(case, seed, layout),
+    }
+    write_folder(folder, contents, command="rig new", rules=rules)
     return len(case.rows["x_mm"])
 
 

@@ -3,6 +3,7 @@ const ROW = 19;
 const listing = document.getElementById("listing"), space = document.getElementById("listing-space");
 const source = data.source;
 let lineHere = 0;
+listing.style.setProperty("--digits", String(source.length).length);
 space.style.height = `${source.length * ROW}px`;
 document.getElementById("program-note").textContent = `${group(source.length)} lines; the bar is the line's lowest stiffness`;
 function drawListing() {

@@ -27,7 +27,7 @@ FloatArray = NDArray[np.float64]
 
 ACROSS = 11  # points of the grid a side
 TILTS = 6  # directions of tilt
-MOST_LEVELS = 3
+MOST_LEVELS = 8  # heights with a panel of their own; more are put together, neighbours with neighbours
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class GapMap:
     pair
         Names of the two rivals.
     x, y, levels
-        (g,) m, (g,) m, (h,) m.
+        (g,) m, (g,) m, (h,) m, the middle of each of `height_groups`.
     vertical, tilted
         (h, g, g) with y before x; with the spindle vertical, and tilted as far as planned in the best of six
         directions; nan where the machine does not reach.
@@ -63,11 +63,21 @@ def top_pair(plan: Plan) -> tuple[str, str]:
     return best.first, best.second
 
 
+def height_groups(z: FloatArray) -> list[FloatArray]:
+    """Heights (n,) m in groups, rising: each height its own, or `MOST_LEVELS` groups of neighbours."""
+    heights = np.unique(np.round(z, 4))
+    return list(np.array_split(heights, min(len(heights), MOST_LEVELS)))
+
+
+def group_of(z: FloatArray, groups: Sequence[FloatArray]) -> NDArray[np.int64]:
+    """(n,) the group that holds each height."""
+    lowest = np.array([group[0] for group in groups])
+    return np.asarray(np.searchsorted(lowest, np.round(z, 4), side="right") - 1, dtype=np.int64)
+
+
 def levels_of(plan: Plan) -> FloatArray:
-    """Heights (h,) m that the plan visits most, at most `MOST_LEVELS`, rising."""
-    z = np.round(plan.visits.pose[list(plan.chosen), 2], 4)
-    levels, counts = np.unique(z, return_counts=True)
-    return np.sort(levels[np.argsort(-counts, kind="stable")[:MOST_LEVELS]])
+    """(h,) m: the middle height of each group that the plan visits, rising."""
+    return np.array([group[len(group) // 2] for group in height_groups(plan.visits.pose[list(plan.chosen), 2])])
 
 
 def gap_map(machine: Machine, plan: Plan, menu: Menu, effect_files: Sequence[str | Path] = ()) -> GapMap:

@@ -1,0 +1,238 @@
+"""Pictures and pages as they look: nothing is clipped, texts do not overlap, the width is used, dark pages are dark."""
+
+from __future__ import annotations
+
+import re
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from tests.report import diagnose_documents as documents
+from tests.report.factory import short
+from tests.stiffness.cases import nist
+from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.analysis.stiffness_map import map_stiffness
+from toolpath_stiff.machine.kinematics import solve_struts
+from toolpath_stiff.placement.case_study import run_case_study
+from toolpath_stiff.report import (
+    case_study_picture,
+    compare_pictures,
+    diagnose_pictures,
+    machine_picture,
+    map_picture,
+    plan_picture,
+)
+from toolpath_stiff.report.batch_page import batch_page
+from toolpath_stiff.report.diagnose_page import diagnose_html
+from toolpath_stiff.report.figure import INK
+from toolpath_stiff.report.map_page import map_page
+from toolpath_stiff.report.page import page
+from toolpath_stiff.report.template import asset
+from toolpath_stiff.report.write import summary_with_options
+from toolpath_stiff.stiffness.model import build_model
+from toolpath_stiff.updating.comparison.compare import compare
+from toolpath_stiff.updating.planning.plan_map import MOST_LEVELS, group_of, height_groups
+from toolpath_stiff.updating.planning.plan_menu import Visits
+from toolpath_stiff.updating.readings.measurements import read_measurements
+
+TOUCH = 1.5  # pixels that boxes may share: they are a little larger than the letters
+
+
+@pytest.fixture
+def last(monkeypatch):
+    """The figures that were drawn, last one last."""
+    figures = []
+    for module in (
+        case_study_picture, compare_pictures, diagnose_pictures, machine_picture, map_picture, plan_picture,
+    ):  # fmt: skip
+
+        def kept(*size, new=module.new_figure):
+            figures.append(new(*size))
+            return figures[-1]
+
+        monkeypatch.setattr(module, "new_figure", kept)
+    return figures
+
+
+@pytest.fixture(scope="module")
+def compared():
+    return compare(nist(), read_measurements(["nist-table1"], nist()))
+
+
+@pytest.fixture(scope="module")
+def mapped():
+    side, model = (-0.15, 0.15), build_model(nist())
+    return map_stiffness(model, side, side, [0.4, 0.65, 0.9, 1.2], parse_load("radial"), 21, (0.0, 0.0, 0.0), 1000.0)
+
+
+def shown_texts(figure):
+    figure.draw_without_rendering()
+    texts = [one for one in figure.findobj(Text) if one.get_visible() and one.get_text().strip()]
+    boxes = [(one.get_text(), one.get_window_extent()) for one in texts]
+    # Ticks beyond the limits of their axis have texts that are not drawn.
+    return [(text, box) for text, box in boxes if box.width > 0 and box.height > 0 and _drawn(figure, text)]
+
+
+def _drawn(figure, text):
+    hidden = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            slack = 1e-9 * (high - low)
+            for tick in axis.get_major_ticks():
+                if not low - slack <= tick.get_loc() <= high + slack or not tick.label1.get_visible():
+                    hidden.add(id(tick.label1))
+    return not any(id(one) in hidden for one in figure.findobj(Text) if one.get_text() == text)
+
+
+def assert_whole_and_apart(figure):
+    texts = shown_texts(figure)
+    width, height = figure.bbox.size
+    for text, box in texts:
+        assert box.x0 >= -TOUCH and box.x1 <= width + TOUCH, text
+        assert box.y0 >= -TOUCH and box.y1 <= height + TOUCH, text
+    for (first, one), (second, other) in combinations(texts, 2):
+        across = min(one.x1, other.x1) - max(one.x0, other.x0)
+        up = min(one.y1, other.y1) - max(one.y0, other.y0)
+        assert min(across, up) <= TOUCH, (first, second)
+
+
+def used_width(figure):
+    boxes = [axes.get_tightbbox() for axes in figure.axes if axes.axison]
+    return (max(box.x1 for box in boxes) - min(box.x0 for box in boxes)) / figure.bbox.width
+
+
+@pytest.mark.parametrize("pose", [(-0.3, 0.3, 0.3, np.radians(-30.0), 0.0, 0.0), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)])
+def test_the_machine_is_whole_and_its_axes_named(last, pose):
+    machine, at = nist(), np.array(pose)
+    machine_picture.machine_picture(machine, at, solve_struts(machine, at[None, :3], at[None, 3:]))
+    figure = last[-1]
+    figure.draw_without_rendering()
+    for i, axes in enumerate(figure.axes):
+        half = figure.bbox.width / 2.0
+        labels = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+        for box in labels:
+            assert i * half - TOUCH <= box.x0 and box.x1 <= (i + 1) * half + TOUCH
+            assert box.y0 >= -TOUCH and box.y1 <= figure.bbox.height + TOUCH
+        assert max(box.x1 for box in labels) - min(box.x0 for box in labels) > 0.7 * half
+
+
+def test_slices_of_a_map_fill_their_rows_and_no_figure_lies_on_another(last, mapped):
+    map_picture.map_picture(nist(), mapped)
+    assert len({round(axes.get_position().x0, 3) for axes in last[-1].axes[:4]}) == 2
+    assert_whole_and_apart(last[-1])
+
+
+def test_the_regions_of_the_case_study_are_whole_and_apart(last):
+    study = run_case_study(build_model(nist()))
+    case_study_picture.regions_picture(study)
+    assert_whole_and_apart(last[-1])
+    assert used_width(last[-1]) > 0.95
+
+
+def test_scatter_and_planes_use_their_width(last, compared):
+    compare_pictures.measured_modelled_png(compared)
+    assert used_width(last[-1]) > 0.9
+    assert_whole_and_apart(last[-1])
+    compare_pictures.planes_png(compared)
+    assert used_width(last[-1]) > 0.85
+    assert_whole_and_apart(last[-1])
+
+
+def test_the_confounding_matrix_uses_its_width(last):
+    document = documents.ambiguous()
+    names = [f"some_effect_{i}" for i in range(12)]
+    document["confounding"] = {"effects": names, "matrix": np.eye(12).tolist(), "sets": []}
+    diagnose_pictures.confounding_png(document)
+    figure = last[-1]
+    figure.draw_without_rendering()
+    matrix = figure.axes[0].get_window_extent()
+    assert matrix.width > 0.7 * figure.bbox.width
+    box = figure.axes[0].get_tightbbox()
+    assert box.x0 >= -TOUCH and box.x1 <= figure.bbox.width + TOUCH
+
+
+# -- the plan ----------------------------------------------------------------------------------------------------------
+
+
+def visits_at(z):
+    """Visits at these heights, each elsewhere; what else they are is not drawn."""
+    count = len(z)
+    pose = np.zeros((count, 6))
+    pose[:, 0], pose[:, 2] = 0.02 * np.arange(count), z
+    none, empty = np.zeros(count), np.full(count, "")
+    index = np.arange(count)
+    return Visits(pose, none, none, empty, empty, None, empty, index, index, index)
+
+
+@pytest.mark.parametrize("heights", [[0.43, 0.78, 1.2, 1.49], [0.07, 0.43, 0.78, 1.13, 1.49, 1.2], [0.5]])
+def test_every_pose_is_in_the_panel_of_its_own_height(last, heights):
+    visits = visits_at(np.array([*heights, heights[0]]))
+    plan_picture.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
+    found = {}
+    for axes in last[-1].axes:
+        z = float(re.match(r"z = ([\d.]+) mm", axes.get_title(loc="left")).group(1))
+        found[z] = sorted(float(line.get_xdata()[0]) for line in axes.lines)
+    expected = {1e3 * z: [] for z in heights}
+    for x, _, z, *_ in 1e3 * visits.pose:
+        expected[float(np.round(z, 3))].append(float(x))
+    assert found.keys() == {round(z, 3) for z in expected}
+    for z, places in expected.items():
+        assert found[round(z, 3)] == pytest.approx(sorted(places))
+    assert_whole_and_apart(last[-1])
+
+
+def test_many_heights_are_put_together_with_their_neighbours():
+    z = np.random.default_rng(1).permutation(np.linspace(0.4, 1.2, 30))
+    groups = height_groups(z)
+    assert len(groups) == MOST_LEVELS
+    assert np.concatenate(groups).tolist() == sorted(np.round(z, 4))
+    for height, which in zip(z, group_of(z, groups), strict=True):
+        assert np.round(height, 4) in groups[which]
+
+
+# -- pages -------------------------------------------------------------------------------------------------------------
+
+
+def test_all_pages_have_one_style_sheet_with_a_dark_half(mapped):
+    analysis = short()
+    pages = {
+        "analysis": page(analysis, summary_with_options(analysis, None, None)),
+        "batch": batch_page([]),
+        "map": map_page(nist(), mapped),
+        "diagnosis": diagnose_html(documents.identified(), {}),
+    }
+    shared = asset("page.css")
+    assert "prefers-color-scheme: dark" in shared
+    for name, text in pages.items():
+        assert text.count(shared) == 1, name
+        assert (
+            text.count("prefers-color-scheme: dark)") - text.count('matchMedia("(prefers-color-scheme: dark)")') == 1
+        ), name
+        assert "Content-Security-Policy" in text, name
+        # Every colour that a rule names is declared.
+        used, declared = set(re.findall(r"var\((--[a-z-]+)", text)), set(re.findall(r"(--[a-z-]+):", text))
+        assert used <= declared | {"--natural", "--digits"}, name
+
+
+def test_a_picture_in_a_page_takes_the_page_s_colours(compared):
+    picture = compare_pictures.planes_png(compared)
+    assert picture.startswith(b"\x89PNG")
+    assert picture.svg == compare_pictures.planes_png(compared).svg
+    assert picture.svg.startswith("<svg viewBox=") and "--natural:1400px" in picture.svg
+    assert INK not in picture.svg and "var(--ink)" in picture.svg and "var(--card)" in picture.svg
+    assert "<script" not in picture.svg and "http" not in picture.svg.replace("http://www.w3.org/", "")
+    text = diagnose_html(documents.ambiguous(), {"ladder.png": diagnose_pictures.ladder_png(documents.ambiguous())})
+    assert "<img" not in text and text.count('class="picture"') == 1
+
+
+def test_many_marks_are_put_in_as_an_image(monkeypatch, compared):
+    from toolpath_stiff.report import vector
+
+    sharp = compare_pictures.measured_modelled_png(compared).svg
+    monkeypatch.setattr(vector, "MOST_MARKS", 10)
+    monkeypatch.setattr(vector, "FEW_MARKS", 5)
+    heavy = compare_pictures.measured_modelled_png(compared).svg
+    assert "<image" not in sharp and "data:image/png" in heavy
