@@ -116,7 +116,7 @@ def test_the_same_command_writes_the_same_bytes(files, spindle, tmp_path):
 
 def test_an_ambiguous_verdict_comes_with_what_to_measure_and_what_it_matters(spindle):
     out, said, _ = spindle
-    assert {file.name for file in out.iterdir()} == {"diagnose.json", "residuals.csv"}
+    assert {file.name for file in out.glob("[!.]*")} == {"diagnose.json", "residuals.csv"}
     found = json.loads(said)
     assert found["verdict"] == "ambiguous" and "spindle_compliance" in found["plausible"]
     assert found["why"] and found["next"]

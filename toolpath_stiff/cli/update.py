@@ -235,7 +235,7 @@ def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> 
     curve = bar_curve(machine, data, seed=args.seed, starts=1)
     found: dict[str, Content] = {"figure3.csv": bar_curve_csv(curve)}
     if not args.no_plots:
-        from toolpath_stiff.report.update_pictures import figure3_png
+        from toolpath_stiff.report.figure3_picture import figure3_png
 
         found["figure3.png"] = figure3_png(
             curve.bars[:-1], 100.0 * curve.error[:-1], refitted_percent=100.0 * curve.error_refitted[:-1]

@@ -84,7 +84,7 @@ def ladder_png(document: Mapping[str, Any]) -> Drawing:
         _ladder_chances(chances, rows, document)
         _ladder_words(words, rows, document)
         for y, row in enumerate(rows):
-            if _marked(row, document):
+            if is_plausible(row, document):
                 shade.axhspan(y - 0.5, y + 0.5, color=CHOSEN, lw=0)
         return drawing(figure)
 
@@ -95,10 +95,6 @@ def ladder_rows(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     outside = figure_of(models[-1], "probability_outside")
     beyond = [{"effect": OUTSIDE, "title": "a smooth unknown", "probability": outside}] if outside else []
     return [*models, *beyond, *entries(document, "pairs")[:MOST_PAIRS], *entries(document, "candidates")]
-
-
-def _marked(row: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
-    return is_plausible(row, document)
 
 
 def _ladder_note(document: Mapping[str, Any]) -> str:
@@ -116,7 +112,7 @@ def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[
         small = ", ".join(parameter_texts(row, intervals=False)) or plain(str(row.get("title") or ""))
         offered = is_offered(row, document)
         colour = INK if offered else RAPID_GREY
-        weight = "bold" if _marked(row, document) else "normal"
+        weight = "bold" if is_plausible(row, document) else "normal"
         axes.text(0.0, y - 0.16, shortened(name, 58), va="center", color=colour, weight=weight)
         axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=MUTED if offered else RAPID_GREY, size=8)
 
@@ -172,7 +168,7 @@ def standard_error(base: float | None, outside: float | None, gain_in_se: float 
 def _row_colour(row: Mapping[str, Any], document: Mapping[str, Any]) -> str:
     if not is_offered(row, document):
         return RAPID_GREY
-    if _marked(row, document):
+    if is_plausible(row, document):
         return BLUE
     return INK if row.get("effect") in (AS_GIVEN, NONE) else MUTED
 

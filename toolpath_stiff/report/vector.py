@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-# Colour that is drawn -> property of page.css. Text on a colour of data must not follow the page: `figure.ON_LIGHT`.
+# Colour that is drawn -> property of page.css. Behind text, a colour of data is more opaque the larger its figure: the
+# text may follow the page.
 PAGE_COLOURS = {
     "#ffffff": "card",
     INK: "ink",
