@@ -7,7 +7,7 @@ PROGRAM ?= programs/pocket.nc
 .PHONY: demo test lint benchmark clean
 
 demo: $(VENV)/.run
-	$(BIN)/tps analyze $(PROGRAM) --out reports/demo
+	$(BIN)/tps analyze $(PROGRAM) --out reports/demo --replace
 	@echo "Report: $(CURDIR)/reports/demo/report.html"
 
 # One thread of linear algebra a process: the processes share the cores already. Each process takes a run of neighbouring
