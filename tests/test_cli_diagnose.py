@@ -12,28 +12,11 @@ import shutil
 import numpy as np
 import pytest
 
+from tests.effects.cases import BENCH_FILE
 from toolpath_stiff import rig
 from toolpath_stiff.cli.diagnose import DATA, PICTURES
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.results_folder import MANIFEST
-
-EFFECT = '''
-from toolpath_stiff.stiffness.effects import Effect, Parameter
-
-
-class Bench(Effect):
-    """A compliance that the readings at the right-hand side see."""
-
-    name = "bench"
-    title = "bench"
-    link = "instrument"
-    equation = "c = c_0 x"
-    source = "made up"
-    parameters = (Parameter("compliance", "nm/N", 1e-9, (0.0, 100.0), (1.0, 10.0), "made up"),)
-
-    def reading(self, stiffness, path, p):
-        return stiffness / (1.0 + p["compliance"] * stiffness * (path.position[:, 0] > 0.1))
-'''
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +128,7 @@ def test_the_papers_table_by_its_name_gets_no_confident_name(tmp_path, capsys):
 
 def test_a_users_own_effect_takes_part(files, tmp_path, capsys):
     effect = tmp_path / "bench.py"
-    effect.write_text(EFFECT, encoding="utf-8")
+    effect.write_text(BENCH_FILE, encoding="utf-8")
     arguments = ["diagnose", str(files / "strut.csv"), "--no-plots", "--json", "--out", str(tmp_path / "o")]
     assert main([*arguments, "--effects", str(effect)]) == 0
     found = json.loads(capsys.readouterr().out)

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 import toolpath_stiff
+from tests.effects.cases import BENCH_FILE
 from tests.machine.test_machine_files import HAL
 from toolpath_stiff import rig
 from toolpath_stiff.cli.main import COMMANDS, main
@@ -59,7 +60,7 @@ def here(tmp_path, monkeypatch):
 
 def test_from_an_exercise_to_the_machine_that_explains_it(here, capsys):
     """A blind exercise, its diagnosis, update, comparison, map: nothing is typed after the first command."""
-    (here / "set up.py").write_text(USER_EFFECT)
+    (here / "set up.py").write_text(BENCH_FILE)
     new = "tps rig new --seed 3 --layout paper --hidden setup_compliance --noise 1 --out 'ex 1'"
     diagnosis = run(new, capsys)
     assert diagnosis == ["tps diagnose 'ex 1/measurements.csv' --machine 'ex 1/machine.toml'"]
@@ -175,22 +176,3 @@ def test_no_message_holds_a_command_with_a_gap_to_fill():
             if gap.search(node.value)
         ]
     assert found == []
-
-
-USER_EFFECT = '''
-from toolpath_stiff.stiffness.effects import Effect, Parameter
-
-
-class Bench(Effect):
-    """Readings at the right-hand side are off."""
-
-    name = "bench"
-    title = "bench"
-    link = "instrument"
-    equation = "c = c_0 x"
-    source = "made up"
-    parameters = (Parameter("compliance", "nm/N", 1e-9, (0.0, 100.0), (1.0, 10.0), "made up"),)
-
-    def reading(self, stiffness, path, p):
-        return stiffness / (1.0 + p["compliance"] * stiffness * (path.position[:, 0] > 0.1))
-'''

@@ -32,6 +32,25 @@ CATALOGUE = (
     "thermal_drift",
 )
 
+# A user's own effect file.
+BENCH_FILE = '''
+from toolpath_stiff.stiffness.effects import Effect, Parameter
+
+
+class Bench(Effect):
+    """A compliance that the readings at the right-hand side see."""
+
+    name = "bench"
+    title = "bench"
+    link = "instrument"
+    equation = "c = c_0 x"
+    source = "made up"
+    parameters = (Parameter("compliance", "nm/N", 1e-9, (0.0, 100.0), (1.0, 10.0), "made up"),)
+
+    def reading(self, stiffness, path, p):
+        return stiffness / (1.0 + p["compliance"] * stiffness * (path.position[:, 0] > 0.1))
+'''
+
 
 def neutral_values(effect: Effect) -> dict[str, Any]:
     """SI values at which the effect vanishes, set-up "riser"."""
