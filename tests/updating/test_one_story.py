@@ -17,6 +17,7 @@ import pytest
 from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, table_1
+from toolpath_stiff.hints import Asked, parted
 from toolpath_stiff.report import compare_text, diagnose_text, update_text
 from toolpath_stiff.report.compare_page import QUESTIONS as COMPARE_QUESTIONS
 from toolpath_stiff.report.compare_page import compare_html
@@ -306,3 +307,21 @@ def test_a_real_ladder_falls_whatever_the_order():
 
 def test_none_is_an_explanation_too():
     assert is_plausible({"effect": NONE}, {"explanations": [NONE]})
+
+
+@pytest.mark.parametrize(
+    ("bounded", "command"),
+    [([], "tps update m.csv --add weak_strut -o nist-updated.toml"), (["factor"], "tps plan m.csv")],
+)
+def test_the_next_step_is_one_that_would_be_taken(bounded, command):
+    """An update refuses an effect that ends at its bound, so it is not recommended; nor are names of no explanation."""
+    fit = SimpleNamespace(at_upper_bound=lambda: bounded)
+    diagnosis = SimpleNamespace(
+        verdict="identified",
+        best="weak_strut",
+        explanations=("weak_strut",),
+        plausible=("weak_strut", "frame_compliance"),
+        fits={"weak_strut": fit},
+    )
+    steps = diagnosis_words.next_steps(diagnosis, Asked(("m.csv",)))
+    assert [parted(step)[1] for step in steps] == [command]

@@ -163,7 +163,11 @@ def _rival_names(diagnosis: Diagnosis, first: str, second: str) -> bool:
 def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     """What to do next, as hints: commands run as they stand."""
     if diagnosis.verdict == "identified" and diagnosis.best is not None:
-        names = [name for name in diagnosis.plausible if name != NONE]
+        names = diagnosis.explanations[0].split(" + ")
+        fit = diagnosis.fits.get(diagnosis.explanations[0])
+        bounded = fit.at_upper_bound() if fit is not None else []
+        if bounded:  # an update would refuse it
+            return [hint(f"{joined(bounded)} ends at its bound: measure more before adding it", asked.command("plan"))]
         own = [*options(add=names), "-o", asked.updated_machine]
         return [hint("add it" if len(names) == 1 else "add them", asked.command("update", *own))]
     if diagnosis.verdict == "ambiguous":
