@@ -235,21 +235,25 @@ def rotary_axis_alone():
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 
 
+def opened(file):
+    """What Chromium makes of a page: its document on stdout, its console on stderr."""
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
+    return subprocess.run(
+        [BROWSER, *options, f"--user-data-dir={file.parent / 'profile'}", "--dump-dom", file.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+
+
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
 @pytest.mark.parametrize("make", [spiral, evil_analysis, rotary_axis_alone])
 def test_a_browser_draws_the_page_without_complaint(make, tmp_path):
     file = tmp_path / "report.html"
     analysis = make()
     file.write_text(render(analysis), encoding="utf-8")
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
-    profile = f"--user-data-dir={tmp_path / 'profile'}"
-    done = subprocess.run(
-        [BROWSER, *options, profile, "--dump-dom", file.as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
+    done = opened(file)
     assert "CONSOLE" not in done.stderr
     dom = Page(done.stdout)
     rows = [attrs for _, attrs in dom.elements if "data-line" in attrs and attrs.get("class") == "row"]
@@ -280,20 +284,7 @@ def test_the_switch_puts_the_plunges_on_the_scale(tmp_path):
         text = re.sub("<meta http-equiv[^>]*>", "", render(analysis))
         file = tmp_path / "report.html"
         file.write_text(text.replace("</body>", f"<script>{click}</script></body>"), encoding="utf-8")
-        options = [
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--enable-logging=stderr",
-            "--virtual-time-budget=3000",
-        ]
-        done = subprocess.run(
-            [BROWSER, *options, f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", file.as_uri()],
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=True,
-        )
+        done = opened(file)
         assert "CONSOLE" not in done.stderr
         dom = Page(done.stdout)
         legends.append(
@@ -314,15 +305,7 @@ def test_a_click_shows_one_operation_alone(tmp_path):
     click = "<script>document.querySelector('[data-operation=\"1\"]').click()</script></body>"
     file = tmp_path / "report.html"
     file.write_text(text.replace("</body>", click), encoding="utf-8")
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
-    profile = f"--user-data-dir={tmp_path / 'profile'}"
-    done = subprocess.run(
-        [BROWSER, *options, profile, "--dump-dom", file.as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
+    done = opened(file)
     assert "CONSOLE" not in done.stderr
     dom = Page(done.stdout)
     assert [attrs.get("class") for name, attrs in dom.elements if name == "tr"].count("chosen") == 1

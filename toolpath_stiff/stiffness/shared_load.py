@@ -9,7 +9,8 @@ is the incompatibility
     g(F) = e(F) + Q_ff F + Q_fw w - J x,      K x = w - J^T F.
 
 It is convex, because a strut gives more under more force, and its gradient has kinks (a strut at the edge of its gap).
-Newton's method with an exact line search converges on such functions from everywhere; the last steps are whole ones.
+Whole steps of Newton's method settle most poses; where they cycle between the kinks, steps with an exact line search,
+which converge on such functions from everywhere, come first.
 """
 
 from __future__ import annotations
