@@ -18,13 +18,13 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import Machine, load_machine
 from toolpath_stiff.rig.case import again
 from toolpath_stiff.rig.tables import read_plan
-from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis, diagnose
-from toolpath_stiff.updating.diagnosis.diagnosis_document import document
-from toolpath_stiff.updating.planning.plan import Plan, plan_measurements, random_visits
-from toolpath_stiff.updating.planning.plan_between import rivals_of
-from toolpath_stiff.updating.planning.plan_files import plan_csv, plan_rows
-from toolpath_stiff.updating.planning.plan_menu import Costs, Menu
-from toolpath_stiff.updating.readings.measurements import read_measurements
+from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
+from toolpath_stiff.updating.diagnosis.document import document
+from toolpath_stiff.updating.measurements import read_measurements
+from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
+from toolpath_stiff.updating.planning.between import rivals_of
+from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
+from toolpath_stiff.updating.planning.visits import Costs, Menu
 
 LAYOUTS = ("tilted", "paper")
 POSES = (2, 4, 6)  # planned poses after which the verdict is asked again

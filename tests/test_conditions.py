@@ -296,7 +296,7 @@ def test_how_much_a_choice_matters_is_asked_in_the_set_up_that_it_belongs_to():
     from types import SimpleNamespace
 
     from toolpath_stiff.placement.case_study import case_study_program
-    from toolpath_stiff.updating.diagnosis.next_measurements import choice_on_path
+    from toolpath_stiff.updating.diagnosis import choice_on_path
 
     machine = load_machine("nist")
     riser = build_model(with_effects(("setup_compliance", RISER))).effects

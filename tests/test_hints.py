@@ -16,7 +16,7 @@ from tests.machine.test_machine_files import HAL
 from toolpath_stiff import rig
 from toolpath_stiff.cli.main import COMMANDS, main
 from toolpath_stiff.hints import Asked, command_line, hint, parted, without_destination
-from toolpath_stiff.updating.diagnosis.diagnosis_words import next_steps
+from toolpath_stiff.updating.diagnosis.words import next_steps
 
 PACKAGE = Path(toolpath_stiff.__file__).parent
 DRAWING = ("diagnose", "compare", "update", "plan", "map")

@@ -15,7 +15,7 @@ from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model
-from toolpath_stiff.updating.readings.measurements import model_stiffness, read_measurements
+from toolpath_stiff.updating.measurements import model_stiffness, read_measurements
 
 SIZES = {
     "spindle_compliance": {"radial": 5.0, "axial": 2.0},

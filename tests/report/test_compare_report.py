@@ -19,8 +19,8 @@ from toolpath_stiff.machine import load_machine
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.report.compare_page import QUESTIONS, compare_html, compare_pictures
 from toolpath_stiff.report.compare_text import residuals_csv, terminal_text
-from toolpath_stiff.updating.comparison.compare import Comparison, compare
-from toolpath_stiff.updating.readings.measurements import Measurements
+from toolpath_stiff.updating.comparison import Comparison, compare
+from toolpath_stiff.updating.measurements import Measurements
 
 NASTY = '<script>alert("1")</script>$x^2$'
 

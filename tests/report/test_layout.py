@@ -32,10 +32,10 @@ from toolpath_stiff.report.page import page
 from toolpath_stiff.report.template import asset
 from toolpath_stiff.report.write import summary_with_options
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.updating.comparison.compare import compare
-from toolpath_stiff.updating.planning.plan_map import MOST_LEVELS, group_of, height_groups
-from toolpath_stiff.updating.planning.plan_menu import Visits
-from toolpath_stiff.updating.readings.measurements import read_measurements
+from toolpath_stiff.updating.comparison import compare
+from toolpath_stiff.updating.measurements import read_measurements
+from toolpath_stiff.updating.planning.document import MOST_LEVELS, group_of, height_groups
+from toolpath_stiff.updating.planning.visits import Visits
 
 TOUCH = 1.5  # pixels that boxes may share: they are a little larger than the letters
 

@@ -17,13 +17,12 @@ from toolpath_stiff import rig
 from toolpath_stiff.machine import Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis, diagnose, testable_effects
+from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose, testable_effects
+from toolpath_stiff.updating.inference import Judgement, judge
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.noise import Noise, covariance, noise_models
-from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.inference.scatter import Scatter
-from toolpath_stiff.updating.inference.verdict import Judgement, judge
-from toolpath_stiff.updating.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance, noise_models
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.measurements import Measurements, read_measurements
 
 FloatArray = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ from tests.stiffness.cases import nist
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.candidates import Component
-from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.planning.plan_rivals import Rival
-from toolpath_stiff.updating.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.measurements import Measurements, read_measurements
+from toolpath_stiff.updating.planning.rivals import Rival
 
 FloatArray = NDArray[np.float64]
 

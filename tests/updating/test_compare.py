@@ -13,11 +13,11 @@ from tests.updating.cases import active, campaign, read_text, readings_by_hand, 
 from toolpath_stiff import rig
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.updating.comparison.compare import Comparison, compare, error_figures
-from toolpath_stiff.updating.comparison.load_path_shares import load_path_shares
-from toolpath_stiff.updating.comparison.residual_variables import directions, planes, radius, zones
-from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.readings.measurements import Measurements, read_measurements
+from toolpath_stiff.updating.comparison import Comparison, compare, error_figures
+from toolpath_stiff.updating.comparison.principles import load_path_shares
+from toolpath_stiff.updating.comparison.residuals import directions, planes, radius, zones
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.measurements import Measurements, read_measurements
 
 FEW = 300  # simulated sets of readings: enough to tell 5 % from 1 %
 

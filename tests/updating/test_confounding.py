@@ -15,18 +15,19 @@ from tests.updating.test_evidence import COUNT, by_hand, logs_by_hand, one_table
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.diagnosis.diagnose import make_problem
-from toolpath_stiff.updating.inference.confounding import (
+from toolpath_stiff.updating.diagnosis import make_problem
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.hypotheses import (
     CONFOUNDED,
     Confounding,
     Detectable,
+    Family,
     _linked,
     confounding,
     detectable_sizes,
+    score_families,
 )
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.ranking import Family, score_families
-from toolpath_stiff.updating.readings.measurements import Measurements
+from toolpath_stiff.updating.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
 

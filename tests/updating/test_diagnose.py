@@ -15,9 +15,9 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, readings_by_hand, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis.diagnose import diagnose
-from toolpath_stiff.updating.diagnosis.diagnosis_document import document
-from toolpath_stiff.updating.inference.predict import scaled_law
+from toolpath_stiff.updating.diagnosis import diagnose
+from toolpath_stiff.updating.diagnosis.document import document
+from toolpath_stiff.updating.inference.prediction import scaled_law
 
 # One of each verdict, of the paper's layout.
 CASES = {

@@ -25,10 +25,10 @@ from tests.updating.cases import (
     simple_noise,
 )
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis.diagnose import make_problem
+from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.inference.candidates import Table, candidates_of, tabulate
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
-from toolpath_stiff.updating.inference.ranking import probabilities, score_families, score_family
+from toolpath_stiff.updating.inference.hypotheses import probabilities, score_families, score_family
 
 FloatArray = NDArray[np.float64]
 
@@ -49,8 +49,8 @@ def scatter(seed: int) -> FloatArray:
 
 def by_hand(logs: FloatArray, outliers: float = 0.0) -> Problem:
     """The problem of explaining readings (24,) of ln k."""
-    from toolpath_stiff.updating.inference.predict import Predictor
-    from toolpath_stiff.updating.inference.scatter import Scatter
+    from toolpath_stiff.updating.inference.noise import Scatter
+    from toolpath_stiff.updating.inference.prediction import Predictor
 
     predictor = Predictor(orthogonal_hexapod(), readings_by_hand(np.exp(logs), direction=DIRECTION))
     return Problem(predictor, Scatter.of(simple_noise(COUNT, 0.02, outliers=outliers), COVARIANCE), COVARIANCE)

@@ -15,12 +15,12 @@ from tests.updating.cases import active, campaign, simple_noise
 from toolpath_stiff.machine import Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.diagnosis.diagnose import make_problem
-from toolpath_stiff.updating.diagnosis.diagnosis_document import parameters
+from toolpath_stiff.updating.diagnosis import make_problem
+from toolpath_stiff.updating.diagnosis.document import parameters
 from toolpath_stiff.updating.inference.candidates import Candidate, candidates_of
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
-from toolpath_stiff.updating.inference.fit import NORMAL_95, Fit, fit_effects
-from toolpath_stiff.updating.inference.predict import Predictor
+from toolpath_stiff.updating.inference.fits import NORMAL_95, Fit, fit_effects
+from toolpath_stiff.updating.inference.prediction import Predictor
 
 FloatArray = NDArray[np.float64]
 

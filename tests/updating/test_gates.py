@@ -13,8 +13,7 @@ from scipy.stats import binom, chi2, kstest
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis.diagnose import make_problem
-from toolpath_stiff.updating.inference.discrepancy import discrepancy_forms
+from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.inference.evidence import Problem, Score
 from toolpath_stiff.updating.inference.gates import (
     DRAWS,
@@ -23,11 +22,12 @@ from toolpath_stiff.updating.inference.gates import (
     Structure,
     _surprise,
     absolute_gate,
+    discrepancy_forms,
     largest_gain,
     set_wild_aside,
 )
+from toolpath_stiff.updating.inference.hypotheses import score_families, signatures
 from toolpath_stiff.updating.inference.noise import Noise
-from toolpath_stiff.updating.inference.ranking import score_families, signatures
 
 FloatArray = NDArray[np.float64]
 
@@ -198,6 +198,6 @@ def test_the_gain_of_the_best_of_many_is_judged_against_the_best_of_many():
 
 def test_draws_resolve_the_levels_that_are_used():
     """The smallest probability that the bootstrap can give lies below the level at which explanations are dropped."""
-    from toolpath_stiff.updating.inference.verdict import ADEQUATE
+    from toolpath_stiff.updating.inference import ADEQUATE
 
     assert 0.5 / DRAWS < ADEQUATE / 2.0

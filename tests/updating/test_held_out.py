@@ -11,12 +11,11 @@ from scipy.stats import ttest_1samp
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis.diagnose import make_problem
+from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.inference.candidates import candidates_of
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.fit import Fit, fit_effects
-from toolpath_stiff.updating.inference.held_out import _inverse_without, gain_in_standard_errors, held_out
-from toolpath_stiff.updating.inference.scatter import Scatter
+from toolpath_stiff.updating.inference.fits import Fit, _inverse_without, fit_effects, gain_in_standard_errors, held_out
+from toolpath_stiff.updating.inference.noise import Scatter
 
 DATA = campaign(21, "paper", "weak_strut", 0.06)[0]
 NOISE = simple_noise(len(DATA), 0.02, 0.01, 0.01, 0.5e-3)
@@ -27,7 +26,7 @@ def fit(problem: Problem, name: str | None = "weak_strut") -> Fit:
     if name is None:
         return fit_effects(problem, (), (), (), np.zeros(2))
     base = problem.score_base()
-    from toolpath_stiff.updating.inference.ranking import score_family
+    from toolpath_stiff.updating.inference.hypotheses import score_family
 
     best = score_family(problem, find_effect(name), base).best
     return fit_effects(problem, best.candidates, best.sizes, best.free, best.law)

@@ -11,13 +11,12 @@ from scipy.stats import norm
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis.diagnose import make_problem
-from toolpath_stiff.updating.diagnosis.diagnosis_document import parameters
-from toolpath_stiff.updating.inference.averaged_interval import averaged_interval
-from toolpath_stiff.updating.inference.fit import refine
+from toolpath_stiff.updating.diagnosis import make_problem
+from toolpath_stiff.updating.diagnosis.document import parameters
+from toolpath_stiff.updating.inference.candidates import likely_interval
+from toolpath_stiff.updating.inference.fits import refine
+from toolpath_stiff.updating.inference.hypotheses import averaged_interval, score_family
 from toolpath_stiff.updating.inference.noise import noise_models
-from toolpath_stiff.updating.inference.ranking import score_family
-from toolpath_stiff.updating.inference.size_prior import likely_interval
 
 
 def normal_scan(mean: float, sd: float, low: float, high: float) -> np.ndarray:

@@ -12,9 +12,14 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig import Nuisances
-from toolpath_stiff.updating.inference.noise import covariance, estimate_from_repeats, noise_models, repeat_groups
-from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.inference.scatter import Scatter
+from toolpath_stiff.updating.inference.noise import (
+    Scatter,
+    covariance,
+    estimate_from_repeats,
+    noise_models,
+    repeat_groups,
+)
+from toolpath_stiff.updating.inference.prediction import Predictor
 
 REPEAT, CLAMPING = 0.02, 0.03
 

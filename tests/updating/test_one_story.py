@@ -26,17 +26,16 @@ from toolpath_stiff.report.diagnose_page import diagnose_html
 from toolpath_stiff.report.diagnose_words import explanations, headline, is_plausible, model_rows
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
-from toolpath_stiff.updating.comparison.compare import Comparison, compare
-from toolpath_stiff.updating.diagnosis import diagnosis_words
-from toolpath_stiff.updating.diagnosis.diagnosis_document import document as diagnosis_document
-from toolpath_stiff.updating.diagnosis.diagnosis_document import words
-from toolpath_stiff.updating.inference.verdict import NONE
-from toolpath_stiff.updating.planning.plan_between import errors_so_far, rivals_of
-from toolpath_stiff.updating.readings.measurements import Measurements
-from toolpath_stiff.updating.update.additions import parse_addition
-from toolpath_stiff.updating.update.update import _Work, update
-from toolpath_stiff.updating.update.update_document import document as update_document
-from toolpath_stiff.updating.update.update_document import residuals_csv
+from toolpath_stiff.updating.comparison import Comparison, compare
+from toolpath_stiff.updating.correction.document import document as update_document
+from toolpath_stiff.updating.correction.document import residuals_csv
+from toolpath_stiff.updating.correction.ladder import _Work, parse_addition, update
+from toolpath_stiff.updating.diagnosis import words as verdict_words
+from toolpath_stiff.updating.diagnosis.document import document as diagnosis_document
+from toolpath_stiff.updating.diagnosis.document import words
+from toolpath_stiff.updating.inference import NONE
+from toolpath_stiff.updating.measurements import Measurements
+from toolpath_stiff.updating.planning.between import errors_so_far, rivals_of
 
 # Seed, layout, what is hidden, its size: one of each verdict.
 CASES = {
@@ -207,12 +206,12 @@ def ambiguous(**chances: float) -> SimpleNamespace:
 
 
 def test_several_explain_equally_well_only_if_there_are_several():
-    alone = diagnosis_words.verdict_text(ambiguous(spindle_and_table=0.92))
+    alone = verdict_words.verdict_text(ambiguous(spindle_and_table=0.92))
     assert "equally well" not in alone
     assert alone.startswith("Spindle gives way and table gives way (spindle + table, probability 92 %)")
-    two = diagnosis_words.verdict_text(ambiguous(spindle=0.6, table=0.4))
+    two = verdict_words.verdict_text(ambiguous(spindle=0.6, table=0.4))
     assert two.startswith("These explain the data about equally well: either spindle gives way (spindle, prob")
-    lopsided = diagnosis_words.verdict_text(ambiguous(spindle=0.85, table=0.1))
+    lopsided = verdict_words.verdict_text(ambiguous(spindle=0.85, table=0.1))
     assert "equally well" not in lopsided and lopsided.startswith("Most likely spindle gives way")
 
 
@@ -323,5 +322,5 @@ def test_the_next_step_is_one_that_would_be_taken(bounded, command):
         plausible=("weak_strut", "frame_compliance"),
         fits={"weak_strut": fit},
     )
-    steps = diagnosis_words.next_steps(diagnosis, Asked(("m.csv",)))
+    steps = verdict_words.next_steps(diagnosis, Asked(("m.csv",)))
     assert [parted(step)[1] for step in steps] == [command]

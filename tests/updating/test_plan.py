@@ -18,11 +18,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.planning.plan import Plan, plan_measurements, random_visits
-from toolpath_stiff.updating.planning.plan_document import plan_document
-from toolpath_stiff.updating.planning.plan_menu import Costs, Matters, Menu, possible_visits
-from toolpath_stiff.updating.planning.plan_rivals import (
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
+from toolpath_stiff.updating.planning.document import plan_document
+from toolpath_stiff.updating.planning.rivals import (
     Forecast,
     ReadingNoise,
     Rival,
@@ -31,6 +30,7 @@ from toolpath_stiff.updating.planning.plan_rivals import (
     joint_columns,
     pair_shares,
 )
+from toolpath_stiff.updating.planning.visits import Costs, Matters, Menu, possible_visits
 
 
 def menu(**changes) -> Menu:

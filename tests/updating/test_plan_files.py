@@ -21,11 +21,11 @@ from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.updating.inference.noise import repeat_groups
-from toolpath_stiff.updating.planning.plan import plan_measurements
-from toolpath_stiff.updating.planning.plan_campaign import Campaign, first_campaign
-from toolpath_stiff.updating.planning.plan_files import plan_csv, plan_rows
-from toolpath_stiff.updating.planning.plan_menu import Menu
-from toolpath_stiff.updating.readings.measurements import read_measurements
+from toolpath_stiff.updating.measurements import read_measurements
+from toolpath_stiff.updating.planning import plan_measurements
+from toolpath_stiff.updating.planning.campaign import Campaign, first_campaign
+from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
+from toolpath_stiff.updating.planning.visits import Menu
 
 MACHINES = ("nist", "genhexkins", "nategh_agheli")
 

@@ -22,7 +22,7 @@ from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.rig.campaign import rows_of, tilted_campaign
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.updating.inference.predict import JOINT_STEP, Predictor
+from toolpath_stiff.updating.inference.prediction import JOINT_STEP, Predictor
 
 NOMINAL = load_nominal("nist")
 

@@ -15,8 +15,8 @@ from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.tables import parse_table
-from toolpath_stiff.updating.readings.measurements import read_measurements
-from toolpath_stiff.updating.readings.raw_records import COLUMNS, read_raw, reduce_loop
+from toolpath_stiff.updating.measurements import read_measurements
+from toolpath_stiff.updating.raw import COLUMNS, read_raw, reduce_loop
 
 HEADING = "x_mm,y_mm,z_mm,direction,point,jog_um,force_N,displacement_um\n"
 JOGS = (0.0, 100.0, 200.0, 100.0, 0.0, -100.0, -200.0, -100.0, 0.0)

@@ -13,11 +13,10 @@ from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import machine_toml, parse_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.update.additions import parse_addition
-from toolpath_stiff.updating.update.mean_error_update import update_by_mean_error
-from toolpath_stiff.updating.update.update import update
-from toolpath_stiff.updating.update.update_document import document, residuals_csv
+from toolpath_stiff.updating.correction.document import document, residuals_csv
+from toolpath_stiff.updating.correction.ladder import parse_addition, update
+from toolpath_stiff.updating.correction.strut_law import update_by_mean_error
+from toolpath_stiff.updating.inference.prediction import Predictor
 
 MEAN_OVER_SD = np.sqrt(2.0 / np.pi)
 PROVENANCE = {"data": ["a.csv"], "data_sha256": "0" * 64, "command": "tps update a.csv"}

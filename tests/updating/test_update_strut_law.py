@@ -9,9 +9,9 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.readings.measurements import read_measurements
-from toolpath_stiff.updating.update.strut_law_search import bar_curve, bar_curve_csv, mean_error, minimise_mean_error
+from toolpath_stiff.updating.correction.strut_law import bar_curve, bar_curve_csv, mean_error, minimise_mean_error
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.measurements import read_measurements
 
 
 @pytest.fixture(scope="module")

@@ -15,13 +15,11 @@ from scipy.stats import binom
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, judged, table_1
-from toolpath_stiff.updating.diagnosis.diagnose import common_verdict, diagnose
-from toolpath_stiff.updating.inference.discrepancy import discrepancy_forms
+from toolpath_stiff.updating.diagnosis import common_verdict, diagnose
+from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, _smallest_set
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate
-from toolpath_stiff.updating.inference.noise import covariance
-from toolpath_stiff.updating.inference.scatter import Scatter
-from toolpath_stiff.updating.inference.verdict import FALSE_ALARM, NONE, _smallest_set
+from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.noise import Scatter, covariance
 
 STRONG = 0.1
 SEEDS = tuple(range(100, 112))

@@ -51,8 +51,8 @@ def run(args: argparse.Namespace) -> int:
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.report.compare_text import residuals_csv, terminal_text
-    from toolpath_stiff.updating.comparison.compare import compare
-    from toolpath_stiff.updating.readings.measurements import read_measurements
+    from toolpath_stiff.updating.comparison import compare
+    from toolpath_stiff.updating.measurements import read_measurements
 
     machine = load_machine(args.machine)
     found = compare(

@@ -25,7 +25,7 @@ from toolpath_stiff.cli.progress import say
 from toolpath_stiff.files import Content
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
+    from toolpath_stiff.updating.diagnosis import Diagnosis
 
 EPILOG = """\
 examples:
@@ -66,9 +66,9 @@ def run(args: argparse.Namespace) -> int:
     target = destination(args, "diagnose", args.data, "-diagnose").check(DATA if args.no_plots else (*DATA, *PICTURES))
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.updating.diagnosis.diagnose import diagnose
-    from toolpath_stiff.updating.diagnosis.diagnosis_document import document
-    from toolpath_stiff.updating.readings.measurements import read_measurements
+    from toolpath_stiff.updating.diagnosis import diagnose
+    from toolpath_stiff.updating.diagnosis.document import document
+    from toolpath_stiff.updating.measurements import read_measurements
 
     machine = load_machine(args.machine)
     data = read_measurements(args.data, machine)
@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namespace) -> None:
     """Add what needs other rooms: the next measurements, and the choice's weight on a tool path."""
-    from toolpath_stiff.updating.diagnosis.next_measurements import choice_on_path, next_measurements
+    from toolpath_stiff.updating.diagnosis import choice_on_path, next_measurements
 
     if diagnosis.verdict != "ambiguous":
         return
@@ -121,7 +121,7 @@ def _residuals(diagnosis: Diagnosis) -> str:
     import numpy as np
 
     from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
-    from toolpath_stiff.updating.inference.baseline import deviation_percent
+    from toolpath_stiff.updating.inference.fits import deviation_percent
 
     data = diagnosis.data
     lines = [

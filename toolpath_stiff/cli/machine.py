@@ -279,7 +279,7 @@ def _from_linuxcnc(args: argparse.Namespace) -> int:
 
 
 def _recover(args: argparse.Namespace) -> int:
-    from toolpath_stiff.updating.update.geometry_recovery import recover_geometry, recovery_text
+    from toolpath_stiff.updating.correction.machines import recover_geometry, recovery_text
 
     if not 1 <= args.starts <= 1000:
         raise InputError(f"--starts {args.starts}", expected="1 to 1000")

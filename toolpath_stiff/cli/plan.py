@@ -19,10 +19,10 @@ from toolpath_stiff.cli.outputs import destination
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
     from toolpath_stiff.stiffness.effects.contract import Effect
-    from toolpath_stiff.updating.planning.plan_campaign import Campaign
-    from toolpath_stiff.updating.planning.plan_menu import Costs, Menu
-    from toolpath_stiff.updating.planning.plan_rivals import Rival
-    from toolpath_stiff.updating.readings.measurements import Measurements
+    from toolpath_stiff.updating.measurements import Measurements
+    from toolpath_stiff.updating.planning.campaign import Campaign
+    from toolpath_stiff.updating.planning.rivals import Rival
+    from toolpath_stiff.updating.planning.visits import Costs, Menu
 
 EPILOG = """\
 examples:
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.stiffness.effects.registry import known_effects
-    from toolpath_stiff.updating.planning.plan_menu import Costs
+    from toolpath_stiff.updating.planning.visits import Costs
 
     machine = load_machine(args.machine)
     effects = known_effects(args.effects)
@@ -128,7 +128,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _menu(args: argparse.Namespace, menu: Menu) -> Menu:
     from toolpath_stiff.units import m_from_mm, rad_from_deg
-    from toolpath_stiff.updating.planning.plan_menu import with_options
+    from toolpath_stiff.updating.planning.visits import with_options
 
     return with_options(
         menu,
@@ -147,12 +147,11 @@ def _menu(args: argparse.Namespace, menu: Menu) -> Menu:
 def _told_apart(
     args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    from toolpath_stiff.updating.planning.plan import plan_measurements
-    from toolpath_stiff.updating.planning.plan_between import unfitted_rivals
-    from toolpath_stiff.updating.planning.plan_document import plan_document
-    from toolpath_stiff.updating.planning.plan_files import plan_csv, plan_rows
-    from toolpath_stiff.updating.planning.plan_menu import Menu
-    from toolpath_stiff.updating.readings.measurements import read_measurements
+    from toolpath_stiff.updating.measurements import read_measurements
+    from toolpath_stiff.updating.planning import plan_measurements
+    from toolpath_stiff.updating.planning.between import unfitted_rivals
+    from toolpath_stiff.updating.planning.document import plan_csv, plan_document, plan_rows
+    from toolpath_stiff.updating.planning.visits import Menu
 
     taken: set[str] = set()
     errors: dict[str, float] = {}
@@ -184,7 +183,7 @@ def _told_apart(
     contents: dict[str, Any] = {"plan.csv": plan_csv(rows)}
     if not args.no_plots:
         from toolpath_stiff.report.plan_picture import plan_picture
-        from toolpath_stiff.updating.planning.plan_map import gap_map
+        from toolpath_stiff.updating.planning.document import gap_map
 
         gap = gap_map(machine, plan, menu, args.effects)
         title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
@@ -199,12 +198,11 @@ def _rivals(
     """Rivals, noise (repeat, clamping), notes, verdict of the diagnosis ("" if none was made), mean errors so far."""
     import numpy as np
 
+    from toolpath_stiff.updating.inference import judge
     from toolpath_stiff.updating.inference.evidence import Problem
-    from toolpath_stiff.updating.inference.noise import covariance, noise_models
-    from toolpath_stiff.updating.inference.predict import Predictor
-    from toolpath_stiff.updating.inference.scatter import Scatter
-    from toolpath_stiff.updating.inference.verdict import judge
-    from toolpath_stiff.updating.planning.plan_between import errors_so_far, fitted_rivals, rivals_of
+    from toolpath_stiff.updating.inference.noise import Scatter, covariance, noise_models
+    from toolpath_stiff.updating.inference.prediction import Predictor
+    from toolpath_stiff.updating.planning.between import errors_so_far, fitted_rivals, rivals_of
 
     # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
     noise = noise_models(data, args.noise, args.strut_spread)[-1]
@@ -233,9 +231,9 @@ def _rivals(
 def _campaign(
     args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    from toolpath_stiff.updating.planning.plan_campaign import RISER, TABLE, first_campaign
-    from toolpath_stiff.updating.planning.plan_files import plan_csv, plan_rows
-    from toolpath_stiff.updating.planning.plan_menu import Menu
+    from toolpath_stiff.updating.planning.campaign import RISER, TABLE, first_campaign
+    from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
+    from toolpath_stiff.updating.planning.visits import Menu
 
     noise = CAMPAIGN_NOISE if args.noise is None else args.noise
     campaign = first_campaign(
@@ -280,7 +278,7 @@ def _campaign_text(campaign: Campaign, rows: list[dict[str, Any]], noise: float)
 
 def _visits(rows: list[dict[str, Any]], kinds: tuple[str, ...], why: tuple[str, ...]) -> list[dict[str, Any]]:
     """One entry a clamping: where, how, what is read, why."""
-    from toolpath_stiff.updating.planning.plan_files import POSE
+    from toolpath_stiff.updating.planning.document import POSE
 
     found = []
     for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):

@@ -13,7 +13,7 @@ from toolpath_stiff.cli.arguments import add_json_option
 from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.readings.raw_records import Loop, LoopFigures
+    from toolpath_stiff.updating.raw import Loop, LoopFigures
 
 EPILOG = """\
 columns of RAW:
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.tables import read_table, split_name
-    from toolpath_stiff.updating.readings.raw_records import COLUMNS, measurement_csv, read_raw, reduce_loops
+    from toolpath_stiff.updating.raw import COLUMNS, measurement_csv, read_raw, reduce_loops
 
     raw = read_table(args.raw, "raw records", COLUMNS)
     loops = read_raw(raw)
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 def describe(loops: list[Loop], figures: list[LoopFigures]) -> list[dict[str, Any]]:
     """One dictionary a loop in the shop's units; what a loop cannot say is null."""
     from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
-    from toolpath_stiff.updating.readings.raw_records import shop_figures
+    from toolpath_stiff.updating.raw import shop_figures
 
     found = []
     for loop, one in zip(loops, figures, strict=True):

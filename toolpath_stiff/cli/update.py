@@ -23,9 +23,9 @@ from toolpath_stiff.hints import command_line, hint, options
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine.model import Machine
-    from toolpath_stiff.updating.readings.measurements import Measurements
-    from toolpath_stiff.updating.update.strut_law_search import StrutLawSearch
-    from toolpath_stiff.updating.update.update import Update
+    from toolpath_stiff.updating.correction.ladder import Update
+    from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
+    from toolpath_stiff.updating.measurements import Measurements
 
 EPILOG = """\
 examples:
@@ -85,8 +85,8 @@ def run(args: argparse.Namespace) -> int:
     limit_threads(args.jobs)
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine, machine_toml
-    from toolpath_stiff.updating.readings.measurements import read_measurements
-    from toolpath_stiff.updating.update.update_document import document, residuals_csv
+    from toolpath_stiff.updating.correction.document import document, residuals_csv
+    from toolpath_stiff.updating.measurements import read_measurements
 
     machine = load_machine(args.machine)
     data = read_measurements(args.data, machine)
@@ -156,14 +156,13 @@ def _check(args: argparse.Namespace) -> None:
 
 def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> tuple[Update, StrutLawSearch | None]:
     if args.objective == "mean-error":
-        from toolpath_stiff.updating.update.mean_error_update import update_by_mean_error
+        from toolpath_stiff.updating.correction.strut_law import update_by_mean_error
 
         return update_by_mean_error(
             machine, data, noise=args.noise, strut_spread=args.strut_spread, seed=args.seed, progress=say,
             effect_files=args.effects,
         )  # fmt: skip
-    from toolpath_stiff.updating.update.additions import parse_addition
-    from toolpath_stiff.updating.update.update import update
+    from toolpath_stiff.updating.correction.ladder import parse_addition, update
 
     additions = [parse_addition(text, data, args.effects) for text in args.add]
     found = update(
@@ -176,7 +175,7 @@ def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> t
 
 def _provenance(args: argparse.Namespace, update: Update) -> dict[str, Any]:
     """Where the fitted values come from. No date: the same data and command give the same bytes."""
-    from toolpath_stiff.updating.update.provenance import data_hash
+    from toolpath_stiff.updating.correction.machines import data_hash
 
     return {
         "data": list(args.data),
@@ -227,7 +226,7 @@ def _search(search: StrutLawSearch) -> dict[str, Any]:
 
 def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> dict[str, Content]:
     """The paper's Figure 3 as data and, unless pictures are off, drawn."""
-    from toolpath_stiff.updating.update.strut_law_search import bar_curve, bar_curve_csv
+    from toolpath_stiff.updating.correction.strut_law import bar_curve, bar_curve_csv
 
     if any(entry.name == "platform_flexibility" for entry in machine.effects):
         return {}

@@ -14,13 +14,13 @@ from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
 from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import DEVIATION
 from toolpath_stiff.units import mm_from_m
-from toolpath_stiff.updating.comparison.residual_variables import directions, planes
-from toolpath_stiff.updating.inference.baseline import deviation_percent
+from toolpath_stiff.updating.comparison.residuals import directions, planes
+from toolpath_stiff.updating.inference.fits import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from toolpath_stiff.updating.comparison.compare import Comparison
+    from toolpath_stiff.updating.comparison import Comparison
 
 FloatArray = NDArray[np.float64]
 Place = tuple[float, float, float, float]  # x, y, width, height

@@ -15,7 +15,7 @@ from toolpath_stiff.report.sections import bullets, escaped, figures, page, pict
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, machine_text
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.comparison.compare import Comparison
+    from toolpath_stiff.updating.comparison import Comparison
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {

@@ -12,15 +12,15 @@ from toolpath_stiff.report.update_pictures import BAND, DIRECTION_COLOURS, RESID
 from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
 from toolpath_stiff.units import n_per_mm_from_n_per_m
-from toolpath_stiff.updating.comparison.residual_variables import directions, planes
-from toolpath_stiff.updating.inference.baseline import deviation_percent
+from toolpath_stiff.updating.comparison.residuals import directions, planes
+from toolpath_stiff.updating.inference.fits import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.updating.comparison.compare import Comparison
+    from toolpath_stiff.updating.comparison import Comparison
 
 FloatArray = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
-from toolpath_stiff.updating.comparison.compare import Comparison
-from toolpath_stiff.updating.comparison.residual_variables import directions, planes
-from toolpath_stiff.updating.inference.baseline import deviation_percent
+from toolpath_stiff.updating.comparison import Comparison
+from toolpath_stiff.updating.comparison.residuals import directions, planes
+from toolpath_stiff.updating.inference.fits import deviation_percent
 
 MOST_NAMED = 5  # readings far off, on the terminal
 

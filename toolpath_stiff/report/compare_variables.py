@@ -22,15 +22,15 @@ from toolpath_stiff.report.figure import (
 from toolpath_stiff.report.update_pictures import DIRECTION_COLOURS
 from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, plain, shortened
-from toolpath_stiff.updating.comparison.residual_structure import SIGNIFICANT
-from toolpath_stiff.updating.comparison.residual_variables import directions
-from toolpath_stiff.updating.inference.baseline import deviation_percent
+from toolpath_stiff.updating.comparison.residuals import directions
+from toolpath_stiff.updating.comparison.structure import SIGNIFICANT
+from toolpath_stiff.updating.inference.fits import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from toolpath_stiff.updating.comparison.compare import Comparison
-    from toolpath_stiff.updating.comparison.residual_variables import Label, Variable
+    from toolpath_stiff.updating.comparison import Comparison
+    from toolpath_stiff.updating.comparison.residuals import Label, Variable
 
 FloatArray = NDArray[np.float64]
 

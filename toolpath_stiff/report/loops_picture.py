@@ -11,7 +11,7 @@ from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style,
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.readings.raw_records import Loop, LoopFigures
+    from toolpath_stiff.updating.raw import Loop, LoopFigures
 
 COLUMNS = 4
 MOST = 60  # loops in one picture; further ones are counted in its heading

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.wording import plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m
-from toolpath_stiff.updating.planning.plan_map import GapMap, group_of, height_groups
-from toolpath_stiff.updating.planning.plan_menu import Visits
+from toolpath_stiff.updating.planning.document import GapMap, group_of, height_groups
+from toolpath_stiff.updating.planning.visits import Visits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -29,13 +29,13 @@ from toolpath_stiff.report.figure import (
 from toolpath_stiff.report.vector import Drawing, drawing
 from toolpath_stiff.report.wording import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
-from toolpath_stiff.updating.inference.baseline import LAW_REFITTED, deviation_percent
+from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.updating.readings.measurements import Measurements
+    from toolpath_stiff.updating.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
 

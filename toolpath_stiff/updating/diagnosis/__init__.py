@@ -1,1 +1,324 @@
-"""Which physical effect is missing, in figures and words."""
+"""Diagnosis: which physical effect is missing from the model, if any.
+
+Reads the verdict of `verdict` for each noise model, takes what they have in common, and writes it down with what a user
+needs to judge it: fits with intervals, errors held out by point, what these data cannot tell, what to measure next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.acting import setup_of
+from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
+from toolpath_stiff.stiffness.effects.registry import known_effects
+from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.updating.inference import NONE, Judgement, judge
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.fits import Baseline, Fit, HeldOut, held_out, refine
+from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
+from toolpath_stiff.updating.inference.noise import JOINT_ERROR, STRUT_SPREAD, Noise, Scatter, covariance, noise_models
+from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.updating.measurements import Measurements
+from toolpath_stiff.updating.planning import plan_measurements
+from toolpath_stiff.updating.planning.between import rivals_of
+from toolpath_stiff.updating.planning.document import plan_rows
+from toolpath_stiff.updating.planning.visits import Costs, Menu
+
+if TYPE_CHECKING:
+    from toolpath_stiff.nc import Program
+    from toolpath_stiff.units import Pose
+
+FloatArray = NDArray[np.float64]
+
+FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Which effect is missing, and what stands behind it.
+
+    Attributes
+    ----------
+    verdict, plausible
+        Common to all noise models; see `verdict`.
+    judgements
+        Name of the noise model -> judgement. The one that is written out in full is `main`.
+    main
+        The judgement of the measured or stated noise, else of the high guess.
+    data, machine, effects
+        What was diagnosed, with the effects that these data can test.
+    cannot_test
+        Effect -> missing columns; empty where nothing in these data depends on the effect.
+    as_given, base, fits
+        The machine file as it stands; its strut law refitted; effect or "a + b" -> final fit of all that were offered.
+    held_out_base, held_out
+        Errors at left-out points.
+    confounding, detectable
+        What these data cannot tell apart, and what they would have shown.
+    files, seed
+        For the record.
+    """
+
+    verdict: str
+    plausible: tuple[str, ...]
+    judgements: dict[str, Judgement]
+    main: Judgement
+    data: Measurements
+    machine: Machine
+    effects: tuple[Effect, ...]
+    cannot_test: dict[str, tuple[str, ...]]
+    as_given: Fit
+    base: Fit
+    fits: dict[str, Fit]
+    held_out_base: HeldOut
+    held_out: dict[str, HeldOut]
+    confounding: Confounding
+    detectable: tuple[Detectable, ...]
+    files: tuple[str, ...]
+    seed: int
+
+    @property
+    def noise(self) -> Noise:
+        """The noise model of `main`."""
+        return self.main.noise
+
+    @property
+    def predictor(self) -> Predictor:
+        """The model's answers to the data."""
+        return self.main.problem.predictor
+
+    @property
+    def explanations(self) -> tuple[str, ...]:
+        """Hypotheses left standing under any noise model, the most likely first: effects, `none`, "a + b".
+
+        One alone where one is the answer.
+        """
+        most = 1 if self.verdict == "identified" else None
+        return tuple(dict.fromkeys(name for one in self.judgements.values() for name in one.explanations[:most]))
+
+    @property
+    def before(self) -> FloatArray:
+        """(n,) ln measured - ln modelled of the machine file as given."""
+        return self.as_given.residual
+
+    @property
+    def best(self) -> str | None:
+        """Name of the best explanation by an effect or a pair; None where there is none."""
+        offered = [name for name in self.ranking() if name in self.fits and any(s.any() for s in self.fits[name].sizes)]
+        return offered[0] if offered else None
+
+    @property
+    def after(self) -> FloatArray:
+        """(n,) residual of the best explanation; with the strut law refitted where there is none, or none is needed."""
+        if self.best is None or self.verdict == "adequate":
+            return self.base.residual
+        return self.fits[self.best].residual
+
+    @property
+    def winner(self) -> tuple[ActiveEffect, ...]:
+        """Effects of the best explanation."""
+        return () if self.best is None else self.fits[self.best].effects
+
+    @property
+    def law(self) -> FloatArray:
+        """(2,) the strut law's logarithms with the best explanation."""
+        return self.base.law if self.best is None else self.fits[self.best].law
+
+    def ranking(self) -> list[str]:
+        """Explanations, most likely first: by probability, then by evidence."""
+        likely = sorted(self.main.probability.items(), key=lambda item: (-item[1], item[0]))
+        names = [name for name, weight in likely if weight > 0.0 and name in self.fits]
+        return names + [f.name for f in self.main.families if f.name not in names]
+
+
+def make_problem(
+    machine: Machine, data: Measurements, noise: Noise, effect_files: Sequence[str | Path] = ()
+) -> tuple[Problem, FloatArray]:
+    """Data, model and scatter, ready for fits; and the covariance (n, n) of ln readings."""
+    predictor = Predictor(machine, data, effect_files)
+    spread = covariance(noise, predictor)
+    return Problem(predictor, Scatter.of(noise, spread), spread), spread
+
+
+def testable_effects(
+    predictor: Predictor, effect_files: Sequence[str | Path] = ()
+) -> tuple[tuple[Effect, ...], dict[str, tuple[str, ...]]]:
+    """Effects of the catalogue and of files that are not in the machine yet and whose columns the data have.
+
+    And those that they have not, with the columns that are missing.
+    """
+    known = known_effects(effect_files)
+    present = {active.effect.name for active in (*predictor.base.effects, *predictor.base.instruments)}
+    cannot = predictor.data.cannot_test(known.values())
+    effects = tuple(e for name, e in known.items() if name not in cannot and name not in present)
+    return effects, cannot
+
+
+def diagnose(
+    machine: Machine,
+    data: Measurements,
+    *,
+    noise: float | tuple[float, float] | None = None,
+    strut_spread: float = STRUT_SPREAD,
+    joint_error: float = JOINT_ERROR,
+    effect_files: Sequence[str | Path] = (),
+    seed: int = 0,
+    files: Sequence[str] = (),
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Find out which physical effect the model lacks, if any.
+
+    Parameters
+    ----------
+    machine, data
+        The model and n readings of the machine.
+    noise
+        Relative sd of one reading, re-clamping included, or (repeat, clamping); None: from the data.
+    strut_spread, joint_error
+        Relative sd of the struts' stiffnesses; m, sd of each joint coordinate.
+    effect_files
+        A user's own effects, which take part.
+    seed
+        Of the bootstrap.
+    files
+        Names of the measurement files, for the record.
+    progress
+        Told what is being done.
+
+    Raises
+    ------
+    InputError
+        Too few readings, or what `Predictor` and `noise_models` refuse.
+    """
+    if len(data) < FEWEST or np.isnan(data.stiffness).any():
+        raise InputError(
+            f"{len(data)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
+            expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
+        )
+    say = progress or (lambda text: None)
+    predictor = Predictor(machine, data, effect_files)
+    joints = predictor.joint_columns()
+    effects, cannot = testable_effects(predictor, effect_files)
+    judgements: dict[str, Judgement] = {}
+    for one in noise_models(data, noise, strut_spread, joint_error):
+        say(f"searching {len(effects)} effects, noise {one.name}")
+        spread = covariance(one, predictor, joints)
+        problem = Problem(predictor, Scatter.of(one, spread), spread)
+        judgements[one.name] = judge(problem, one, spread, effects, seed)
+    verdict, plausible = common_verdict(list(judgements.values()))
+    # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
+    main = max(judgements.values(), key=lambda judgement: judgement.noise.typical)
+    say("final fits, errors held out by point")
+    baseline = Baseline.of(main.problem)
+    fits = dict(main.fits)
+    for family in main.families:
+        if family.best is not None and family.name not in fits:
+            fits[family.name] = refine(main.problem, family.best)
+    tested = {family.name for family in main.families}
+    cannot |= {effect.name: () for effect in effects if effect.name not in tested}
+    return Diagnosis(
+        verdict, plausible, judgements, main, data, machine, effects, cannot, baseline.as_given, baseline.refitted,
+        fits, held_out(baseline.refitted, data.point), {name: held_out(fit, data.point) for name, fit in fits.items()},
+        confounding(main.problem, main.families),
+        tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
+        tuple(files) or tuple(dict.fromkeys(data.file.tolist())), seed,
+    )  # fmt: skip
+
+
+def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
+    """The verdict that all noise models share, and names that hold the truth under any; else `ambiguous`."""
+    verdicts = {judgement.verdict for judgement in judgements}
+    plausible = tuple(dict.fromkeys(name for judgement in judgements for name in judgement.plausible))
+    if len(verdicts) == 1:
+        verdict = verdicts.pop()
+        if verdict == "identified" and any(set(j.plausible) != set(judgements[0].plausible) for j in judgements):
+            verdict = "ambiguous"
+        return verdict, plausible
+    return "ambiguous", plausible if plausible else (NONE,)
+
+
+# -- what next ---------------------------------------------------------------------------------------------------------
+#
+# What to measure next after a diagnosis, and how much the choice between its explanations matters on a tool path.
+
+POSES = 6
+PATH_STEP = 5e-3  # m between samples: the mean of a path needs no more
+
+
+def next_measurements(
+    diagnosis: Diagnosis, poses: int = POSES, seed: int = 0
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
+
+    Empty unless the verdict is `ambiguous`: there is nothing to tell apart.
+    """
+    # Under several noise models the most demanding one that leaves rivals: a plan for it serves the others, too.
+    open_ones = [j for j in diagnosis.judgements.values() if j.verdict == "ambiguous"]
+    if diagnosis.verdict != "ambiguous" or not open_ones:
+        return [], []
+    judgement = open_ones[-1]
+    rivals = rivals_of(judgement)
+    if len(rivals) < 2:
+        return [], []
+    noise = (float(np.sqrt(np.mean(judgement.noise.repeat**2))), judgement.noise.clamping)
+    try:
+        plan = plan_measurements(
+            diagnosis.machine, rivals, noise, poses, menu=Menu.of(diagnosis.data), costs=Costs(), seed=seed,
+            effect_files=diagnosis.predictor.effect_files, strut_spread=judgement.noise.strut_spread,
+        )  # fmt: skip
+    except InputError as error:
+        return [], [f"no plan could be made: {error}"]
+    rows = plan_rows(plan.visits, plan.chosen, set(diagnosis.data.point.tolist()))
+    for row in rows:
+        row["why"] = plan.why[int(row["clamp"]) - 1]
+    remarks = [
+        f"{pair.first} and {pair.second}: tip stiffness cannot tell them apart; put an indicator "
+        + " or ".join(f"{place}" for place in dict.fromkeys(pair.indicators.values()))
+        for pair in plan.pairs
+        if not pair.separable
+    ]
+    return rows, remarks
+
+
+def choice_on_path(
+    diagnosis: Diagnosis, program: Program, origin: Pose | None = None, given: Conditions | None = None
+) -> dict[str, Any]:
+    """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
+
+    Where the program is out of reach, or a model has no answer there, the reason instead. `given` is under what the
+    program runs; unless it names a set-up, the one that an explanation belongs to: there the choice matters.
+    """
+    from toolpath_stiff.analysis import analyse
+    from toolpath_stiff.analysis.statistics import stiffness_figures
+
+    names = [name for name in diagnosis.explanations if name == NONE or name in diagnosis.fits]
+    conditions = given or Conditions(diagnosis.machine.setup, diagnosis.machine.temperature)
+    if conditions.setup is None:
+        effects = [active for name in names if name != NONE for active in diagnosis.fits[name].effects]
+        conditions = replace(conditions, setup=next(filter(None, map(setup_of, effects)), None))
+    found: dict[str, Any] = {"program": program.name, "setup": conditions.setup, "explanations": {}}
+    for name in names:
+        fit = diagnosis.base if name == NONE else diagnosis.fits[name]
+        machine = diagnosis.machine.with_changes(strut_law=scaled_law(diagnosis.machine.strut_law, fit.law))
+        try:
+            model = build_model(machine, diagnosis.predictor.effect_files, fit.effects, conditions)
+            model = replace(model, instruments=())  # readings differ, the machine under the tool does not
+            analysis = analyse(model, program, origin=origin, step=PATH_STEP)
+        except TpsError as error:
+            return {"program": program.name, "reason": str(error)}
+        figures = stiffness_figures(analysis, analysis.headline)
+        found["explanations"][name] = {
+            key: round(figures[key], 1) for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
+        }
+    means = [entry["mean_N_per_mm"] for entry in found["explanations"].values()]
+    if means:
+        found["mean_spread_percent"] = round(100.0 * (max(means) - min(means)) / float(np.mean(means)), 2)
+    return found

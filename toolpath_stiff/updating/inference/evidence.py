@@ -16,10 +16,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.updating.inference.candidates import Candidate, Table
-from toolpath_stiff.updating.inference.predict import Predictor
-from toolpath_stiff.updating.inference.scatter import Scatter
-from toolpath_stiff.updating.inference.size_prior import Sight, SizePrior, likely_interval, log_comparable
+from toolpath_stiff.updating.inference.candidates import (
+    Candidate,
+    Sight,
+    SizePrior,
+    Table,
+    likely_interval,
+    log_comparable,
+)
+from toolpath_stiff.updating.inference.noise import Scatter
+from toolpath_stiff.updating.inference.prediction import Predictor
 
 FloatArray = NDArray[np.float64]
 

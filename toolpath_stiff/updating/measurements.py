@@ -20,7 +20,7 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table, read_table
-from toolpath_stiff.updating.readings.measurement_rows import (
+from toolpath_stiff.updating.rows import (
     COLUMNS,
     LABELS,
     OPTIONAL,

@@ -10,18 +10,13 @@ from numpy.typing import NDArray
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, joined
 from toolpath_stiff.units import mm_from_m
-from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
-from toolpath_stiff.updating.diagnosis.diagnosis_words import next_steps, verdict_text, why
-from toolpath_stiff.updating.inference.averaged_interval import averaged_interval
-from toolpath_stiff.updating.inference.baseline import error_figures
-from toolpath_stiff.updating.inference.candidates import Component
-from toolpath_stiff.updating.inference.confounding import CONFOUNDED
+from toolpath_stiff.updating.diagnosis import Diagnosis
+from toolpath_stiff.updating.diagnosis.words import next_steps, verdict_text, why
+from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, Judgement
+from toolpath_stiff.updating.inference.candidates import EXPECTED, Component
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
-from toolpath_stiff.updating.inference.fit import NORMAL_95, Fit
-from toolpath_stiff.updating.inference.held_out import gain_in_standard_errors
-from toolpath_stiff.updating.inference.ranking import Family
-from toolpath_stiff.updating.inference.size_prior import EXPECTED
-from toolpath_stiff.updating.inference.verdict import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, Judgement
+from toolpath_stiff.updating.inference.fits import NORMAL_95, Fit, error_figures, gain_in_standard_errors
+from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
 
 FloatArray = NDArray[np.float64]
 

@@ -22,10 +22,11 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.units import RAD_PER_DEG
+from toolpath_stiff.updating.inference import NONE
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
-from toolpath_stiff.updating.inference.verdict import NONE
-from toolpath_stiff.updating.planning.plan_between import unfitted_rivals
-from toolpath_stiff.updating.planning.plan_menu import (
+from toolpath_stiff.updating.planning.between import unfitted_rivals
+from toolpath_stiff.updating.planning.rivals import ReadingNoise, forecast_all, pair_shares, repeat_and_clamping
+from toolpath_stiff.updating.planning.visits import (
     AXES,
     READING_EVERY,
     Costs,
@@ -37,7 +38,6 @@ from toolpath_stiff.updating.planning.plan_menu import (
     planned_readings,
     reachable,
 )
-from toolpath_stiff.updating.planning.plan_rivals import ReadingNoise, forecast_all, pair_shares, repeat_and_clamping
 
 FloatArray = NDArray[np.float64]
 

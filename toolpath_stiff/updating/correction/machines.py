@@ -1,30 +1,132 @@
-"""The NIST hexapod's geometry, recovered from the 42 modelled values of the paper's Table 1.
-
-The paper does not print the geometry; its modelled stiffnesses determine it. Symmetry of the octahedral hexapod leaves
-seven lengths: radius and height of the platform joints (a regular hexagon), radius and height of the two kinds of frame
-joints, and one number that a vertical spindle and a force at the tip cannot tell: scaling the platform about the tip,
-with the frame joints moved along, changes no strut direction and no length. Both joints of a vertex are therefore put
-in the vertex's radial plane, which leaves six unknowns (and gives a platform of 12.00 in).
-
-Platform joints at 30, 90, ... degrees, vertices at 60, 180, 300; struts 1, 3, 5 go to the lower joint of a vertex,
-2, 4, 6 to the upper one. The strut law is the paper's: 46.5 N/um at 2.5616 m, 32.5 N/um at 3.2132 m.
-"""
+"""A fit as a machine: the fitted values, how well they are known, and where they come from."""
 
 from __future__ import annotations
 
 import csv
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.files import read_bytes
 from toolpath_stiff.machine import Machine, StrutLaw, load_machine, solve_struts
+from toolpath_stiff.machine.model import EffectEntry
+from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty
 from toolpath_stiff.stiffness.core import tip_compliance
+from toolpath_stiff.stiffness.effects.contract import SETUP
 from toolpath_stiff.stiffness.model import build_model
+from toolpath_stiff.tables import split_name
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.updating.inference.fits import Fit
+from toolpath_stiff.updating.inference.prediction import scaled_law
+from toolpath_stiff.updating.measurements import NIST_TABLE_1
 
 FloatArray = NDArray[np.float64]
+
+
+def data_hash(files: Sequence[str]) -> str:
+    """SHA-256 of the measurement files' bytes, one after the other."""
+    found = hashlib.sha256()
+    for file in files:
+        found.update(_bytes(file))
+    return found.hexdigest()
+
+
+def _bytes(file: str) -> bytes:
+    if file == NIST_TABLE_1:
+        return (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_bytes()
+    return read_bytes(split_name(file)[0], "measurements")
+
+
+def fitted_machine(
+    machine: Machine, fit: Fit, provenance: Mapping[str, Any], widened: float = 1.0, setups: Iterable[str] = ()
+) -> Machine:
+    """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
+
+    Parameters
+    ----------
+    machine
+        What was fitted.
+    fit
+        Effects on top of the machine's own, and the strut law if that was free.
+    provenance
+        Keys and values for machine files, the same for every entry.
+    widened
+        Factor on the standard deviations.
+    setups
+        Names of the set-ups that were measured: where an effect belongs to one, the machine file lists them all.
+    """
+    effects, instruments = list(machine.effects), list(machine.instruments)
+    for candidate, active in zip(fit.candidates, fit.effects, strict=True):
+        values = {p.key: _in_file(p, active.values[p.name]) for p in candidate.effect.parameters}
+        entry = EffectEntry(candidate.name, values, dict(provenance))
+        (instruments if candidate.effect.is_instrument else effects).append(entry)
+    changes: dict[str, Any] = {"effects": tuple(effects), "instruments": tuple(instruments)}
+    if fit.law_free:
+        remark = f"fitted: {provenance['command']}; data sha256 {provenance['data_sha256']}"
+        changes |= {
+            "strut_law": scaled_law(machine.strut_law, fit.law),
+            "origins": {**machine.origins, "strut_law": "fitted"},
+            "remarks": {**machine.remarks, "strut_law": remark},
+        }
+    if any(SETUP in one.effect.conditions(one.values) for one in fit.effects):
+        known = sorted({*setups} - {"", *machine.setups})
+        changes["setups"] = (*machine.setups, *known)
+    return machine.with_changes(**changes, uncertainty=_uncertainty(machine, fit, widened))
+
+
+def _in_file(parameter: Any, value: Any) -> Any:
+    return value if parameter.discrete else float(value) / parameter.si
+
+
+def _uncertainty(machine: Machine, fit: Fit, widened: float) -> Uncertainty | None:
+    """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already."""
+    law = scaled_law(machine.strut_law, fit.law)
+    names, slopes, rows = [], [], []
+    if fit.law_free:
+        names += list(STRUT_LAW)
+        slopes += [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6]
+        rows += [0, 1]
+    index = 0
+    for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
+        for component, size in zip(candidate.components, sizes, strict=True):
+            if index in fit.free:
+                names.append(f"{candidate.name}.{component.parameter.key}")
+                # value = 1 / size for a stiffness whose neutral value is infinite.
+                slope = -1.0 / float(size) ** 2 if component.inverse else 1.0
+                slopes.append(slope / component.parameter.si)
+                rows.append(2 + fit.free.index(index))
+            index += 1
+    if not names:
+        return machine.uncertainty
+    scale = widened * np.array(slopes)
+    covariance = np.outer(scale, scale) * fit.covariance[np.ix_(rows, rows)]
+    return _beside(machine.uncertainty, Uncertainty.of(names, covariance))
+
+
+def _beside(old: Uncertainty | None, new: Uncertainty) -> Uncertainty:
+    """Both; what is fitted again replaces what was known of it."""
+    if old is None:
+        return new
+    kept = old.without(new.names)
+    return kept.beside(new) if kept.names else new
+
+
+# -- recovered geometry ------------------------------------------------------------------------------------------------
+#
+# The NIST hexapod's geometry, recovered from the 42 modelled values of the paper's Table 1.
+#
+# The paper does not print the geometry; its modelled stiffnesses determine it. Symmetry of the octahedral hexapod
+# leaves seven lengths: radius and height of the platform joints (a regular hexagon), radius and height of the two kinds
+# of frame joints, and one number that a vertical spindle and a force at the tip cannot tell: scaling the platform about
+# the tip, with the frame joints moved along, changes no strut direction and no length. Both joints of a vertex are
+# therefore put in the vertex's radial plane, which leaves six unknowns (and gives a platform of 12.00 in).
+#
+# Platform joints at 30, 90, ... degrees, vertices at 60, 180, 300; struts 1, 3, 5 go to the lower joint of a vertex, 2,
+# 4, 6 to the upper one. The strut law is the paper's: 46.5 N/um at 2.5616 m, 32.5 N/um at 3.2132 m.
 
 UNKNOWNS = (
     "platform radius",

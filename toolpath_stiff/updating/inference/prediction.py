@@ -20,7 +20,7 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.acting import idle_on_readings
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model
-from toolpath_stiff.updating.readings.measurements import Measurements, measured_path
+from toolpath_stiff.updating.measurements import Measurements, measured_path
 
 FloatArray = NDArray[np.float64]
 

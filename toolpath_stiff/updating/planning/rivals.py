@@ -35,9 +35,9 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
 from toolpath_stiff.updating.inference.candidates import Component
 from toolpath_stiff.updating.inference.noise import CLAMPING, JOINT_ERROR, STRUT_SPREAD
-from toolpath_stiff.updating.inference.predict import JOINT_STEP, Predictor
-from toolpath_stiff.updating.planning.plan_menu import Visits
-from toolpath_stiff.updating.readings.measurements import Measurements
+from toolpath_stiff.updating.inference.prediction import JOINT_STEP, Predictor
+from toolpath_stiff.updating.measurements import Measurements
+from toolpath_stiff.updating.planning.visits import Visits
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -11,13 +11,20 @@ import numpy as np
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.inference.baseline import AS_GIVEN, LAW_REFITTED, Baseline, error_figures
+from toolpath_stiff.updating.inference import NONE, Judgement
 from toolpath_stiff.updating.inference.candidates import Component
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
-from toolpath_stiff.updating.inference.fit import Fit, fit_effects, refine
-from toolpath_stiff.updating.inference.ranking import score_family
-from toolpath_stiff.updating.inference.verdict import NONE, Judgement
-from toolpath_stiff.updating.planning.plan_rivals import Rival
+from toolpath_stiff.updating.inference.fits import (
+    AS_GIVEN,
+    LAW_REFITTED,
+    Baseline,
+    Fit,
+    error_figures,
+    fit_effects,
+    refine,
+)
+from toolpath_stiff.updating.inference.hypotheses import score_family
+from toolpath_stiff.updating.planning.rivals import Rival
 
 LEAST_WEIGHT = 0.02  # probability below which an explanation is no rival
 UNKNOWN_SIZE = 0.5  # relative sd of a size that nothing has been measured of; assumed

@@ -23,7 +23,7 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.units import RAD_PER_DEG
-from toolpath_stiff.updating.readings.measurements import Measurements
+from toolpath_stiff.updating.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

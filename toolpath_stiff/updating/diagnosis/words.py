@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
-from toolpath_stiff.updating.inference.baseline import errors_text
-from toolpath_stiff.updating.inference.confounding import CONFOUNDED
-from toolpath_stiff.updating.inference.verdict import FALSE_ALARM, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.updating.diagnosis import Diagnosis
+from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.updating.inference.fits import errors_text
+from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:

@@ -13,13 +13,18 @@ from numpy.typing import NDArray
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
-from toolpath_stiff.updating.comparison.residual_variables import directions
-from toolpath_stiff.updating.diagnosis.diagnosis_document import interval, json_number, rounded_errors
-from toolpath_stiff.updating.inference.baseline import LAW_REFITTED, deviation_percent, errors_text
-from toolpath_stiff.updating.inference.fit import NORMAL_95, Fit
-from toolpath_stiff.updating.inference.held_out import gain_in_standard_errors
-from toolpath_stiff.updating.inference.predict import scaled_law
-from toolpath_stiff.updating.update.update import NEEDED, Step, Support, Update
+from toolpath_stiff.updating.comparison.residuals import directions
+from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
+from toolpath_stiff.updating.diagnosis.document import interval, json_number, rounded_errors
+from toolpath_stiff.updating.inference.fits import (
+    LAW_REFITTED,
+    NORMAL_95,
+    Fit,
+    deviation_percent,
+    errors_text,
+    gain_in_standard_errors,
+)
+from toolpath_stiff.updating.inference.prediction import scaled_law
 
 FloatArray = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_um, n_per_mm_from_n_per_m, um_from_m
-from toolpath_stiff.updating.readings.measurement_rows import (
+from toolpath_stiff.updating.rows import (
     ANGLES,
     LABELS,
     POSITION,

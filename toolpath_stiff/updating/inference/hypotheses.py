@@ -1,0 +1,445 @@
+"""All candidates against the data: searched, grouped by effect, weighed against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
+from toolpath_stiff.updating.inference.candidates import Table, candidates_of, tabulate
+from toolpath_stiff.updating.inference.evidence import Problem, Score
+from toolpath_stiff.updating.inference.gates import Structure, set_wild_aside
+
+FloatArray = NDArray[np.float64]
+
+NOTHING = -1e9  # log evidence of what cannot be
+
+
+@dataclass(frozen=True)
+class Family:
+    """One effect with everything that it may act on.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    tables
+        One a choice that does something to these data.
+    best
+        The best fit whose sizes lie within their bounds; None if every fit ends at nothing.
+    log_evidence
+        Averaged over choices and subsets of components: a choice of six costs ln 6.
+    subsets
+        Fits of the choice of `best` with each subset of components that is possible, and their log prior weights.
+    """
+
+    effect: Effect
+    tables: tuple[Table, ...]
+    best: Score | None
+    log_evidence: float
+    subsets: tuple[tuple[Score, float], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+
+def score_family(problem: Problem, effect: Effect, base: Score) -> Family | None:
+    """Search one effect; None if it does nothing to these data."""
+    data = problem.predictor.data
+    tables, evidences = [], []
+    best: Score | None = None
+    subsets: tuple[tuple[Score, float], ...] = ()
+    for candidate in candidates_of(effect, data):
+        table = tabulate(candidate, problem.predictor, np.zeros(2))
+        if table is None:
+            continue
+        tables.append(table)
+        scores = _scores(problem, table, base)
+        for score, log_weight in scores:
+            evidences.append(score.log_evidence + log_weight)
+            if score.possible and (best is None or score.log_evidence > best.log_evidence):
+                best = score
+        if best is not None and best.tables[0] is table:
+            subsets = tuple((score, log_weight) for score, log_weight in scores if score.possible)
+    if not tables:
+        return None
+    total = float(np.logaddexp.reduce(evidences)) - np.log(len(tables)) if evidences else NOTHING
+    return Family(effect, tuple(tables), best, total, subsets)
+
+
+def _scores(problem: Problem, table: Table, base: Score) -> list[tuple[Score, float]]:
+    """Fits of one candidate with the log prior weight of each subset of components."""
+    if table.knots:
+        return [(problem.score_single(table, base), 0.0)]
+    subsets = list(table.candidate.subsets())
+    found = ((problem.score_subset([table], free, base), -float(np.log(len(subsets)))) for free in subsets)
+    return [(score, weight) for score, weight in found if score is not None]
+
+
+def score_families(
+    problem: Problem, effects: Iterable[Effect], base: Score, progress: Callable[[str], None] | None = None
+) -> list[Family]:
+    """All effects that do something to these data, the most likely first."""
+    found = []
+    for effect in effects:
+        if progress is not None:
+            progress(effect.name)
+        family = score_family(problem, effect, base)
+        if family is not None:
+            found.append(family)
+    return sorted(found, key=lambda family: (-family.log_evidence, family.name))
+
+
+def signatures(problem: Problem, families: Sequence[Family]) -> list[list[FloatArray]]:
+    """One-sided small-size signatures d ln k / d size of every candidate: subsets of columns (n, p), sizes >= 0."""
+    found = []
+    for family in families:
+        for table in family.tables:
+            columns = -table.columns / problem.base_compliance[:, None]
+            components = table.candidate.components
+            if len(components) == 1:
+                found.append([columns * sign for sign in components[0].signs])
+            else:
+                toward = np.array([c.signs[-1] for c in components])
+                found.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
+    return found
+
+
+def probabilities(log_evidence: Mapping[str, float], prior: Mapping[str, float]) -> dict[str, float]:
+    """Posterior of hypotheses from log evidences and prior weights (which need not sum to 1); none if all are out."""
+    names = [name for name in log_evidence if prior.get(name, 0.0) > 0.0]
+    logs = np.array([log_evidence[name] + np.log(prior[name]) for name in names])
+    if not names or logs.max() <= 0.5 * NOTHING:
+        return dict.fromkeys(log_evidence, 0.0)
+    weights = np.exp(logs - logs.max())
+    found = dict(zip(names, (weights / weights.sum()).tolist(), strict=True))
+    return {name: found.get(name, 0.0) for name in log_evidence}
+
+
+# -- intervals over subsets --------------------------------------------------------------------------------------------
+#
+# Intervals of sizes that do not take the choice of an effect's components for granted.
+#
+# Which components of an effect are at zero is itself uncertain: a table that gives way along X, Y and Z may fit as well
+# as one along X and Z that rocks, with sizes far apart. An interval from the likeliest subset alone holds the truth in
+# eight cases of ten. Averaged over the subsets by their posterior probabilities (Hoeting, Madigan, Raftery and Volinsky
+# 1999, Bayesian model averaging, Statistical Science 14, 382) it says what is known.
+
+SHARE = 0.95
+HALVINGS = 60  # of the bracket about a quantile
+
+
+def averaged_interval(family: Family, j: int) -> FloatArray | None:
+    """(2,) 95 % interval of the size of component `j`, over the subsets of components of the best choice.
+
+    Normal within the bounds where a subset holds the component, 0 where it does not. None where the effect has no
+    subsets.
+    """
+    if family.best is None or len(family.subsets) < 2:
+        return None
+    logs = np.array([score.log_evidence + weight for score, weight in family.subsets])
+    shares = np.exp(logs - logs.max())
+    shares /= shares.sum()
+    low, high = family.best.candidates[0].components[j].bounds
+    parts, absent = [], 0.0
+    for (score, _), share in zip(family.subsets, shares, strict=True):
+        if j in score.free:
+            at = 2 + score.free.index(j)
+            sd = float(np.sqrt(max(score.covariance[at, at], 1e-300)))
+            parts.append((float(share), float(score.sizes[0][j]), sd))
+        else:
+            absent += float(share)
+    if not parts:
+        return np.zeros(2)
+    far = max(abs(size) + 8.0 * sd for _, size, sd in parts)
+    bracket = (max(low, -far), min(high, far))
+    tail = 0.5 * (1.0 - SHARE)
+    return np.array([_quantile(parts, absent, bracket, share) for share in (tail, 1.0 - tail)])
+
+
+def _quantile(
+    parts: list[tuple[float, float, float]], absent: float, bracket: tuple[float, float], share: float
+) -> float:
+    """Size up to which the mixture of cut-off normals (share, mean, sd) and of zero holds `share`."""
+    from scipy.special import ndtr
+
+    def below(size: float) -> float:
+        total = absent if size >= 0.0 else 0.0
+        for part, mean, sd in parts:
+            first, last, here = ((x - mean) / sd for x in (*bracket, size))
+            total += part * float((ndtr(here) - ndtr(first)) / max(ndtr(last) - ndtr(first), 1e-300))
+        return total
+
+    low, high = bracket
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if below(middle) < share else (low, middle)
+    return 0.0 if abs(high) <= 1e-12 * (bracket[1] - bracket[0]) else high
+
+
+# -- two effects at once -----------------------------------------------------------------------------------------------
+#
+# Two effects at once, and the alternative to every explanation: something that no effect of the catalogue describes.
+#
+# Pairs are tried only where no single effect will do: from each of the best singles, the partners that would gain most.
+# With some hundred pairs to choose from one of them fits many a strange machine tolerably, so that pairs compete with
+# the forms of discrepancy: only if the catalogue's physics explains more than a smooth unknown does it get the name.
+
+STARTS = 5  # singles from which pairs are built
+PARTNERS = 6  # partners tried for each
+AMPLITUDES = np.geomspace(0.003, 0.3, 9)  # rms of a discrepancy of ln k; as wide as the effects' own prior
+FORMS = 5  # forms of discrepancy that are weighed, those that stick out most
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two effects together."""
+
+    names: tuple[str, str]
+    score: Score
+    log_evidence: float
+
+    @property
+    def name(self) -> str:
+        """Both effects: "a + b"."""
+        return " + ".join(self.names)
+
+
+def score_pairs(problem: Problem, families: Sequence[Family], starts: Sequence[Family]) -> list[Pair]:
+    """The pairs worth looking at that hold one of the first of `starts`, the most likely first; each pair once."""
+    best: dict[tuple[str, str], Pair] = {}
+    tables = [(family.name, table) for family in families for table in family.tables]
+    for first in [family for family in starts if family.best is not None][:STARTS]:
+        assert first.best is not None
+        projected = problem.projected(first.best.jacobian)
+        pulls, _ = set_wild_aside((first.best.residual @ projected)[None], projected)
+        partners = [(name, table) for name, table in tables if name != first.name]
+        gains = [_gain(table, pulls[0], projected, problem) for _, table in partners]
+        for index in np.argsort(gains)[::-1][:PARTNERS]:
+            name, table = partners[int(index)]
+            found = _together(problem, first.best, _beside(problem, first.best, table))
+            if found is None:
+                continue
+            key = (first.name, name) if first.name < name else (name, first.name)
+            choices = len(first.tables) * sum(1 for other, _ in tables if other == name)
+            evidence = found.log_evidence - np.log(choices)
+            if key not in best or evidence > best[key].log_evidence:
+                best[key] = Pair(key, found, float(evidence))
+    return sorted(best.values(), key=lambda pair: (-pair.log_evidence, pair.names))
+
+
+def _beside(problem: Problem, first: Score, table: Table) -> Table:
+    """The partner's table where the first effect is at work already, if one of the two is an instrument.
+
+    An instrument's factor acts on the whole compliance, the partner's included; mechanical effects add up as they are.
+    """
+    owner = first.candidates[0]
+    if not (owner.effect.is_instrument or table.candidate.effect.is_instrument):
+        return table
+    beside = [owner.active(first.sizes[0])]
+    return tabulate(table.candidate, problem.predictor, first.law, beside) or table
+
+
+def _gain(table: Table, pulls: FloatArray, projected: FloatArray, problem: Problem) -> float:
+    """Largest linear gain of a partner's components, signs respected one by one."""
+    columns = -table.columns / problem.base_compliance[:, None]
+    slopes = columns.T @ pulls
+    information = np.einsum("np,nm,mp->p", columns, projected, columns)
+    gains = []
+    for slope, own, component in zip(slopes, information, table.candidate.components, strict=True):
+        if own > 0.0 and np.sign(slope) in component.signs:
+            gains.append(slope**2 / own)
+    return float(sum(gains))
+
+
+def _together(problem: Problem, first: Score, table: Table) -> Score | None:
+    """The first effect's components refitted along with each subset of the partner's; the best."""
+    count = len(first.sizes[0])
+    found: Score | None = None
+    subsets = list(table.candidate.subsets())
+    for subset in subsets:
+        free = (*first.free, *(count + j for j in subset))
+        score = problem.score_subset([first.tables[0], table], free, first)
+        if score is None or not score.possible:
+            continue
+        weighted = score.log_evidence - np.log(len(subsets)) - np.log(max(len(list(first.candidates[0].subsets())), 1))
+        if found is None or weighted > found.log_evidence:
+            found = _replace_evidence(score, float(weighted))
+    return found
+
+
+def _replace_evidence(score: Score, log_evidence: float) -> Score:
+    from dataclasses import replace
+
+    return replace(score, log_evidence=log_evidence)
+
+
+def discrepancy_evidence(problem: Problem, score: Score, forms: Mapping[str, FloatArray]) -> tuple[float, str]:
+    """Log evidence of a fit plus a discrepancy of unknown form and amplitude, and the likeliest form.
+
+    The gain over the fit alone is, for one form K and amplitude t, with P the projected inverse covariance and z = P r,
+
+        -1/2 ln |1 + t^2 L^T P L| + 1/2 z^T L t^2 (1 + t^2 L^T P L)^-1 L^T z,      K = L L^T,
+
+    averaged over amplitudes and forms.
+    """
+    projected = problem.projected(score.jacobian)
+    pulls, _ = set_wild_aside((score.residual @ projected)[None], projected)
+    surprises = Structure(dict(forms), projected).surprises(pulls)[0]
+    gains, names = [], list(forms)
+    order = np.argsort(surprises)[::-1][:FORMS]
+    for index in order:
+        values, vectors = np.linalg.eigh(forms[names[int(index)]])
+        kept = values > 1e-9 * values[-1]
+        root = vectors[:, kept] * np.sqrt(values[kept])
+        own, turn = np.linalg.eigh(root.T @ projected @ root)
+        own = np.maximum(own, 0.0)
+        loads = (turn.T @ (root.T @ pulls[0])) ** 2
+        squared = AMPLITUDES[:, None] ** 2
+        each = -0.5 * np.log1p(squared * own).sum(axis=1) + 0.5 * (squared * loads / (1.0 + squared * own)).sum(axis=1)
+        gains.append(float(np.logaddexp.reduce(each)) - np.log(len(AMPLITUDES)))
+    if not gains:
+        return score.log_evidence, ""
+    likeliest = names[int(order[int(np.argmax(gains))])]
+    return score.log_evidence + float(np.logaddexp.reduce(gains)) - np.log(len(forms)), likeliest
+
+
+# -- what these data cannot tell ---------------------------------------------------------------------------------------
+#
+# What a design of measurements can and cannot tell: confounded effects, smallest sizes that would have been seen.
+#
+# Both from the effects' small-size signatures, whitened with the noise and projected beside the strut law, whose
+# constants are refitted along with everything.
+
+CONFOUNDED = 0.95  # canonical correlation above which two effects cannot be told apart by these data
+POWER_80 = 0.8416  # normal quantile of 80 % power
+
+
+@dataclass(frozen=True)
+class Confounding:
+    """Largest canonical correlation of any two effects' signatures.
+
+    Attributes
+    ----------
+    names
+        Effects, ordered so that those of one set stand together.
+    matrix
+        (m, m) from 0 to 1.
+    sets
+        Sets of two and more effects, linked by correlations above `CONFOUNDED`.
+    """
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+    sets: tuple[tuple[str, ...], ...]
+
+
+def confounding(problem: Problem, families: Sequence[Family]) -> Confounding:
+    """The confounding of effects on these data; for an effect with choices, that of its worst choice."""
+    values, vectors = np.linalg.eigh(problem.sight.projected)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    names = sorted(family.name for family in families)
+    bases: dict[str, list[FloatArray]] = {}
+    for family in families:
+        bases[family.name] = []
+        for table in family.tables:
+            columns = root.T @ (table.columns / problem.base_compliance[:, None])
+            lengths = np.linalg.norm(columns, axis=0)
+            if lengths.max() > 0.0:
+                kept = columns[:, lengths > 1e-9 * lengths.max()] / lengths[lengths > 1e-9 * lengths.max()]
+                bases[family.name].append(np.linalg.qr(kept)[0])
+    matrix = np.eye(len(names))
+    for i, first in enumerate(names):
+        for j, second in enumerate(names[:i]):
+            matrix[i, j] = matrix[j, i] = max(
+                (float(np.linalg.norm(a.T @ b, 2)) for a in bases[first] for b in bases[second]), default=0.0
+            )
+    matrix = np.clip(matrix, 0.0, 1.0)
+    sets = _linked(matrix > CONFOUNDED)
+    # Sets first, each as a block; then the rest, every one next to what it resembles most.
+    order = [i for group in sorted(sets, key=lambda group: (-len(group), group)) for i in group]
+    return Confounding(
+        tuple(names[i] for i in order),
+        matrix[np.ix_(order, order)],
+        tuple(tuple(names[i] for i in group) for group in sets if len(group) > 1),
+    )
+
+
+def _linked(close: NDArray[np.bool_]) -> list[list[int]]:
+    """Connected components of a symmetric relation."""
+    left, groups = set(range(len(close))), []
+    while left:
+        group, edge = set(), {min(left)}
+        while edge:
+            group |= edge
+            edge = {j for i in edge for j in np.flatnonzero(close[i]).tolist()} - group
+        groups.append(sorted(group))
+        left -= group
+    return groups
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """Smallest size of one parameter that these data would have shown.
+
+    Attributes
+    ----------
+    effect, parameter
+        Which.
+    value
+        SI value of the parameter at that size; nan if no size shows.
+    rms
+        Rms change of ln stiffness that it makes; the largest possible one if no size shows.
+    seen
+        Whether any size within the bounds would have been seen.
+    """
+
+    effect: str
+    parameter: Parameter
+    value: float
+    rms: float
+    seen: bool
+
+
+def detectable_sizes(problem: Problem, families: Sequence[Family], gain_threshold: float) -> list[Detectable]:
+    """Per parameter, the size seen with 80 % power at the threshold that the best of all candidates must pass.
+
+    Of an effect with choices the choice that is hardest to see counts. Only the parameter itself differs from neutral.
+    """
+    wanted = np.sqrt(gain_threshold) + POWER_80
+    found = []
+    for family in sorted(families, key=lambda family: family.name):
+        for j, component in enumerate(family.tables[0].candidate.components):
+            worst: Detectable | None = None
+            for table in family.tables:
+                for sign in component.signs:
+                    if table.knots and sign not in table.knots:
+                        continue
+                    one = _smallest(problem, table, j, sign, float(wanted))
+                    # Hardest to see: not at all, else by the largest change.
+                    if worst is None or (one.seen, -one.rms) < (worst.seen, -worst.rms):
+                        worst = one
+            if worst is not None:
+                found.append(worst)
+    return found
+
+
+def _smallest(problem: Problem, table: Table, j: int, sign: float, wanted: float) -> Detectable:
+    component = table.candidate.components[j]
+    prior = problem.prior(table, j)
+    sizes = np.zeros((len(prior.log_sizes[sign]), len(table.candidate.components)))
+    sizes[:, j] = sign * np.exp(prior.log_sizes[sign])
+    change = problem.sight.change(table.delta(sizes))
+    lengths = np.maximum.accumulate(problem.sight.length(change))
+    rms = np.sqrt(np.mean(change**2, axis=1))
+    name, parameter = table.candidate.name, component.parameter
+    if lengths[-1] < wanted:
+        return Detectable(name, parameter, float("nan"), float(rms[-1]), seen=False)
+    log_size = float(np.interp(wanted, lengths, prior.log_sizes[sign]))
+    at = float(np.interp(log_size, prior.log_sizes[sign], rms))
+    return Detectable(name, parameter, component.value(sign * float(np.exp(log_size))), at, seen=True)

@@ -1,0 +1,294 @@
+"""A plan in figures and sentences."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.updating.planning import MOST_REPEATS, Plan, matters
+from toolpath_stiff.updating.planning.rivals import SETTLED, ReadingNoise, forecast_all, pair_shares
+from toolpath_stiff.updating.planning.visits import (
+    AXES,
+    READING_EVERY,
+    ROUND,
+    VECTORS,
+    Menu,
+    Visits,
+    planned_readings,
+    reachable,
+)
+
+
+def plan_document(plan: Plan) -> dict[str, Any]:
+    """The plan as the content of plan.json."""
+    return {
+        "rivals": [{"name": rival.name, "probability": rival.weight} for rival in plan.rivals],
+        "poses": len(plan.chosen),
+        "readings": int(plan.visits.counts[list(plan.chosen)].sum()),
+        "minutes": plan.minutes,
+        "expected": {
+            "probability_of_truth_before": plan.before.truth,
+            "probability_of_truth_after": plan.after.truth,
+            "settled_before": plan.before.settled,
+            "settled_after": plan.after.settled,
+            "settled_at": SETTLED,
+            "poses_to_settle": plan.enough,
+            "repeats_to_settle": plan.repeats,
+        },
+        "pairs": [
+            {
+                "effects": [pair.first, pair.second],
+                "gap_sigma": pair.gap,
+                "best_single_pose_sigma": pair.best_visit_gap,
+                "separable": pair.separable,
+                "indicator_across": pair.indicators,
+            }
+            for pair in plan.pairs
+        ],
+        "text": plan_text(plan),
+        "notes": list(plan.notes),
+    }
+
+
+def _percent(share: float) -> str:
+    """Never "100 %" for what is only expected."""
+    return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
+
+
+def plan_text(plan: Plan) -> list[str]:
+    """What the plan promises, in sentences."""
+    count = len(plan.chosen)
+    lines = [
+        f"{count} pose{'s' if count > 1 else ''}, about {plan.minutes:.0f} minutes: the probability of the right "
+        f"explanation is expected to rise from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}, "
+        f"and the verdict to be settled in {_percent(plan.after.settled)} of cases"
+    ]
+    if plan.enough is not None and plan.enough < count:
+        lines.append(f"{plan.enough} of the poses should do for {100 * SETTLED:.0f} %; the others are in reserve")
+    elif plan.repeats is None:
+        lines.append(f"{100 * SETTLED:.0f} % is not expected from repeats of these poses, up to {MOST_REPEATS} of them")
+    elif plan.repeats > 1:
+        lines.append(f"{100 * SETTLED:.0f} % is expected after {plan.repeats} repeats of each, clamped anew")
+    for pair in plan.pairs:
+        if not pair.separable:
+            lines.append(
+                f"tip stiffness cannot tell {pair.first} from {pair.second} ({pair.gap:.1f} sigma after all poses); "
+                f"put an indicator across the link: "
+                + "; or ".join(f"{link}: {place}" for link, place in pair.indicators.items())
+            )
+    return lines
+
+
+# -- rows --------------------------------------------------------------------------------------------------------------
+#
+# Plans as measurement files: one row a reading, the stiffness left empty.
+
+POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+VECTOR = ("dx", "dy", "dz")
+
+
+def plan_rows(
+    visits: Visits, chosen: Sequence[int], taken: Iterable[str] = (), repeats: Sequence[int] = ()
+) -> list[dict[str, Any]]:
+    """Rows of a measurement file in shop units, in measuring order.
+
+    Parameters
+    ----------
+    visits, chosen
+        The visits in measuring order; each is one clamping.
+    taken
+        Names of points that new points must not bear.
+    repeats
+        Which repeat of its place each visit is, where places are clamped several times; else the rounds of a visit.
+    """
+    names = _point_names(visits, chosen, set(taken))
+    timed = not np.isnan(visits.readings.time).any()
+    axes_only = all(visits.names[row] in AXES for visit in chosen for row in visits.rows(visit))
+    found = []
+    for clamp, visit in enumerate(chosen, 1):
+        for row in visits.rows(visit):
+            pose = [*mm_from_m(visits.pose[visit, :3]), *deg_from_rad(visits.pose[visit, 3:])]
+            entry: dict[str, Any] = dict(zip(POSE, (_round(value) for value in pose), strict=True))
+            name = str(visits.names[row])
+            if axes_only:
+                entry["direction"] = name
+            else:
+                entry |= zip(VECTOR, _whole(name), strict=True)
+            entry["stiffness_N_per_mm"] = ""
+            entry["force_N"] = _round(visits.readings.force[row])
+            entry["setup"] = str(visits.setup[visit])
+            entry["clamp"] = clamp
+            entry["repeat"] = repeats[clamp - 1] if len(repeats) else int(visits.rounds[row])
+            entry["point"] = names[clamp - 1]
+            if timed:
+                entry["time_min"] = _round(visits.readings.time[row] / 60.0)
+            entry["tool_extension_mm"] = _round(mm_from_m(visits.extension[visit]))
+            found.append(entry)
+    if not (visits.setup[list(chosen)] != "").any():
+        for entry in found:
+            del entry["setup"]
+    return found
+
+
+def _point_names(visits: Visits, chosen: Sequence[int], taken: set[str]) -> list[str]:
+    """The name that a pose had before, or a new one; one name a pose."""
+    known: dict[tuple[float, ...], str] = {}
+    number, names = 0, []
+    for visit in chosen:
+        pose = tuple(visits.pose[visit].tolist())
+        if pose not in known:
+            name = str(visits.label[visit])
+            while not name or (not visits.label[visit] and name in taken):
+                number += 1
+                name = f"plan {number}"
+            known[pose] = name
+        names.append(known[pose])
+    return names
+
+
+def _round(value: float) -> float:
+    """To ten digits after the unit's point at most: 0.30000000000000004 is 0.3 to whoever keys it in."""
+    return round(float(value), 6) + 0.0
+
+
+def _whole(name: str) -> list[int]:
+    """A direction in whole numbers: files allow vectors of any length."""
+    return [int(component != 0.0) for component in VECTORS[name]]
+
+
+def plan_csv(rows: Sequence[dict[str, Any]]) -> str:
+    """The rows as CSV."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(rows[0])
+    for row in rows:
+        writer.writerow([value if isinstance(value, str) else f"{value:.10g}" for value in row.values()])
+    return stream.getvalue()
+
+
+# -- map ---------------------------------------------------------------------------------------------------------------
+#
+# How far two rivals would be apart at each place of the workspace: one visit there, X, Y and Z.
+
+FloatArray = NDArray[np.float64]
+
+ACROSS = 11  # points of the grid a side
+TILTS = 6  # directions of tilt
+MOST_LEVELS = 8  # heights with a panel of their own; more are put together, neighbours with neighbours
+
+
+@dataclass(frozen=True)
+class GapMap:
+    """Gap in standard deviations of one visit, reference tool, the best of the set-ups.
+
+    Attributes
+    ----------
+    pair
+        Names of the two rivals.
+    x, y, levels
+        (g,) m, (g,) m, (h,) m, the middle of each of `height_groups`.
+    vertical, tilted
+        (h, g, g) with y before x; with the spindle vertical, and tilted as far as planned in the best of six
+        directions; nan where the machine does not reach.
+    max_tilt
+        rad.
+    """
+
+    pair: tuple[str, str]
+    x: FloatArray
+    y: FloatArray
+    levels: FloatArray
+    vertical: FloatArray
+    tilted: FloatArray
+    max_tilt: float
+
+
+def top_pair(plan: Plan) -> tuple[str, str]:
+    """The two most probable rivals that can be told apart; if none can, the two most probable."""
+    weights = {rival.name: rival.weight for rival in plan.rivals}
+    best = max(plan.pairs, key=lambda pair: (pair.separable, weights[pair.first] * weights[pair.second]))
+    return best.first, best.second
+
+
+def height_groups(z: FloatArray) -> list[FloatArray]:
+    """Heights (n,) m in groups, rising: each height its own, or `MOST_LEVELS` groups of neighbours."""
+    heights = np.unique(np.round(z, 4))
+    return list(np.array_split(heights, min(len(heights), MOST_LEVELS)))
+
+
+def group_of(z: FloatArray, groups: Sequence[FloatArray]) -> NDArray[np.int64]:
+    """(n,) the group that holds each height."""
+    lowest = np.array([group[0] for group in groups])
+    return np.asarray(np.searchsorted(lowest, np.round(z, 4), side="right") - 1, dtype=np.int64)
+
+
+def levels_of(plan: Plan) -> FloatArray:
+    """(h,) m: the middle height of each group that the plan visits, rising."""
+    return np.array([group[len(group) // 2] for group in height_groups(plan.visits.pose[list(plan.chosen), 2])])
+
+
+def gap_map(machine: Machine, plan: Plan, menu: Menu, effect_files: Sequence[str | Path] = ()) -> GapMap:
+    """Gaps of the plan's top pair over the menu's radius at the heights that the plan visits most."""
+    names = top_pair(plan)
+    rivals = [next(rival for rival in plan.rivals if rival.name == name) for name in names]
+    side = np.linspace(-menu.radius, menu.radius, ACROSS)
+    levels = levels_of(plan)
+    turns = np.linspace(0.0, 2.0 * np.pi, TILTS, endpoint=False)
+    tilts = np.stack([menu.max_tilt * np.cos(turns), menu.max_tilt * np.sin(turns)], axis=1)
+    angles = np.concatenate([np.zeros((1, 2)), tilts])
+    poses = np.array([[x, y, z, a, b, 0.0] for a, b in angles for z, y, x in product(levels, side, side)])
+    good = np.flatnonzero(reachable(machine, poses, 0.0, margin=0.0))
+    found = matters(rivals)
+    setups = menu.setups if found.setup else menu.setups[:1]
+    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads)))) if found.load else (menu.usual_load,)
+    gaps = np.full((len(setups), len(poses)), np.nan)
+    if len(good):
+        visits = _visits(poses[good], setups, loads, menu)
+        forecasts, answered, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
+        share = pair_shares(visits, forecasts[0], forecasts[1], ReadingNoise(*plan.noise, scatter))
+        usable = np.logical_and.reduceat(answered, visits.starts)
+        gaps[:, good] = np.where(usable, share.gaps_with(()), np.nan).reshape(len(setups), -1)
+    for k, setup in enumerate(setups):
+        gaps[k, poses[:, 2] < menu.floors.get(setup, -np.inf) - ROUND] = np.nan
+    best = np.fmax.reduce(gaps, axis=0).reshape(len(angles), len(levels), ACROSS, ACROSS)
+    return GapMap(names, side, side, levels, best[0], np.fmax.reduce(best[1:], axis=0), menu.max_tilt)
+
+
+def _visits(poses: FloatArray, setups: Sequence[str], loads: Sequence[float], menu: Menu) -> Visits:
+    """One visit to each pose in each set-up."""
+    jobs = list(product(AXES, loads))
+    count, v = len(jobs), len(poses) * len(setups)
+    pose, setup = np.tile(poses, (len(setups), 1)), np.repeat(np.array(setups, dtype=str), len(poses))
+    names = np.tile([name for name, _ in jobs], v)
+    time = max(menu.waits) + READING_EVERY * np.arange(1.0, count + 1.0)
+    readings = planned_readings(
+        np.repeat(pose, count, axis=0),
+        names,
+        np.tile([load for _, load in jobs], v),
+        np.zeros(v * count),
+        np.repeat(setup, count),
+        np.tile(time if menu.timed else np.full(count, np.nan), v),
+    )
+    members = np.arange(v * count)
+    return Visits(
+        pose,
+        np.zeros(v),
+        np.zeros(v),
+        setup,
+        np.full(v, ""),
+        readings,
+        names,
+        np.ones(v * count, dtype=np.int64),
+        members,
+        members[::count].copy(),
+    )

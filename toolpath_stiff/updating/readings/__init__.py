@@ -1,1 +1,0 @@
-"""Measured stiffnesses: files, rows, raw records of force and displacement."""
