@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.cut_classes import along_tool_axis
-from toolpath_stiff.analysis.path_analysis import Analysis
+from toolpath_stiff.analysis.loads import along_tool_axis
+from toolpath_stiff.analysis.statistics import EvaluatedPath
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
 from toolpath_stiff.path.samples import Samples
 from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
@@ -31,19 +31,19 @@ COLUMNS: dict[str, int | None] = {
 }
 
 
-def sample_columns(analysis: Analysis, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
     """Column name -> values in the shop's units, for some rows."""
-    at = analysis.at
+    at = path.at
     names = np.array([limit.name for limit in at.limits] or ["none"])
     return {
-        **path_columns(analysis.samples, rows),
+        **path_columns(path.samples, rows),
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(at.stiffness[rows]),
-        "deflection_um": um_from_m(analysis.force / at.stiffness[rows]),
+        "deflection_um": um_from_m(path.force / at.stiffness[rows]),
         **{f"strut{i + 1}_mm": mm_from_m(at.strut_lengths[rows, i]) for i in range(6)},
         "margin": at.margin[rows],
         "margin_limit": names[at.limit[rows]],
-        "operation": analysis.operations.of_move[analysis.samples.move[rows]] + 1,
-        "cut": _cut(analysis.samples.take(rows)),
+        "operation": path.operations.of_move[path.samples.move[rows]] + 1,
+        "cut": _cut(path.samples.take(rows)),
     }
 
 
@@ -53,18 +53,18 @@ def _cut(samples: Samples) -> NDArray[np.str_]:
     return np.where(moving, np.where(along_tool_axis(samples.tangent, samples.abc), "plunge", "across"), "")
 
 
-def samples_frame(analysis: Analysis) -> pd.DataFrame:
+def samples_frame(path: EvaluatedPath) -> pd.DataFrame:
     """The samples as a DataFrame, full precision."""
     import pandas as pd
 
-    return pd.DataFrame(sample_columns(analysis))
+    return pd.DataFrame(sample_columns(path))
 
 
-def samples_csv(analysis: Analysis) -> Iterator[bytes]:
+def samples_csv(path: EvaluatedPath) -> Iterator[bytes]:
     """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
-    return csv_pieces(partial(sample_columns, analysis), len(analysis.samples), COLUMNS)
+    return csv_pieces(partial(sample_columns, path), len(path.samples), COLUMNS)
 
 
-def samples_parquet(analysis: Analysis) -> Iterator[bytes]:
+def samples_parquet(path: EvaluatedPath) -> Iterator[bytes]:
     """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
-    return parquet_pieces(partial(sample_columns, analysis), len(analysis.samples))
+    return parquet_pieces(partial(sample_columns, path), len(path.samples))

@@ -65,7 +65,7 @@ def write_analysis(
 
 def summary_with_options(analysis: Analysis, required: float | None, other: Analysis | None) -> dict[str, Any]:
     """`analysis.summary()`, with `required` and `compare` where these were asked for; no nan, no infinity."""
-    from toolpath_stiff.analysis.path_analysis import required_stiffness_missed
+    from toolpath_stiff.analysis.results import required_stiffness_missed
 
     summary = dict(analysis.summary())
     if required is not None:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.stiffness.effects.registry import known_effects
 from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.baseline import Baseline
 from toolpath_stiff.updating.inference.confounding import Confounding, Detectable, confounding, detectable_sizes

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.stiffness.acting import setup_of
 from toolpath_stiff.stiffness.effects.contract import Conditions
-from toolpath_stiff.stiffness.model import build_model
+from toolpath_stiff.stiffness.model import build_model, setup_of
 from toolpath_stiff.updating.diagnosis.diagnose import Diagnosis
 from toolpath_stiff.updating.inference.predict import scaled_law
 from toolpath_stiff.updating.inference.verdict import NONE

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
-from toolpath_stiff.stiffness.effects.registry import find_effect
 from toolpath_stiff.updating.inference.candidates import Candidate, Component, candidates_of
 from toolpath_stiff.updating.readings.measurements import Measurements
 

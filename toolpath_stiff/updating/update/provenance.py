@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.files import read_bytes
-from toolpath_stiff.machine.model import EffectEntry, Machine
-from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty
+from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Machine, Uncertainty
 from toolpath_stiff.stiffness.effects.contract import SETUP
 from toolpath_stiff.tables import split_name
 from toolpath_stiff.updating.inference.fit import Fit

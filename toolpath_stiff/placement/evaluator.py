@@ -12,12 +12,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load, load_directions
+from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.machine.kinematics import neutral_axes, solve_struts, solve_struts_at
 from toolpath_stiff.machine.limits import machine_limits, reach
 from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.placement.work_path import WorkPath
+from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
