@@ -21,10 +21,10 @@ from toolpath_stiff.analysis.statistics import (
     path_length,
     per_operation,
     per_tool,
+    samples_frame,
     share,
     weakest_places,
 )
-from toolpath_stiff.analysis.tables import samples_frame
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program

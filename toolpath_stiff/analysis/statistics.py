@@ -1,4 +1,4 @@
-"""Figures of a path: length-weighted mean, extremes, the weakest places, shares; tool by tool, operation by operation.
+"""Figures and tables of a path: length-weighted mean, extremes, the weakest places, tool by tool; sample by sample.
 
 How far the uncertainty of a machine's fitted parameters reaches into them is a linear propagation (JCGM 100:2008,
 Guide to the expression of uncertainty in measurement, equation 13): the covariance of the parameters between two
@@ -8,27 +8,44 @@ slopes of the stiffness, which are differences of whole evaluations.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.loads import Load, headline_of, headline_words, plunging_rows
+from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_of, headline_words, plunging_rows
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
+from toolpath_stiff.column_files import csv_pieces, parquet_pieces
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.moves import RAPID, Program
 from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
 from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
+# Of `samples.csv`, Parquet and the DataFrame, with their decimals.
+COLUMNS: dict[str, int | None] = {
+    **PATH_COLUMNS,
+    "stiffness_N_per_mm": 4,
+    "deflection_um": 6,
+    **{f"strut{i}_mm": 6 for i in range(1, 7)},
+    "margin": 6,
+    "margin_limit": None,
+    "operation": None,
+    "cut": None,
+}
 
 STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
 NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
@@ -384,3 +401,42 @@ def band_figures(path: EvaluatedPath, band: ParameterBand) -> dict[str, Any] | N
 
 def _interval(value: float, sd: float) -> list[float]:
     return [n_per_mm_from_n_per_m(value + sign * NORMAL_95 * sd) for sign in (-1.0, 1.0)]
+
+
+def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+    """Column name -> values in the shop's units, for some rows."""
+    at = path.at
+    names = np.array([limit.name for limit in at.limits] or ["none"])
+    return {
+        **path_columns(path.samples, rows),
+        "stiffness_N_per_mm": n_per_mm_from_n_per_m(at.stiffness[rows]),
+        "deflection_um": um_from_m(path.force / at.stiffness[rows]),
+        **{f"strut{i + 1}_mm": mm_from_m(at.strut_lengths[rows, i]) for i in range(6)},
+        "margin": at.margin[rows],
+        "margin_limit": names[at.limit[rows]],
+        "operation": path.operations.of_move[path.samples.move[rows]] + 1,
+        "cut": _cut(path.samples.take(rows)),
+    }
+
+
+def _cut(samples: Samples) -> NDArray[np.str_]:
+    """(n,) "across" or "plunge", whatever the load; "" on rapids and where the tip does not move."""
+    moving = samples.cutting & samples.tangent.any(axis=1)
+    return np.where(moving, np.where(along_tool_axis(samples.tangent, samples.abc), "plunge", "across"), "")
+
+
+def samples_frame(path: EvaluatedPath) -> pd.DataFrame:
+    """The samples as a DataFrame, full precision."""
+    import pandas as pd
+
+    return pd.DataFrame(sample_columns(path))
+
+
+def samples_csv(path: EvaluatedPath) -> Iterator[bytes]:
+    """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
+    return csv_pieces(partial(sample_columns, path), len(path.samples), COLUMNS)
+
+
+def samples_parquet(path: EvaluatedPath) -> Iterator[bytes]:
+    """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
+    return parquet_pieces(partial(sample_columns, path), len(path.samples))

@@ -101,7 +101,7 @@ class WorkPath:
     tool_length
         (m,) m; nan: the reference tool.
     headline
-        (m,) samples that mean, range and weakest place are about (`analysis.cut_classes`).
+        (m,) samples that mean, range and weakest place are about (`analysis.loads`).
     cutting
         (m,) samples of cuts; the others are rapids that move with the work, held to the limits alone.
     anchored

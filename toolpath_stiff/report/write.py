@@ -100,7 +100,7 @@ def _contents(
     analysis: Analysis, plots: bool, table: str, required: float | None, other: Analysis | None, show_plunges: bool
 ) -> dict[str, Callable[[], Content]]:
     """Names of the files, and what makes each."""
-    from toolpath_stiff.analysis.tables import samples_csv, samples_parquet
+    from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
 
     summary = summary_with_options(analysis, required, other)
     contents: dict[str, Callable[[], Content]] = {

@@ -204,7 +204,7 @@ class Case:
         Measurement table in shop units, in measuring order.
     truth
         What was hidden: `hidden` (names; empty if nothing), `kind`, `effects` with parameters in shop units,
-        their `size` (rms change of ln stiffness) and `detectability` (see `size.DETECTABLE`).
+        their `size` (rms change of ln stiffness) and `detectability` (see `effects.DETECTABLE`).
     nominal, machine, nuisances
         To measure the same machine again.
     """

@@ -340,7 +340,7 @@ def under_load(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> 
     """The machine under a load of `path.force` along unit vectors (n, 3), load-dependent effects included.
 
     Those see the strut forces of the loaded machine: the ones of equilibrium or, where a stiffness parallel to the
-    struts shares the load, the ones that agree with the compliances that they cause (`shared_load`).
+    struts shares the load, the ones that agree with the compliances that they cause (`SharedLoad`).
 
     Raises
     ------

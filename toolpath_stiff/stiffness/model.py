@@ -92,7 +92,7 @@ class StiffnessModel:
     given
         The machine as it was loaded, before geometry effects; None for a model that `build_model` did not make.
     conditions
-        Under what programs run; measurements bring their own. `acting` says which effects that leaves.
+        Under what programs run; measurements bring their own. `acting_effects` says which effects that leaves.
     """
 
     machine: Machine

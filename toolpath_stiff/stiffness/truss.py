@@ -97,7 +97,7 @@ def _rigid_motions(nodes: FloatArray) -> FloatArray:
 
 
 def structure_stiffness(machine: Machine, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-    """Structure stiffness matrix at one pose, (24, 24) N/m; nodes as in `platform_truss`, base axes.
+    """Structure stiffness matrix at one pose, (24, 24) N/m; nodes as in the module's heading, base axes.
 
     Parameters
     ----------
