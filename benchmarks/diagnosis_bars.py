@@ -16,7 +16,7 @@ NORMAL_95 = NormalDist().inv_cdf(0.975)
 SCATTER_PERCENT = math.hypot(2.0, 1.0)
 FLOOR_PERCENT = 0.80 * SCATTER_PERCENT
 FLOOR_RATIO = 1.3
-# Detectability of the smallest effects that the rig draws (`toolpath_stiff.rig.size.DETECTABLE`); one whose largest
+# Detectability of the smallest effects that the rig draws (`toolpath_stiff.rig.effects.DETECTABLE`); one whose largest
 # size of 30 % stays below cannot be seen in the layout.
 JUST_SEEN = 3.9
 

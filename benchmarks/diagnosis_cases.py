@@ -17,7 +17,7 @@ from toolpath_stiff import rig
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import Machine, load_machine
 from toolpath_stiff.rig.case import again
-from toolpath_stiff.rig.tables import read_plan
+from toolpath_stiff.rig.exercise import read_plan
 from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
 from toolpath_stiff.updating.diagnosis.document import document
 from toolpath_stiff.updating.measurements import read_measurements

@@ -23,11 +23,11 @@ from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.controller import read_controller
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.placement.batch import Evaluator
 from toolpath_stiff.placement.climb import Bounds, Rules
+from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.paths import telling_path, work_path
 from toolpath_stiff.placement.placing import Placed, Task, place_program
 from toolpath_stiff.placement.search import SearchRules
-from toolpath_stiff.placement.work_path import telling_path, work_path
 from toolpath_stiff.stiffness.model import build_model
 
 PROGRAMS = Path(__file__).parent.parent / "programs"

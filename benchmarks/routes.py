@@ -12,9 +12,10 @@ import numpy as np
 
 from toolpath_stiff.machine import Machine, load_machine
 from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.stiffness import closed_form, compiled, core, reference
+from toolpath_stiff.stiffness import closed_form, compiled, core
+from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.stiffness.platform_truss import TIP, platform_bars, platform_nodes
+from toolpath_stiff.stiffness.truss import TIP, platform_bars, platform_nodes
 
 BAR_STIFFNESS = 1e12  # N/m: rigid to 5e-5, the stiffest bars that direct stiffness solves well
 PLAIN_POSES, FAST_POSES = 300, 100_000

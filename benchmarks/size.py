@@ -168,7 +168,7 @@ def writing(report: Report, lines: int, rounds: int) -> None:
     import pyarrow.parquet as pq
 
     from toolpath_stiff.analysis import analyse
-    from toolpath_stiff.analysis.tables import sample_columns, samples_csv, samples_frame, samples_parquet
+    from toolpath_stiff.analysis.statistics import sample_columns, samples_csv, samples_frame, samples_parquet
     from toolpath_stiff.machine import load_machine
 
     analysis = analyse(load_machine("nist"), parse_program(program("5-axis", lines)), origin=(0, 0, 0.8, 0, 0, 0))

@@ -15,7 +15,7 @@ from benchmarks.diagnosis_bars import floor_ratio, holds_truth, mean, middle_of,
 from benchmarks.diagnosis_cases import Job, choice_is_right, interval_checks, make_jobs, run, settleable
 from toolpath_stiff import rig
 from toolpath_stiff.rig.effects import at_strength, draw_shape
-from toolpath_stiff.stiffness.effects.registry import known_effects
+from toolpath_stiff.stiffness.effects import known_effects
 
 
 # Newcombe (1998), Statistics in Medicine 17, 857: Table I, method 3 (score, without continuity correction).

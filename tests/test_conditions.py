@@ -10,9 +10,8 @@ from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine, machine_toml, parse_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.stiffness.acting import acting_names, condition_warnings, idle_effects
 from toolpath_stiff.stiffness.effects import Conditions
-from toolpath_stiff.stiffness.model import build_model
+from toolpath_stiff.stiffness.model import acting_names, build_model, condition_warnings, idle_effects
 
 RISER = {"setup": "riser", "x_nm_per_N": 8.0, "y_nm_per_N": 5.0, "z_nm_per_N": 2.0}
 PART = "G21 G90 G94\nG0 X0 Y0 Z20\nG1 Z0 F600\nG1 X30 F1200\nG1 Y30\nM30\n"

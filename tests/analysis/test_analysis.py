@@ -7,8 +7,8 @@ import pytest
 
 from toolpath_stiff.analysis import analyse, evaluate, parse_load
 from toolpath_stiff.analysis.loads import load_directions, softest_directions, stiffest_directions
-from toolpath_stiff.analysis.path_analysis import required_stiffness_missed
 from toolpath_stiff.analysis.poses import evaluate_poses
+from toolpath_stiff.analysis.results import required_stiffness_missed
 from toolpath_stiff.analysis.statistics import weakest_places
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine import load_machine

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from tests.report.factory import make_analysis, spiral
 from toolpath_stiff.analysis import Analysis, analyse
-from toolpath_stiff.analysis.breakdown import FIGURES, weighted_figures
-from toolpath_stiff.analysis.cut_classes import PLUNGES_ONLY
+from toolpath_stiff.analysis.loads import PLUNGES_ONLY
+from toolpath_stiff.analysis.statistics import FIGURES, weighted_figures
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry

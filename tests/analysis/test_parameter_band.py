@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toolpath_stiff.analysis.path_analysis import analyse
+from toolpath_stiff.analysis.results import analyse
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty
+from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty
 from toolpath_stiff.nc import read_program
 from toolpath_stiff.stiffness.model import build_model, with_parameter_moved
 from toolpath_stiff.units import n_per_mm_from_n_per_m

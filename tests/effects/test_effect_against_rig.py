@@ -10,7 +10,7 @@ import pytest
 
 from tests.effects.cases import CATALOGUE, all_effects, model_with
 from tests.stiffness.cases import nist
-from toolpath_stiff.rig.campaign import rows_of, tilted_campaign
+from toolpath_stiff.rig.case import rows_of, tilted_campaign
 from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import load_nominal

@@ -8,8 +8,7 @@ import pytest
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.machine.file import parse_machine
-from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty, with_parameter
+from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty, with_parameter
 from toolpath_stiff.machine.writer import machine_toml
 
 RADIAL = "spindle_compliance.radial_nm_per_N"

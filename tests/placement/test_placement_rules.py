@@ -17,10 +17,10 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.batch import Evaluator
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules
+from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.paths import telling_path, work_path
 from toolpath_stiff.placement.search import NO_FLOORS, OBJECTIVES, SearchRules, search_placements
-from toolpath_stiff.placement.work_path import telling_path, work_path
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parents[2]

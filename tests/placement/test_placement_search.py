@@ -17,11 +17,10 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program, read_program
-from toolpath_stiff.placement.batch import Evaluator, Keepout, PlacementFigures
-from toolpath_stiff.placement.climb import Bounds
-from toolpath_stiff.placement.front import front_rows, thin
+from toolpath_stiff.placement.climb import Bounds, front_rows, thin
+from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures
+from toolpath_stiff.placement.paths import placed_path, telling_path, work_path
 from toolpath_stiff.placement.search import SearchRules, search_placements
-from toolpath_stiff.placement.work_path import placed_path, telling_path, work_path
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parent.parent.parent

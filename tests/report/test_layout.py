@@ -13,7 +13,7 @@ from tests.report import diagnose_documents as documents
 from tests.report.factory import short
 from tests.stiffness.cases import nist
 from toolpath_stiff.analysis.loads import parse_load
-from toolpath_stiff.analysis.stiffness_map import map_stiffness
+from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
 from toolpath_stiff.report import (

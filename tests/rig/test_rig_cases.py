@@ -9,11 +9,10 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig import CATALOGUE, OUTSIDE, Nuisances, csv_text, draw_case, effects_of_layout, make_case
-from toolpath_stiff.rig.campaign import clamp_of, rows_of
-from toolpath_stiff.rig.kinematics import reachable
-from toolpath_stiff.rig.noise import disturb_readings
-from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.size import Covariance
+from toolpath_stiff.rig.case import clamp_of, rows_of
+from toolpath_stiff.rig.effects import Covariance
+from toolpath_stiff.rig.hidden import disturb_readings
+from toolpath_stiff.rig.nominal import load_nominal, reachable
 
 NIST = load_nominal("nist")
 

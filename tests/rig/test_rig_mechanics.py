@@ -9,10 +9,8 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from toolpath_stiff.rig.hidden import HiddenMachine, Rows, readings, true_stiffness
-from toolpath_stiff.rig.kinematics import commanded_lengths, rotations, true_poses
-from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.outside import Oddity
+from toolpath_stiff.rig.hidden import HiddenMachine, Oddity, Rows, readings, true_stiffness
+from toolpath_stiff.rig.nominal import commanded_lengths, load_nominal, rotations, true_poses
 
 NIST = load_nominal("nist")
 AXES = np.eye(3)

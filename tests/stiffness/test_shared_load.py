@@ -14,9 +14,8 @@ from scipy.optimize import brentq
 
 from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist, random_poses
-from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.analysis.poses import evaluate_poses
+from toolpath_stiff.analysis.poses import evaluate, evaluate_poses
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.path.rotations import roll_pitch_yaw
 from toolpath_stiff.stiffness import core, exact

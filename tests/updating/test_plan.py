@@ -16,8 +16,8 @@ from tests.stiffness.cases import nist
 from tests.updating.planning import READING_SD, active, rival, rivals, table_1_design
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.nominal import reachable as rig_reachable
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
 from toolpath_stiff.updating.planning.document import plan_document

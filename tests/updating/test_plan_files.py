@@ -17,8 +17,8 @@ from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.nominal import reachable as rig_reachable
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.updating.inference.noise import repeat_groups
 from toolpath_stiff.updating.measurements import read_measurements

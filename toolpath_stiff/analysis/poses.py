@@ -1,21 +1,194 @@
-"""Stiffness at single poses: along X, Y, Z, in the softest and the stiffest direction, with strut lengths."""
+"""Stiffness, strut lengths and reach at poses of a machine: of a path, single ones, on a grid.
+
+A grid is that of planes of the workspace under one load, as the paper's Figures 8 and 9.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.loads import softest_directions, stiffest_directions
+from toolpath_stiff.analysis.loads import Load, load_directions, softest_directions, stiffest_directions
+from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Reach, reach
+from toolpath_stiff.machine.limits import Limit, Reach, machine_limits, reach
 from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
+Progress = Callable[[int, int], None]
+
+MOST_POINTS = 5_000_000
+
+
+@dataclass(frozen=True)
+class PoseStiffness:
+    """What the machine does at n poses. SI.
+
+    Attributes
+    ----------
+    stiffness
+        (n,) N/m along the load, displacement measured along it; nan where the pose is out of reach.
+    direction
+        (n, 3) unit vectors of the load.
+    substituted
+        (n,) the asked load direction does not exist there, the softest one stands in.
+    strut_lengths
+        (n, 6) m.
+    extrapolated
+        (n,) a strut is longer or shorter than the strut law was given for.
+    margin, limit, limit_value
+        (n,) as in `Reach`.
+    limits
+        The machine's limits.
+    """
+
+    stiffness: FloatArray
+    direction: FloatArray
+    substituted: BoolArray
+    strut_lengths: FloatArray
+    extrapolated: BoolArray
+    margin: FloatArray
+    limit: IntArray
+    limit_value: FloatArray
+    limits: tuple[Limit, ...]
+
+    @property
+    def reachable(self) -> BoolArray:
+        """(n,) whether every limit is kept."""
+        return np.asarray(self.margin >= 0.0)
+
+    @property
+    def reach(self) -> Reach:
+        """The limits' side of it, for `Reach.describe`."""
+        return Reach(self.margin, self.limit, self.limit_value, self.limits)
+
+
+def evaluate(
+    model: StiffnessModel,
+    position: FloatArray,
+    abc: FloatArray,
+    tangent: FloatArray,
+    tool_length: FloatArray | float = np.nan,
+    load: Load | None = None,
+    force: float = DEFAULT_FORCE,
+    progress: Progress | None = None,
+) -> PoseStiffness:
+    """Evaluate n poses.
+
+    Parameters
+    ----------
+    model
+        Machine and effects.
+    position, abc
+        (n, 3) m and (n, 3) rad: tool tip; roll, pitch, yaw.
+    tangent
+        (n, 3) unit vectors of the motion (0 where there is none); only some loads ask for it.
+    tool_length
+        m, scalar or (n,); nan: the reference tool.
+    load
+        Direction of the load, tangential unless given.
+    force
+        N; only load-dependent effects ask for it.
+    progress
+        Called with (poses done, poses in all).
+    """
+    n = len(position)
+    load = load or Load()
+    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
+    route = core.choose_route(model, n)  # by all poses, not by those of a block
+    result = PoseStiffness(
+        stiffness=np.empty(n),
+        direction=np.empty((n, 3)),
+        substituted=np.zeros(n, dtype=bool),
+        strut_lengths=np.empty((n, 6)),
+        extrapolated=np.zeros(n, dtype=bool),
+        margin=np.empty(n),
+        limit=np.zeros(n, dtype=np.int64),
+        limit_value=np.empty(n),
+        limits=machine_limits(model.machine),
+    )
+    for start in range(0, n, BLOCK):
+        rows = slice(start, min(start + BLOCK, n))
+        _evaluate_block(model, rows, position, abc, tangent, lengths, load, force, route, result)
+        if progress:
+            progress(rows.stop, n)
+    return result
+
+
+def _evaluate_block(
+    model: StiffnessModel,
+    rows: slice,
+    position: FloatArray,
+    abc: FloatArray,
+    tangent: FloatArray,
+    tool_length: FloatArray,
+    load: Load,
+    force: float,
+    route: str,
+    result: PoseStiffness,
+) -> None:
+    machine = model.machine
+    tip, angles, tool = position[rows], abc[rows], tool_length[rows]
+    rotation = rotation_matrices(angles) if np.any(angles != 0.0) else None
+    struts = solve_struts(machine, tip, rotation, _one_if_equal(tool))
+    stand = reach(machine, tip, struts, rotation)
+    within = stand.reachable
+    compliance = np.full((len(tip), 3, 3), np.nan)
+    turned = None if rotation is None else rotation[within]
+    compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, route)
+    softest = partial(_softest, model, tip, rotation, tool, force, within) if model.load_dependent else None
+    direction, substituted = load_directions(load, compliance, tip, rotation, tangent[rows], softest)
+    along = np.full(len(tip), np.nan)
+    if model.load_dependent:
+        along[within] = core.compliance_along(model, direction[within], tip[within], turned, tool[within], force)
+    else:
+        along = np.einsum("ni,nij,nj->n", direction, compliance, direction)
+    result.stiffness[rows] = 1.0 / along
+    result.direction[rows] = direction
+    result.substituted[rows] = substituted
+    result.strut_lengths[rows] = struts.lengths
+    result.extrapolated[rows] = machine.strut_law.extrapolates(struts.lengths).any(axis=1)
+    result.margin[rows] = stand.margin
+    result.limit[rows] = stand.limit
+    result.limit_value[rows] = stand.value
+
+
+def _softest(
+    model: StiffnessModel,
+    tip: FloatArray,
+    rotation: FloatArray | None,
+    tool: FloatArray,
+    force: float,
+    within: BoolArray,
+    rows: BoolArray,
+    across: FloatArray | None,
+) -> FloatArray:
+    """Softest directions under the load, of some rows; nan where these are out of reach."""
+    found = np.full((int(rows.sum()), 3), np.nan)
+    inside = within[rows]
+    some = rows & within
+    turn = None if rotation is None else rotation[some]
+    normals = None if across is None else across[inside]
+    found[inside] = core.extreme_directions(model, tip[some], turn, tool[some], force, across=normals)
+    return found
+
+
+def _one_if_equal(tool_length: FloatArray) -> FloatArray | float:
+    """A single tool length where all are equal (all nan counts): the kinematics is then cheaper."""
+    if len(tool_length) and (np.isnan(tool_length).all() or np.ptp(tool_length) == 0.0):
+        return float(tool_length[0])
+    return tool_length
 
 
 @dataclass(frozen=True)
@@ -97,3 +270,109 @@ def evaluate_poses(
         extrapolated=np.asarray(model.machine.strut_law.extrapolates(struts.lengths).any(axis=1)),
         reach=stand,
     )
+
+
+@dataclass(frozen=True)
+class StiffnessMap:
+    """Stiffness on a grid. SI.
+
+    Attributes
+    ----------
+    x, y, z
+        (nx,), (ny,), (nz,) m, coordinates of the grid.
+    stiffness
+        (nz, ny, nx) N/m along the load; nan where out of reach.
+    reachable
+        (nz, ny, nx).
+    load, abc
+        The load's direction; roll, pitch, yaw of the platform in rad.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    stiffness: FloatArray
+    reachable: BoolArray
+    load: Load
+    abc: tuple[float, float, float]
+
+
+def map_stiffness(
+    model: StiffnessModel,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    heights: list[float],
+    load: Load,
+    points: int = 61,
+    abc: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    force: float = DEFAULT_FORCE,
+    progress: Progress | None = None,
+) -> StiffnessMap:
+    """Evaluate a grid of poses.
+
+    Parameters
+    ----------
+    model
+        Machine and effects.
+    x, y
+        (low, high) m.
+    heights
+        z of the slices, m.
+    load
+        Any direction but tangential and normal, which need a path.
+    points
+        Grid points along the longer side; the other side has the same spacing or finer.
+    abc
+        Orientation of the platform, rad.
+
+    Raises
+    ------
+    InputError
+        The load needs a path, an area has no extent, or there are too many points.
+    UnreachableError
+        Nothing of the grid can be reached.
+    """
+    if load.kind in ("tangential", "normal"):
+        raise InputError(
+            f"load {load} needs a path, and a map has none", expected="radial, axial, softest, x, y, z or DX,DY,DZ"
+        )
+    if not (x[0] < x[1] and y[0] < y[1]):
+        raise InputError("the area of the map has no extent", expected="LO:HI with LO below HI in x and in y")
+    spacing = max(x[1] - x[0], y[1] - y[0]) / (points - 1)
+    nx, ny = (int(np.ceil((hi - lo) / spacing - 1e-9)) + 1 for lo, hi in (x, y))
+    if nx * ny * len(heights) > MOST_POINTS:
+        raise InputError(f"{nx * ny * len(heights)} grid points", expected=f"at most {MOST_POINTS}")
+    xs, ys, zs = np.linspace(*x, nx), np.linspace(*y, ny), np.array(heights)
+    grid = np.stack(np.meshgrid(zs, ys, xs, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
+    turned = np.broadcast_to(np.array(abc), grid.shape)
+    found = evaluate(model, grid, turned, np.zeros_like(grid), load=load, force=force, progress=progress)
+    if not found.reachable.any():
+        nearest = int(np.argmax(found.margin))
+        raise UnreachableError(
+            f"nothing of the map is within reach; the nearest point: {found.reach.describe(nearest)}"
+        )
+    shape = (len(zs), ny, nx)
+    return StiffnessMap(xs, ys, zs, found.stiffness.reshape(shape), found.reachable.reshape(shape), load, abc)
+
+
+def around_axis(model: StiffnessModel, radius: float, height: float, load: Load, angles: FloatArray) -> FloatArray:
+    """Stiffness N/m on a circle about the machine axis at angles (n,) rad; nan where out of reach."""
+    position = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(len(angles), height)])
+    zeros = np.zeros_like(position)
+    return evaluate(model, position, zeros, zeros, load=load).stiffness
+
+
+def turning_points(model: StiffnessModel, radius: float, height: float, load: Load) -> dict[str, list[float]]:
+    """Angles in rad of the maxima and minima on a circle about the machine axis, to a hundredth of a degree.
+
+    Where the whole circle varies by less than a millionth there are none.
+    """
+    angles = np.linspace(0.0, 2.0 * np.pi, 36000, endpoint=False)
+    values = around_axis(model, radius, height, load, angles)
+    if np.isnan(values).any() or np.ptp(values) < 1e-6 * values.mean():
+        return {"maxima": [], "minima": []}
+    before, after = np.roll(values, 1), np.roll(values, -1)
+    return {
+        "maxima": [float(a) for a in angles[(values > before) & (values >= after)]],
+        "minima": [float(a) for a in angles[(values < before) & (values <= after)]],
+    }

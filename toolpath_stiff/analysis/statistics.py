@@ -1,31 +1,125 @@
-"""Figures of a path: length-weighted mean, extremes, the weakest places, shares."""
+"""Figures and tables of a path: length-weighted mean, extremes, the weakest places, tool by tool; sample by sample.
+
+How far the uncertainty of a machine's fitted parameters reaches into them is a linear propagation (JCGM 100:2008,
+Guide to the expression of uncertainty in measurement, equation 13): the covariance of the parameters between two
+slopes of the stiffness, which are differences of whole evaluations.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.breakdown import class_figures, describe_sample, per_operation, per_tool, weighted_figures
-from toolpath_stiff.analysis.parameter_band import band_figures
-from toolpath_stiff.analysis.path_analysis import Analysis, assumptions
-from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.stiffness.acting import effects_stated
-from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_of, headline_words, plunging_rows
+from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
+from toolpath_stiff.column_files import csv_pieces, parquet_pieces
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.moves import RAPID, Program
+from toolpath_stiff.nc.operations import Operations, operations
+from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
+from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 if TYPE_CHECKING:
-    from toolpath_stiff.path.samples import Samples
+    import pandas as pd
 
 BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
+# Of `samples.csv`, Parquet and the DataFrame, with their decimals.
+COLUMNS: dict[str, int | None] = {
+    **PATH_COLUMNS,
+    "stiffness_N_per_mm": 4,
+    "deflection_um": 6,
+    **{f"strut{i}_mm": 6 for i in range(1, 7)},
+    "margin": 6,
+    "margin_limit": None,
+    "operation": None,
+    "cut": None,
+}
+
+STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
+NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 
 
-def stiffness_figures(analysis: Analysis, rows: BoolArray) -> dict[str, Any]:
+@dataclass(frozen=True)
+class EvaluatedPath:
+    """A program's samples and what the machine does at each: what statistics and tables are made from.
+
+    Attributes
+    ----------
+    program
+        What was sampled.
+    load, force
+        Direction of the load; its size in N.
+    samples
+        The path in machine coordinates.
+    at
+        Stiffness, struts, reach at every sample.
+    """
+
+    program: Program
+    load: Load
+    force: float
+    samples: Samples
+    at: PoseStiffness
+
+    @cached_property
+    def counted(self) -> BoolArray:
+        """(n,) samples in the statistics: cutting, reachable, with a load in the asked direction."""
+        return np.asarray(self.samples.cutting & self.at.reachable & (self.samples.weight > 0.0))
+
+    @cached_property
+    def plunging(self) -> BoolArray:
+        """(n,) counted samples of plunges along the tool axis; none where the load does not follow the motion."""
+        return plunging_rows(self.load, self.samples.tangent, self.samples.abc, self.counted)
+
+    @property
+    def headline(self) -> BoolArray:
+        """(n,) counted samples that mean, range and weakest place are about: those of `headline_rows`."""
+        return headline_of(self.counted, self.plunging)
+
+    @property
+    def set_aside(self) -> BoolArray:
+        """(n,) plunges beside the headline; none of a program that only plunges."""
+        return np.asarray(self.counted & ~self.headline)
+
+    @property
+    def deflection(self) -> FloatArray:
+        """(n,) m, the tip's deflection along the load under `force`."""
+        return np.asarray(self.force / self.at.stiffness)
+
+    @property
+    def out_of_reach(self) -> BoolArray:
+        """(n,) cutting samples that the machine cannot reach."""
+        return np.asarray(self.samples.cutting & ~self.at.reachable)
+
+    @cached_property
+    def operations(self) -> Operations:
+        """The program's operations, and the row of its operation for every move."""
+        return operations(self.program)
+
+    @property
+    def operation(self) -> NDArray[np.int64]:
+        """(n,) number of each sample's operation, from 1."""
+        return np.asarray(self.operations.of_move[self.samples.move] + 1)
+
+
+def stiffness_figures(path: EvaluatedPath, rows: BoolArray) -> dict[str, Any]:
     """Mean (by length), min, max, range in N/mm and mean deflection in um of some counted samples.
 
     None for each where there are no such samples.
     """
-    return weighted_figures(analysis.at.stiffness[rows], analysis.samples.weight[rows], analysis.force)
+    return weighted_figures(path.at.stiffness[rows], path.samples.weight[rows], path.force)
 
 
 def path_length(samples: Samples, rapid: bool) -> float:
@@ -37,67 +131,312 @@ def path_length(samples: Samples, rapid: bool) -> float:
     return float(step[(samples.motion == RAPID) == rapid].sum())
 
 
-def weakest_places(analysis: Analysis, count: int = 3) -> list[int]:
+def weakest_places(path: EvaluatedPath, count: int = 3) -> list[int]:
     """Rows of the weakest headline samples, one a place: apart by at least a twentieth of the path, other lines."""
-    rows = np.flatnonzero(analysis.headline)
+    rows = np.flatnonzero(path.headline)
     if not len(rows):
         return []
-    s, line = analysis.samples.s, analysis.samples.line
+    s, line = path.samples.s, path.samples.line
     apart = (s[rows[-1]] - s[rows[0]]) / 20.0
     chosen: list[int] = []
     while len(rows) and len(chosen) < count:
-        best = int(rows[np.argmin(analysis.at.stiffness[rows])])
+        best = int(rows[np.argmin(path.at.stiffness[rows])])
         chosen.append(best)
         rows = rows[(np.abs(s[rows] - s[best]) >= apart) & (line[rows] != line[best])]
     return chosen
-
-
-def summarise(analysis: Analysis) -> dict[str, Any]:
-    """The figures of `summary.json`, in the shop's units."""
-    from toolpath_stiff import __version__
-
-    samples = analysis.samples
-    places = weakest_places(analysis)
-    cutting = samples.cutting & analysis.at.reachable
-    x, y, z, a, b, c = analysis.origin
-    nearest = int(np.argmin(np.where(cutting, analysis.at.margin, np.inf)))
-    band = band_figures(analysis)
-    return {
-        "program": analysis.program.name,
-        "interpreter": analysis.program.interpreter,
-        "kinematics": analysis.program.kinematics,
-        "machine": analysis.machine.name,
-        "load": str(analysis.load),
-        "force_N": analysis.force,
-        "step_mm": mm_from_m(analysis.step),
-        "origin_mm_deg": [mm_from_m(x), mm_from_m(y), mm_from_m(z), *(deg_from_rad(v) for v in (a, b, c))],
-        "origin_source": analysis.origin_source,
-        "samples": len(samples),
-        "cutting_length_mm": mm_from_m(path_length(samples, rapid=False)),
-        "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
-        "time_s": float(samples.t[-1]) if len(samples) else 0.0,
-        **class_figures(analysis, np.arange(len(samples))),
-        **({} if band is None else {"parameter_uncertainty": band}),
-        "weakest_places": [describe_sample(analysis, row) for row in places],
-        "per_tool": per_tool(analysis),
-        "per_operation": per_operation(analysis),
-        "min_margin": float(analysis.at.margin[nearest]),
-        "min_margin_limit": analysis.at.reach.describe(nearest),
-        "min_margin_line": int(samples.line[nearest]),
-        "out_of_reach_samples": int(analysis.out_of_reach.sum()),
-        "extrapolated_share": share(analysis.at.extrapolated, cutting),
-        **effects_stated(analysis.model),
-        "unsupported": [
-            {"line": u.line, "column": u.column, "word": u.word, "reason": u.reason}
-            for u in analysis.program.unsupported
-        ],
-        "assumptions": assumptions(analysis),
-        "warnings": list(analysis.warnings),
-        "version": __version__,
-    }
 
 
 def share(condition: BoolArray, among: BoolArray) -> float:
     """Share of the rows of `among` for which `condition` holds; 0 of none."""
     total = int(among.sum())
     return float((condition & among).sum()) / total if total else 0.0
+
+
+def weighted_figures(stiffness: FloatArray, weight: FloatArray, force: float) -> dict[str, float | None]:
+    """Mean by weight, min, max, range in N/mm and mean deflection in um; None for each where there is nothing.
+
+    stiffness (n,) N/m; weight (n,); force N.
+    """
+    if not len(stiffness):
+        return dict.fromkeys(FIGURES)
+    low, high = float(stiffness.min()), float(stiffness.max())
+    return {
+        "mean_N_per_mm": n_per_mm_from_n_per_m(float(np.average(stiffness, weights=weight))),
+        "min_N_per_mm": n_per_mm_from_n_per_m(low),
+        "max_N_per_mm": n_per_mm_from_n_per_m(high),
+        "range_N_per_mm": n_per_mm_from_n_per_m(high - low),
+        "mean_deflection_um": um_from_m(float(np.average(force / stiffness, weights=weight))),
+    }
+
+
+def class_figures(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
+    """The headline figures of the samples `rows`, what they are about, their weakest place, and the plunges beside.
+
+    `rows` (m,) are rows of samples, in order; only those in the statistics count. `plunges` is None without any.
+    """
+    counted, plunging = path.counted[rows], path.plunging[rows]
+    about = rows[headline_of(counted, plunging)]
+    return {
+        "headline": headline_words(path.load, counted, plunging),
+        **_figures_and_weakest(path, about),
+        "plunges": _plunges(path, rows[plunging]) if plunging.any() else None,
+    }
+
+
+def _plunges(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
+    samples = path.samples
+    return {
+        "samples": len(rows),
+        "moves": len(np.unique(samples.move[rows])),
+        "length_mm": mm_from_m(float(samples.weight[rows].sum())),
+        **_figures_and_weakest(path, rows),
+    }
+
+
+def _figures_and_weakest(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
+    stiffness = path.at.stiffness[rows]
+    return {
+        **weighted_figures(stiffness, path.samples.weight[rows], path.force),
+        "weakest": describe_sample(path, int(rows[np.argmin(stiffness)])) if len(rows) else None,
+    }
+
+
+def per_operation(path: EvaluatedPath) -> list[dict[str, Any]]:
+    """The figures of each operation, in the order of the run; their lengths, times and samples add up to the whole."""
+    operations = path.operations
+    parts = _Parts(path, operations.of_move, len(operations.rows))
+    return [
+        {
+            "operation": operation.number,
+            "name": operation.name,
+            "tool": operation.tool,
+            "first_line": operation.first_line,
+            "last_line": operation.last_line,
+            **parts.row(part),
+        }
+        for part, operation in enumerate(operations.rows)
+    ]
+
+
+def per_tool(path: EvaluatedPath) -> list[dict[str, Any]]:
+    """The figures of each tool that cuts, in order of use; a tool that cuts with two lengths has two rows.
+
+    Rapids with a length that the tool never cuts with (before G43) count with the first that it does.
+    """
+    moves = path.program.moves
+    remarks = {tool.number: tool.remark for tool in path.program.tools}
+    tools, tool = np.unique(moves.tool, return_inverse=True)
+    lengths, length = np.unique(moves.tool_length, return_inverse=True)  # nan, the reference tool's, is one of them
+    many = len(lengths)
+    of_move = tool * many + length
+    used, first = np.unique(of_move[moves.motion != RAPID], return_index=True)
+    order = used[np.argsort(first)].tolist()
+    first_of_tool: dict[int, int] = {}
+    for part in order:
+        first_of_tool.setdefault(part // many, part)
+    counts_with = [
+        part if part in order else first_of_tool.get(part // many, part) for part in range(len(tools) * many)
+    ]
+    parts = _Parts(path, np.array(counts_with)[of_move], len(counts_with))
+    rows = []
+    for part in order:
+        number, tool_length = int(tools[part // many]), float(lengths[part % many])
+        about = {
+            "tool": number,
+            "remark": remarks.get(number, ""),
+            "length_mm": None if math.isnan(tool_length) else mm_from_m(tool_length),
+        }
+        rows.append({**about, **parts.row(part)})
+    return rows
+
+
+class _Parts:
+    """A path in parts, each move in one of them: `of_move` (n_moves,) says in which of `count`."""
+
+    def __init__(self, path: EvaluatedPath, of_move: IntArray, count: int) -> None:
+        self.path = path
+        samples, moves = path.samples, path.program.moves
+        first = np.searchsorted(samples.move, np.arange(len(moves)))
+        last = np.append(first[1:], len(samples)) - 1
+        length, cutting = samples.s[last] - samples.s[first], moves.motion != RAPID
+        time = np.diff(np.append(samples.t[first], samples.t[-1]))  # with the dwell after each move but the last
+        self.cutting_length = np.bincount(of_move, np.where(cutting, length, 0.0), count)
+        self.rapid_length = np.bincount(of_move, np.where(cutting, 0.0, length), count)
+        self.time = np.bincount(of_move, time, count)
+        self.out_of_reach = path.out_of_reach
+        self.margin = np.where(samples.cutting & path.at.reachable, path.at.margin, np.inf)
+        of_sample = of_move[samples.move]
+        order = np.argsort(of_sample, kind="stable")
+        ends = np.searchsorted(of_sample[order], np.arange(count + 1))
+        self.rows = [order[ends[part] : ends[part + 1]] for part in range(count)]
+
+    def row(self, part: int) -> dict[str, Any]:
+        """Length, time, figures, weakest place and nearest limit of one part."""
+        path, rows = self.path, self.rows[part]
+        nearest = int(rows[np.argmin(self.margin[rows])])
+        known = bool(np.isfinite(self.margin[nearest]))
+        return {
+            "cutting_length_mm": mm_from_m(float(self.cutting_length[part])),
+            "rapid_length_mm": mm_from_m(float(self.rapid_length[part])),
+            "time_s": float(self.time[part]),
+            **class_figures(path, rows),
+            "min_margin": float(self.margin[nearest]) if known else None,
+            "min_margin_limit": path.at.reach.describe(nearest) if known else None,
+            "min_margin_line": int(path.samples.line[nearest]) if known else None,
+            "out_of_reach_samples": int(self.out_of_reach[rows].sum()),
+        }
+
+
+def describe_sample(path: EvaluatedPath, row: int) -> dict[str, Any]:
+    """Line, source text, position and stiffness of one sample."""
+    samples = path.samples
+    line = int(samples.line[row])
+    x, y, z = (mm_from_m(float(v)) for v in samples.position[row])
+    a, b, c = (deg_from_rad(float(v)) for v in samples.abc[row])
+    source = path.program.source
+    return {
+        "line": line,
+        "text": source[line - 1].strip() if 0 < line <= len(source) else "",
+        "s_mm": mm_from_m(float(samples.s[row])),
+        "x_mm": x,
+        "y_mm": y,
+        "z_mm": z,
+        "a_deg": a,
+        "b_deg": b,
+        "c_deg": c,
+        "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(path.at.stiffness[row])),
+    }
+
+
+@dataclass(frozen=True)
+class ParameterBand:
+    """Uncertainty of the stiffness of n samples that comes from p fitted parameters.
+
+    Attributes
+    ----------
+    names
+        Of the parameters, as in machine files.
+    slopes
+        (n, p) N/m by which the stiffness changes with one standard deviation of each; nan out of reach.
+    correlation
+        (p, p) of the parameters.
+    """
+
+    names: tuple[str, ...]
+    slopes: FloatArray
+    correlation: FloatArray
+
+    @property
+    def deviation(self) -> FloatArray:
+        """(n,) N/m, standard deviation of the stiffness of each sample."""
+        squared = np.einsum("ni,ij,nj->n", self.slopes, self.correlation, self.slopes)
+        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+
+    def deviation_of_mean(self, weight: FloatArray) -> float:
+        """N/m, standard deviation of the mean stiffness of samples with weights (n,); the errors do not average out."""
+        slope: FloatArray = weight[weight > 0.0] @ self.slopes[weight > 0.0] / weight.sum()
+        return float(np.sqrt(max(float(slope @ self.correlation @ slope), 0.0)))
+
+
+def parameter_band(path: EvaluatedPath, model: StiffnessModel) -> ParameterBand | None:
+    """The band of a path; None where the machine file has no `[uncertainty]`, or none of what acts on the machine."""
+    given = model.given
+    uncertainty = given.uncertainty if given is not None else None
+    if uncertainty is None:
+        return None
+    idle = {active.effect.name for active in model.instruments}
+    idle |= {one.effect for one in idle_effects(model)}
+    kept = [
+        i
+        for i, (name, sd) in enumerate(zip(uncertainty.names, uncertainty.sd, strict=True))
+        if sd > 0.0 and name.partition(".")[0] not in idle
+    ]
+    if not kept:
+        return None
+    slopes = [_slope(path, model, uncertainty.names[i], float(uncertainty.sd[i])) for i in kept]
+    return ParameterBand(
+        tuple(uncertainty.names[i] for i in kept),
+        np.stack(slopes, axis=1),
+        np.asarray(uncertainty.correlation[np.ix_(kept, kept)]),
+    )
+
+
+def _slope(path: EvaluatedPath, model: StiffnessModel, name: str, sd: float) -> FloatArray:
+    """(n,) N/m per standard deviation of one parameter, away from a bound that is near."""
+    for step in (STEP, -STEP):
+        try:
+            moved = with_parameter_moved(model, name, step * sd)
+        except InputError:
+            continue
+        return np.asarray((_stiffness(path, moved) - path.at.stiffness) / step)
+    raise InputError(f"[uncertainty]: {name} has no room between its bounds for a standard deviation of {sd:g}")
+
+
+def _stiffness(path: EvaluatedPath, model: StiffnessModel) -> FloatArray:
+    samples = path.samples
+    at = evaluate(model, samples.position, samples.abc, samples.tangent, samples.tool_length, path.load, path.force)
+    return at.stiffness
+
+
+def band_figures(path: EvaluatedPath, band: ParameterBand) -> dict[str, Any] | None:
+    """Headline figures of the band: standard deviations and 95 % intervals in N/mm; None where nothing counts."""
+    about = path.headline
+    if not about.any():
+        return None
+    stiffness, weight = path.at.stiffness, np.where(about, path.samples.weight, 0.0)
+    relative = np.where(about, band.deviation / stiffness, 0.0)
+    mean, mean_sd = float(np.average(stiffness[about], weights=weight[about])), band.deviation_of_mean(weight)
+    row = int(np.argmin(np.where(about, stiffness, np.inf)))
+    widest = int(np.argmax(relative))
+    return {
+        "parameters": list(band.names),
+        "mean_sd_N_per_mm": n_per_mm_from_n_per_m(mean_sd),
+        "mean_95_N_per_mm": _interval(mean, mean_sd),
+        "min_sd_N_per_mm": n_per_mm_from_n_per_m(float(band.deviation[row])),
+        "min_95_N_per_mm": _interval(float(stiffness[row]), float(band.deviation[row])),
+        "largest_sd_percent": 100.0 * float(relative[widest]),
+        "largest_sd_line": int(path.samples.line[widest]),
+    }
+
+
+def _interval(value: float, sd: float) -> list[float]:
+    return [n_per_mm_from_n_per_m(value + sign * NORMAL_95 * sd) for sign in (-1.0, 1.0)]
+
+
+def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+    """Column name -> values in the shop's units, for some rows."""
+    at = path.at
+    names = np.array([limit.name for limit in at.limits] or ["none"])
+    return {
+        **path_columns(path.samples, rows),
+        "stiffness_N_per_mm": n_per_mm_from_n_per_m(at.stiffness[rows]),
+        "deflection_um": um_from_m(path.force / at.stiffness[rows]),
+        **{f"strut{i + 1}_mm": mm_from_m(at.strut_lengths[rows, i]) for i in range(6)},
+        "margin": at.margin[rows],
+        "margin_limit": names[at.limit[rows]],
+        "operation": path.operations.of_move[path.samples.move[rows]] + 1,
+        "cut": _cut(path.samples.take(rows)),
+    }
+
+
+def _cut(samples: Samples) -> NDArray[np.str_]:
+    """(n,) "across" or "plunge", whatever the load; "" on rapids and where the tip does not move."""
+    moving = samples.cutting & samples.tangent.any(axis=1)
+    return np.where(moving, np.where(along_tool_axis(samples.tangent, samples.abc), "plunge", "across"), "")
+
+
+def samples_frame(path: EvaluatedPath) -> pd.DataFrame:
+    """The samples as a DataFrame, full precision."""
+    import pandas as pd
+
+    return pd.DataFrame(sample_columns(path))
+
+
+def samples_csv(path: EvaluatedPath) -> Iterator[bytes]:
+    """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
+    return csv_pieces(partial(sample_columns, path), len(path.samples), COLUMNS)
+
+
+def samples_parquet(path: EvaluatedPath) -> Iterator[bytes]:
+    """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
+    return parquet_pieces(partial(sample_columns, path), len(path.samples))

@@ -22,7 +22,7 @@ from toolpath_stiff.cli.outputs import Destination, add_replace_option, destinat
 
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
-    from toolpath_stiff.analysis.evaluate import Progress
+    from toolpath_stiff.analysis.poses import Progress
     from toolpath_stiff.nc import Program
     from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -155,7 +155,7 @@ def analyse_and_write(
     progress: Progress | None = None,
 ) -> Report:
     """Analyse a program and write its report folder. Raises `TpsError`, with nothing written."""
-    from toolpath_stiff.analysis.path_analysis import analyse, required_stiffness_missed
+    from toolpath_stiff.analysis.results import analyse, required_stiffness_missed
     from toolpath_stiff.report.write import write_analysis
     from toolpath_stiff.units import n_per_m_from_n_per_mm
 

@@ -227,8 +227,7 @@ def models_for(args: argparse.Namespace, *machines: str) -> list[StiffnessModel]
     from dataclasses import replace
 
     from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.stiffness.acting import check_setup
-    from toolpath_stiff.stiffness.model import build_model
+    from toolpath_stiff.stiffness.model import build_model, check_setup
 
     models = [build_model(load_machine(name), args.effects) for name in machines or (args.machine,)]
     for model in models:
@@ -251,7 +250,7 @@ def conditions_for(args: argparse.Namespace, model: StiffnessModel) -> Condition
 
 def _asked_setup(args: argparse.Namespace) -> tuple[str | None, str]:
     """The set-up that an option or the controller file names ("" for none of them), and who says so."""
-    from toolpath_stiff.stiffness.acting import NO_SETUP
+    from toolpath_stiff.stiffness.model import NO_SETUP
 
     asked, said_by = args.setup, f"--setup {args.setup}"
     if asked is None and getattr(args, "controller", None):

@@ -94,8 +94,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _document(args: argparse.Namespace, checked: Checked, lines: tuple[str, ...], machine: Any) -> dict[str, Any]:
     """What `--json` prints."""
-    from toolpath_stiff.analysis.check_parts import check_parts, figure_rows
-    from toolpath_stiff.analysis.program_check import Figures, figures, machine_findings, radii_findings
+    from toolpath_stiff.analysis.checks import (
+        Figures,
+        check_parts,
+        figure_rows,
+        figures,
+        machine_findings,
+        radii_findings,
+    )
 
     findings: list[Finding] = list(checked.findings)
     found = Figures({}, {}, {}, {})

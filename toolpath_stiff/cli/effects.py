@@ -57,8 +57,7 @@ def run(args: argparse.Namespace) -> int:
         return write_template(args.file, check_new(args, args.file))
     if args.action == "check":
         return check(args)
-    from toolpath_stiff.stiffness.effects import find_effect, known_effects
-    from toolpath_stiff.stiffness.effects.registry import installed_effects
+    from toolpath_stiff.stiffness.effects import find_effect, installed_effects, known_effects
 
     if args.action == "show":
         effect = find_effect(args.name, args.effects)

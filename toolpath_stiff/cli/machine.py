@@ -191,13 +191,12 @@ def _check(args: argparse.Namespace) -> int:
     """Load the file, say what is wrong or doubtful, draw the machine at its neutral pose."""
     import numpy as np
 
-    from toolpath_stiff.analysis.machine_check import check_machine, neutral_words, symmetry_words
+    from toolpath_stiff.analysis.checks import check_machine, neutral_words, symmetry_words
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.machine.kinematics import solve_struts_at
     from toolpath_stiff.report.machine_picture import machine_views
-    from toolpath_stiff.stiffness.acting import acting_names, condition_warnings
-    from toolpath_stiff.stiffness.model import build_model
+    from toolpath_stiff.stiffness.model import acting_names, build_model, condition_warnings
 
     if not Path(args.file).is_file():
         new = command_line("machine", "new", args.file)

@@ -21,7 +21,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis.stiffness_map import StiffnessMap
+    from toolpath_stiff.analysis.poses import StiffnessMap
     from toolpath_stiff.stiffness.model import StiffnessModel
 
 EPILOG = """\
@@ -82,7 +82,7 @@ def _angles(text: str) -> tuple[float, float, float]:
 def run(args: argparse.Namespace) -> int:
     """Evaluate the grid and write the files."""
     from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.analysis.stiffness_map import map_stiffness
+    from toolpath_stiff.analysis.poses import map_stiffness
     from toolpath_stiff.cli.progress import progress_bar
     from toolpath_stiff.units import m_from_mm, rad_from_deg
 
@@ -132,8 +132,8 @@ def map_summary(model: StiffnessModel, found: StiffnessMap) -> dict[str, Any]:
     """Extremes of each slice, and of a circle about the machine axis where the map holds one."""
     import numpy as np
 
-    from toolpath_stiff.analysis.stiffness_map import turning_points
-    from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated
+    from toolpath_stiff.analysis.poses import turning_points
+    from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
     from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
     slices = []

@@ -26,8 +26,8 @@ from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
-    from toolpath_stiff.placement.batch import Keepout
     from toolpath_stiff.placement.climb import Bounds
+    from toolpath_stiff.placement.evaluator import Keepout
     from toolpath_stiff.placement.placing import Placed, Task
 
 EPILOG = """\
@@ -280,7 +280,7 @@ def _bounds(args: argparse.Namespace, machine: Machine) -> Bounds:
 
 
 def _keepouts(args: argparse.Namespace) -> tuple[Keepout, ...]:
-    from toolpath_stiff.placement.batch import Keepout
+    from toolpath_stiff.placement.evaluator import Keepout
     from toolpath_stiff.units import m_from_mm
 
     boxes = []
@@ -291,7 +291,7 @@ def _keepouts(args: argparse.Namespace) -> tuple[Keepout, ...]:
 
 
 def _write(args: argparse.Namespace, target: Destination, placed: Placed) -> list[Path]:
-    from toolpath_stiff.placement.report_data import COLUMNS
+    from toolpath_stiff.placement.document import COLUMNS
 
     summary = placed.summary
     rows = [",".join(_cell(row[name]) for name in COLUMNS) for row in summary["front"]]

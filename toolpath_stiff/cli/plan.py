@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     )
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.stiffness.effects.registry import known_effects
+    from toolpath_stiff.stiffness.effects import known_effects
     from toolpath_stiff.updating.planning.visits import Costs
 
     machine = load_machine(args.machine)

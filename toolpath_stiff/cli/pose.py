@@ -107,7 +107,7 @@ def _decimals(name: str) -> int | None:
 
 def _csv(model: StiffnessModel, args: argparse.Namespace) -> int:
     from toolpath_stiff.column_files import csv_rows
-    from toolpath_stiff.stiffness.acting import condition_warnings
+    from toolpath_stiff.stiffness.model import condition_warnings
 
     poses = _read_poses(args.csv)
     found = _evaluate(model, poses, args.force)
@@ -171,7 +171,7 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
     import numpy as np
 
     from toolpath_stiff.errors import UnreachableError
-    from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated
+    from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
 
     poses = np.array([[*args.pose, 0.0, 0.0, 0.0][:6]])
     if np.abs(poses).max() > FARTHEST:
@@ -197,7 +197,7 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
 def _print_pose(model: StiffnessModel, values: dict[str, Any], found: PoseReport) -> None:
     x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
     from toolpath_stiff.report.wording import machine_text
-    from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated
+    from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
 
     named = machine_text({"machine": model.machine.title, **effects_stated(model)})
     print(f"{named}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n")

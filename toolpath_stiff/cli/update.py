@@ -133,8 +133,7 @@ def _next(args: argparse.Namespace, updated: Machine | None, machine_file: str) 
     """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
     if updated is None:
         return []
-    from toolpath_stiff.stiffness.acting import setup_of
-    from toolpath_stiff.stiffness.model import build_model
+    from toolpath_stiff.stiffness.model import build_model, setup_of
 
     model = build_model(updated, args.effects)
     setups = [name for active in model.effects if (name := setup_of(active))]

@@ -1,8 +1,7 @@
 """Machine files, kinematics and limits of six-strut platforms."""
 
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
-from toolpath_stiff.machine.forward import forward_kinematics
-from toolpath_stiff.machine.kinematics import Struts, joint_angles, singularity_index, solve_struts
+from toolpath_stiff.machine.kinematics import Struts, forward_kinematics, joint_angles, singularity_index, solve_struts
 from toolpath_stiff.machine.limits import Limit, Reach, machine_limits, reach
 from toolpath_stiff.machine.model import EffectEntry, Limits, Machine, StrutLaw
 from toolpath_stiff.machine.writer import machine_toml

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.machine.model import EffectEntry, Machine
-from toolpath_stiff.machine.uncertainty import Uncertainty
+from toolpath_stiff.machine.model import EffectEntry, Machine, Uncertainty
 from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
 
 FloatArray = NDArray[np.float64]

@@ -15,8 +15,7 @@ from typing import Any
 from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.nc import Program, parse_program
-from toolpath_stiff.stiffness.acting import condition_warnings, effects_stated, machine_words
-from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated, machine_words
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
 PROGRAM = "case_study.nc"

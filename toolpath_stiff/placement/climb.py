@@ -1,10 +1,12 @@
-"""Climbing from one placement: a sequence of linear programmes within a trust region.
+"""Climbing from one placement, a sequence of linear programmes within a trust region; and fronts of placements.
 
 Range and weakest place are extremes over samples and have kinks where two samples are equally stiff, which is where
 their best values lie. Linearised sample by sample they are constraints of a linear programme (the epigraph form:
 L <= k_i <= H for all i), and so are the limits and what must not get worse. Its solution is tried; where the figures
 did not follow, the trust region shrinks (Fletcher, Practical Methods of Optimization, 1987, section 14.4, exact penalty
 functions; here with one shared slack for all constraints, so that there is always a solution).
+
+A front holds what nothing beats in mean, range and weakest place.
 """
 
 from __future__ import annotations
@@ -14,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.placement.batch import Evaluator, PlacedRows, PlacementFigures
+from toolpath_stiff.placement.evaluator import Evaluator, PlacedRows, PlacementFigures
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
 
 DIFFERENCE = 1e-6  # of each range, for the derivatives
 PENALTY = 100.0  # what a shortfall costs, in units of the objective
@@ -330,3 +333,41 @@ def _block(slopes: FloatArray, rest: list[float]) -> FloatArray:
     """Rows (n, free + 4) of one kind of constraint from derivatives (free, n)."""
     n = slopes.shape[1]
     return np.concatenate([slopes.T, np.tile(np.array(rest), (n, 1))], axis=1)
+
+
+def front_rows(figures: PlacementFigures, kept: NDArray[np.bool_]) -> IntArray:
+    """Rows of those kept that no other beats in all of mean, range and weakest, by rising mean; equals stand once."""
+    rows = np.flatnonzero(kept & np.isfinite(figures.mean))
+    values, first = np.unique(figures.objectives[rows], axis=0, return_index=True)
+    rows = rows[first]
+    no_worse = np.asarray((values[:, None] >= values[None]).all(axis=2))  # [i, j]: i is at least as good as j in all
+    no_worse[np.diag_indices(len(rows))] = False
+    return np.asarray(rows[~no_worse.any(axis=0)], dtype=np.int64)
+
+
+def thin(objectives: FloatArray, rows: IntArray, points: int, best: int = -1) -> IntArray:
+    """At most `points` of rows (n,) with objectives (n, 3), spread over the front by farthest-point choice.
+
+    Its ends and the row `best` come first.
+    """
+    if len(rows) <= points:
+        return rows
+    scaled = (objectives - objectives.min(axis=0)) / np.maximum(np.ptp(objectives, axis=0), 1e-12)
+    chosen = list(dict.fromkeys([*np.flatnonzero(rows == best), *scaled.argmax(axis=0)]))[:points]
+    distance = np.min([((scaled - scaled[i]) ** 2).sum(axis=1) for i in chosen], axis=0)
+    while len(chosen) < points:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, ((scaled - scaled[chosen[-1]]) ** 2).sum(axis=1))
+    return np.asarray(rows[np.sort(np.array(chosen))])
+
+
+def apart(bounds: Bounds, placements: FloatArray, count: int) -> list[int]:
+    """The first of ranked placements, and the best of the others that are not beside one chosen."""
+    unit = bounds.unit(placements)
+    chosen: list[int] = []
+    for i in range(len(unit)):
+        if all(np.abs(unit[i] - unit[j]).max(initial=0.0) > 0.1 for j in chosen):
+            chosen.append(i)
+        if len(chosen) == count:
+            break
+    return chosen

@@ -1,43 +1,48 @@
 """A program placed: search or an earlier search's front, one placement chosen, analysed, and everything said about it.
 
-`place_program` searches; `place_again` takes another point of a front that was found before. Both return `Placed`,
-which the command line saves and prints.
+`place_program` searches; `place_again` takes another point of a front that was found before, and refuses where
+anything has changed since that search (`fingerprint`). Both return `Placed`, which the command line saves and prints.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.analysis.results import Analysis, analyse
+from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.placement.advice import placement_warnings, worsened
-from toolpath_stiff.placement.batch import Evaluator, PlacementFigures
+from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.climb import Bounds
-from toolpath_stiff.placement.fingerprint import fingerprint, refuse_other_search
-from toolpath_stiff.placement.report_data import (
+from toolpath_stiff.placement.document import (
     FIGURES,
     figures_of,
     front_rows,
     placement_of,
     placement_row,
     placement_summary,
+    placement_warnings,
     pose_of,
+    worsened,
 )
+from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
+from toolpath_stiff.placement.paths import Read, WorkPath, work_path
 from toolpath_stiff.placement.search import SearchRules, search_placements
-from toolpath_stiff.placement.work_path import Read, WorkPath, work_path
-from toolpath_stiff.placement.written_path import rewriting_differences
-from toolpath_stiff.rewriting import check_decimals, check_rewritable, rewrite_program
+from toolpath_stiff.rewriting import Rewritten, check_decimals, check_rewritable, rewrite_program
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose
+from toolpath_stiff.units import Pose, mm_from_m
 
 FloatArray = NDArray[np.float64]
+
+COMPARED = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_per_mm"}
 
 
 @dataclass(frozen=True)
@@ -200,7 +205,7 @@ def _placed(
     old = figures_of(before) if before else None
     worse = worsened(chosen, old)
     rewritten, written = _rewritten(task, program, best)
-    warnings = placement_warnings(task, search, chosen, old, reason, worse, present, best)
+    warnings = placement_warnings(task.bounds, task.rules, search, chosen, old, reason, worse, present, best)
     summary = placement_summary(program, best, rows, search, chosen, old, reason, worse, written, warnings)
     return Placed(task, summary, best, before, program, rewritten)
 
@@ -232,3 +237,78 @@ def _rewritten(task: Task, program: Program, best: Analysis) -> tuple[bytes | No
         "relative_difference": rewriting_differences(best, rewritten, task.present, **writing.reading),
         "notes": list(rewritten.notes),
     }
+
+
+def fingerprint(task: Task) -> dict[str, Any]:
+    """Hashes of program and machine, and the options that a search depends on, under their names."""
+    program, rules, bounds = task.program, task.rules, task.bounds
+    moves = [getattr(program.moves, f.name).tobytes() for f in fields(program.moves)]
+    acting = [(active.effect.name, sorted(active.values.items())) for active in task.model.effects]
+    acting_in = f"{acting!r} {task.model.conditions!r}"
+    low, high = bounds.low.tolist(), bounds.high.tolist()
+    return {
+        "program_sha256": _hash("\n".join(program.source).encode("utf-8", "replace"), *moves),
+        "machine_sha256": _hash(machine_toml(task.model.machine).encode(), acting_in.encode()),
+        "options": {
+            **{f"--{name}": [low[i], high[i]] for i, name in enumerate(("x", "y", "z", "tilt-a", "tilt-b", "rotate"))},
+            "--z-values": list(bounds.heights),
+            "--keep-out": [[box.name, *box.low, *box.high] for box in rules.keepouts],
+            "--objective": rules.objective,
+            "--margin": rules.margin,
+            "--allow-extrapolation": rules.allow_extrapolation,
+            "--points": rules.points,
+            "--seed": rules.seed,
+            "--origin": list(task.present),
+            "--load": str(task.load),
+            "--step": mm_from_m(task.step),
+            "--force": task.force,
+        },
+    }
+
+
+def refuse_other_search(task: Task, earlier: dict[str, Any]) -> None:
+    """Raise `InputError` where an earlier search was not of this program, machine and options; names what differs."""
+    now, then = fingerprint(task), earlier.get("search")
+    if not isinstance(then, dict) or "front" not in earlier:
+        raise InputError("--pick: placement.json is of an older version", hint="search again, without --pick")
+    differ = [name for name in ("program", "machine") if now[f"{name}_sha256"] != then.get(f"{name}_sha256")]
+    options = then.get("options", {})
+    differ += [name for name, value in now["options"].items() if options.get(name) != value]
+    if differ:
+        raise InputError(
+            f"--pick: the earlier search differs in {', '.join(differ)}",
+            expected="the same program, machine and options as in the search",
+            hint="repeat the search's own command with --pick added, or search again without it",
+        )
+
+
+def _hash(*parts: bytes) -> str:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def rewriting_differences(
+    placed: Analysis, rewritten: Rewritten, original_origin: Pose, **reading: Any
+) -> dict[str, float]:
+    """Relative differences of mean, range and smallest stiffness: the rewritten program against the placed one.
+
+    Parameters
+    ----------
+    placed
+        The untouched program, analysed at the placement.
+    rewritten
+        Is read and analysed at the original origin with the same load, force and step.
+    original_origin
+        m and rad, as it was given to `rewrite_program`.
+    **reading
+        `offsets`, `tools`, `block_delete`, as for `parse_program`.
+    """
+    program = parse_program(rewritten.text, placed.program.name, origin=original_origin, **reading)
+    again = analyse(
+        placed.model, program, origin=original_origin, load=placed.load, step=placed.step, force=placed.force
+    )
+    wanted, found = (stiffness_figures(analysis, analysis.counted) for analysis in (placed, again))
+    scale = {"range": wanted["range_N_per_mm"] or wanted["mean_N_per_mm"]}  # a path of one point has no range
+    return {name: abs(found[key] - wanted[key]) / scale.get(name, wanted[key]) for name, key in COMPARED.items()}

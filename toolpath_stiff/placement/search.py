@@ -13,17 +13,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.placement import batch
-from toolpath_stiff.placement.batch import Evaluator, Keepout, PlacementFigures
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules
-from toolpath_stiff.placement.front import apart, front_rows, thin
-from toolpath_stiff.placement.work_path import WorkPath, placed_path, telling_path
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, front_rows, thin
+from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures, clearances
+from toolpath_stiff.placement.paths import WorkPath, placed_path, telling_path
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -256,7 +254,7 @@ def _breaks(search: _Search, path: WorkPath, placement: FloatArray, columns: Int
     stand = reach(machine, position, struts, rotation)
     worst = int(np.argmin(stand.margin))
     if stand.margin[worst] >= search.rules.margin:
-        boxes = [box.name for box in search.asked.keepouts if batch.clearances(box, position).min() < 0.0]
+        boxes = [box.name for box in search.asked.keepouts if clearances(box, position).min() < 0.0]
         return f"it runs through the keep-out {boxes[0]}" if boxes else "it cannot be kept"
     return stand.describe(worst)
 
@@ -378,7 +376,7 @@ def _infeasible(search: _Search, placement: FloatArray) -> UnreachableError:
             hint="widen the bounds, or cut the part in two set-ups",
         )
     if figures.clearance[0] < 0.0:
-        depths = [batch.clearances(box, position) for box in search.asked.keepouts]
+        depths = [clearances(box, position) for box in search.asked.keepouts]
         deepest = int(np.argmin([depth.min() for depth in depths]))
         row = int(np.argmin(depths[deepest]))
         return UnreachableError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpath_stiff.analysis.breakdown import class_figures
+from toolpath_stiff.analysis.statistics import class_figures
 from toolpath_stiff.report.wording import headline_text, plain, shortened
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from toolpath_stiff.analysis.stiffness_map import StiffnessMap
+from toolpath_stiff.analysis.poses import StiffnessMap
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.report.page import json_for_script
 from toolpath_stiff.report.sections import escaped

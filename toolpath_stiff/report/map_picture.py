@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.stiffness_map import StiffnessMap
+from toolpath_stiff.analysis.poses import StiffnessMap
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, png_bytes
 from toolpath_stiff.report.wording import number

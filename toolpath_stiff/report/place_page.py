@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.analysis import Analysis
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.placement.batch import Keepout
-from toolpath_stiff.placement.drawn_path import DrawnPath, drawn_path
-from toolpath_stiff.placement.report_data import placement_of
+from toolpath_stiff.placement.document import placement_of
+from toolpath_stiff.placement.evaluator import Keepout
+from toolpath_stiff.placement.paths import DrawnPath, drawn_path
 from toolpath_stiff.report.page import json_for_script
 from toolpath_stiff.report.page_data import class_colours
 from toolpath_stiff.report.template import asset, filled, script_hash, style

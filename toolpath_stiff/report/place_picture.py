@@ -8,8 +8,8 @@ import numpy as np
 
 from toolpath_stiff.analysis import Analysis
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.analysis.stiffness_map import map_stiffness
-from toolpath_stiff.placement.report_data import FIGURES
+from toolpath_stiff.analysis.poses import map_stiffness
+from toolpath_stiff.placement.document import FIGURES
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
 from toolpath_stiff.report.profile_picture import profile_curve
 from toolpath_stiff.report.wording import machine_text, number, plain

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.parameter_band import NORMAL_95
-from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
+from toolpath_stiff.analysis.statistics import NORMAL_95, stiffness_figures, weakest_places
 from toolpath_stiff.report.figure import (
     DPI,
     INK,

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from toolpath_stiff.analysis.cut_classes import PLUNGES_ONLY
-from toolpath_stiff.stiffness.acting import machine_words
+from toolpath_stiff.analysis.loads import PLUNGES_ONLY
+from toolpath_stiff.stiffness.model import machine_words
 
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}

@@ -65,7 +65,7 @@ def write_analysis(
 
 def summary_with_options(analysis: Analysis, required: float | None, other: Analysis | None) -> dict[str, Any]:
     """`analysis.summary()`, with `required` and `compare` where these were asked for; no nan, no infinity."""
-    from toolpath_stiff.analysis.path_analysis import required_stiffness_missed
+    from toolpath_stiff.analysis.results import required_stiffness_missed
 
     summary = dict(analysis.summary())
     if required is not None:
@@ -100,7 +100,7 @@ def _contents(
     analysis: Analysis, plots: bool, table: str, required: float | None, other: Analysis | None, show_plunges: bool
 ) -> dict[str, Callable[[], Content]]:
     """Names of the files, and what makes each."""
-    from toolpath_stiff.analysis.tables import samples_csv, samples_parquet
+    from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
 
     summary = summary_with_options(analysis, required, other)
     contents: dict[str, Callable[[], Content]] = {

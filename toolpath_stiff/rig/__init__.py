@@ -10,10 +10,8 @@ kinematics, its own mechanics (assembled elements, displacement method).
 
 from toolpath_stiff.rig.case import Case, draw_case, effects_of_layout, make_case
 from toolpath_stiff.rig.effects import CATALOGUE
-from toolpath_stiff.rig.exercise import measure_again, new_exercise, reveal
-from toolpath_stiff.rig.noise import Nuisances
-from toolpath_stiff.rig.outside import OUTSIDE
-from toolpath_stiff.rig.tables import csv_text
+from toolpath_stiff.rig.exercise import csv_text, measure_again, new_exercise, reveal
+from toolpath_stiff.rig.hidden import OUTSIDE, Nuisances
 
 __all__ = [
     "CATALOGUE",

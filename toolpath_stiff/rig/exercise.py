@@ -1,26 +1,244 @@
-"""A blind exercise as a folder: measurements.csv, machine.toml and sealed.bin; measuring again; opening the seal."""
+"""A blind exercise as a folder: measurements.csv, machine.toml and sealed.bin; measuring again; opening the seal.
+
+The sealed truth is opaque to a look into the file, and tampering is noticed. It is no cryptography: the key stands
+below, so whoever wants to cheat can; the seal keeps an honest user from reading the answer by accident. The truth is
+written as JSON, compressed, padded to one length (so that the size tells nothing), scrambled with a SHA-256 key stream
+and preceded by a keyed digest.
+"""
 
 from __future__ import annotations
 
+import csv
+import dataclasses
 import hashlib
+import hmac
+import io
+import json
+import math
+import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content, write_atomically
+from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.files import Content, read_text, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
-from toolpath_stiff.rig.campaign import clamp_of
-from toolpath_stiff.rig.case import again, draw_case
+from toolpath_stiff.rig.case import AXES, DEFAULT_SETUP, POSE, Case, Table, again, clamp_of, draw_case
 from toolpath_stiff.rig.effects import CATALOGUE
-from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.outside import OUTSIDE
-from toolpath_stiff.rig.seal import score, seal, unseal
-from toolpath_stiff.rig.tables import csv_text, read_plan
+from toolpath_stiff.rig.hidden import OUTSIDE, HiddenMachine, Nuisances, Oddity
+from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
+from toolpath_stiff.units import m_from_mm, rad_from_deg
+
+MAGIC = b"tps-rig-sealed-1\n"
+KEY = b"toolpath_stiff.rig: not a secret, only a blindfold"
+DIGEST = hashlib.sha256().digest_size
+BLOCK = 8192  # bytes; several times what one case needs
+
+# Column -> lowest and highest value that makes sense, and the value of an empty cell (None: a number is needed).
+NUMBERS: dict[str, tuple[float, float, float | None]] = {
+    **dict.fromkeys(POSE[:3], (-1e5, 1e5, None)),
+    **dict.fromkeys(POSE[3:], (-360.0, 360.0, 0.0)),
+    **dict.fromkeys(("dx", "dy", "dz"), (-1e3, 1e3, None)),
+    "force_N": (1e-3, 1e6, 1000.0),
+    "time_min": (0.0, 1e5, 0.0),
+    "tool_extension_mm": (-1e4, 1e4, 0.0),
+    "temperature_C": (-50.0, 100.0, 20.0),
+}
+WHOLE = ("clamp",)
+LABELS = ("repeat", "point")  # any text
+WORDS = ("setup", "loop")
+RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm")
+TIP_LOOPS = ("", "tip")  # the rig's only indicator: tool tip against workpiece
 
 MEASUREMENTS, MACHINE, SEALED = FILES = "measurements.csv", "machine.toml", "sealed.bin"
 NO_OTHER = Rules(fresh=True)
+
+
+def seal(case: Case, seed: int, layout: str) -> bytes:
+    """Content of `sealed.bin`; the same case gives the same bytes."""
+    machine = {
+        field.name: value.tolist() if isinstance(value := getattr(case.machine, field.name), np.ndarray) else value
+        for field in dataclasses.fields(case.machine)
+    }
+    if case.machine.oddity is not None:
+        machine["oddity"] = dataclasses.asdict(case.machine.oddity)
+    content = {
+        "seed": seed,
+        "layout": layout,
+        "truth": case.truth,
+        "machine": machine,
+        "nuisances": dataclasses.asdict(case.nuisances),
+        "nominal": {"name": case.nominal.name, "text": case.nominal.text},
+        "columns": list(case.rows),
+        "clamps": int(max(case.rows.get("clamp", [0]))),
+    }
+    packed = zlib.compress(json.dumps(content, sort_keys=True).encode(), 9)
+    length = len(packed).to_bytes(4, "big")
+    body = (length + packed).ljust(-(-(len(packed) + 4) // BLOCK) * BLOCK, b"\0")
+    digest = hmac.digest(KEY, body, "sha256")
+    return MAGIC + digest + _scrambled(body, digest)
+
+
+def unseal(file: str | Path) -> tuple[Case, dict[str, Any]]:
+    """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
+    try:
+        content = Path(file).read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"cannot read {str(file)!r}: {error.strerror}", hint="give the folder that `tps rig new` wrote"
+        ) from None
+    digest = content[len(MAGIC) : len(MAGIC) + DIGEST]
+    body = _scrambled(content[len(MAGIC) + DIGEST :], digest)
+    if not content.startswith(MAGIC) or not hmac.compare_digest(digest, hmac.digest(KEY, body, "sha256")):
+        raise InputError(
+            "the seal is broken: the file was changed or is no sealed truth",
+            hint="make the exercise anew with `tps rig new`",
+            file=str(file),
+        )
+    sealed: dict[str, Any] = json.loads(zlib.decompress(body[4 : 4 + int.from_bytes(body[:4], "big")]))
+    machine: dict[str, Any] = {k: np.array(v) if isinstance(v, list) else v for k, v in sealed["machine"].items()}
+    machine["spindle"] = tuple(sealed["machine"]["spindle"])
+    if sealed["machine"]["oddity"] is not None:
+        machine["oddity"] = Oddity(**sealed["machine"]["oddity"])
+    nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
+    case = Case({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"]))
+    return case, sealed
+
+
+def _scrambled(body: bytes, nonce: bytes) -> bytes:
+    """The body, every byte exclusive-or with a key stream; its own inverse."""
+    count = -(-len(body) // DIGEST)
+    stream = b"".join(hashlib.sha256(KEY + nonce + i.to_bytes(4, "big")).digest() for i in range(count))
+    return bytes(a ^ b for a, b in zip(body, stream, strict=False))
+
+
+def score(hidden: list[str], claim: list[str]) -> str:
+    """`right`, `partly`, `wrong` or `correctly none`.
+
+    Nothing hidden is claimed as `none` or `adequate`; something outside the catalogue as `outside` or `unexplained`,
+    or by its own name.
+    """
+    claimed = {name for name in claim if name not in ("none", "adequate")}
+    truth = set(hidden)
+    if claimed & {"outside", "unexplained"}:
+        claimed = (claimed - {"outside", "unexplained"}) | ((truth & set(OUTSIDE)) or {"outside"})
+    if not truth:
+        return "wrong" if claimed else "correctly none"
+    if claimed == truth:
+        return "right"
+    return "partly" if claimed & truth else "wrong"
+
+
+def csv_text(table: Mapping[str, Any]) -> str:
+    """The table as CSV; numbers as short as they are exact to ten digits."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(table)
+    for row in zip(*table.values(), strict=True):
+        writer.writerow([value if isinstance(value, str) else f"{value + 0.0:.10g}" for value in row])
+    return stream.getvalue()
+
+
+def read_plan(file: str, nominal: Nominal) -> Table:
+    """Table of a plan; stiffness and its sd may be there, empty or not, and are left out.
+
+    Raises
+    ------
+    InputError, InputErrors
+        Not a table of poses; or every bad cell and unreachable pose, named.
+    """
+    lines = [row for row in enumerate(csv.reader(io.StringIO(read_text(file, "the plan"))), 1) if any(row[1])]
+    if len(lines) < 2:
+        raise InputError("no poses", expected="a heading (x_mm,y_mm,z_mm,direction ...) and rows", file=file)
+    (first, heading), body = lines[0], lines[1:]
+    heading = [name.strip() for name in heading]
+    _check_heading(heading, file, first)
+    errors: list[InputError] = []
+    table: Table = {}
+    for column, name in enumerate(heading):
+        if name in RESULTS:
+            continue
+        values = []
+        for line, row in body:
+            cell = row[column].strip() if column < len(row) else ""
+            try:
+                values.append(_value(name, cell))
+            except ValueError as error:
+                errors.append(InputError(f"{name} {cell!r}", expected=str(error), file=file, line=line))
+        table[name] = values if name in (*LABELS, *WORDS, "direction") else np.array(values)
+    if errors:
+        raise InputErrors(errors)
+    _check_rows(table, [line for line, _ in body], nominal, file)
+    table.pop("loop", None)
+    return table
+
+
+def _check_heading(heading: list[str], file: str, line: int) -> None:
+    known = (*NUMBERS, *WHOLE, *LABELS, *WORDS, *RESULTS, "direction")
+    for name in heading:
+        if name not in known or heading.count(name) > 1:
+            wrong = "unknown column" if name not in known else "column given twice:"
+            raise InputError(f"{wrong} {name!r}", expected=", ".join(known), file=file, line=line)
+    vectors = [name for name in ("dx", "dy", "dz") if name in heading]
+    if ("direction" in heading) == bool(vectors) or len(vectors) not in (0, 3):
+        raise InputError("directions unclear", expected="either direction or dx,dy,dz", file=file, line=line)
+    for name in POSE[:3]:
+        if name not in heading:
+            raise InputError(f"column {name} is missing", expected="x_mm,y_mm,z_mm", file=file, line=line)
+
+
+def _value(name: str, cell: str) -> float | int | str:
+    """The value of a cell; ValueError says what was expected."""
+    if name == "direction":
+        if cell not in AXES:
+            raise ValueError("X, Y or Z")
+        return cell
+    if name == "loop":
+        if cell not in TIP_LOOPS:
+            raise ValueError("an empty cell or 'tip': the rig has its indicator at the tool tip alone")
+        return cell
+    if name in LABELS:
+        return cell
+    if name == "setup":
+        return cell or DEFAULT_SETUP
+    if name in WHOLE:
+        if not cell.isdecimal():
+            raise ValueError("a whole number")
+        return int(cell)
+    low, high, default = NUMBERS[name]
+    if not cell and default is not None:
+        return default
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        raise ValueError(f"a number from {low:g} to {high:g}")
+    return value
+
+
+def _check_rows(table: Table, lines: list[int], nominal: Nominal, file: str) -> None:
+    """Directions that are none and poses that the machine cannot take."""
+    count = len(lines)
+    poses = np.column_stack([table.get(name, np.zeros(count)) for name in POSE])
+    extension = m_from_mm(np.asarray(table.get("tool_extension_mm", np.zeros(count))))
+    reached = reachable(nominal, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), extension)
+    errors = [
+        InputError(f"machine {nominal.name} cannot reach this pose", file=file, line=line)
+        for line, good in zip(lines, reached, strict=True)
+        if not good
+    ]
+    if "dx" in table:
+        length = np.linalg.norm([table[name] for name in ("dx", "dy", "dz")], axis=0)
+        errors += [
+            InputError("a direction of no length", expected="dx, dy, dz not all 0", file=file, line=line)
+            for line, size in zip(lines, length, strict=True)
+            if size < 1e-9
+        ]
+    if errors:
+        raise InputErrors(errors)
 
 
 def new_exercise(

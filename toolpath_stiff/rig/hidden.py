@@ -2,27 +2,130 @@
 
 `HiddenMachine` holds the differences; all of them zero is the nominal machine. `true_stiffness` turns it and the
 rows of a campaign into stiffnesses, `readings` adds what the instruments do to them.
+
+Oddities are physics that no effect of the catalogue describes, for testing the verdict "something else is missing".
+Each is one formula on struts, joints, table or readings; `size` scales it. They are invented for the purpose, with
+the shapes that damaged or badly set machines show; no source gives figures for them.
+
+`Nuisances` are what every real campaign adds, whether or not something is hidden.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-from toolpath_stiff.rig.kinematics import commanded_lengths, platform_points, rotations, true_poses
-from toolpath_stiff.rig.nominal import Nominal
-from toolpath_stiff.rig.outside import Oddity, extra_joint, extra_table, reading_factor, strut_block
+from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, platform_points, rotations, true_poses
 from toolpath_stiff.rig.structure import Geometry, Links, secant_compliance
+from toolpath_stiff.units import n_per_m_from_n_per_mm, n_per_mm_from_n_per_m
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+REACH = 0.3  # m, half the width of the workspace that the paper measured
+REFERENCE_LOAD = 1000.0  # N
+
+# Name -> what it is. The second group needs columns (time, several loads) that only some campaigns have.
+ODDITIES = {
+    "loose_preload": "joints softer in tension than in compression",
+    "screw_pitch_error": "strut stiffness varies periodically with length",
+    "cracked_bed": "the workpiece side gives way where y is positive only",
+    "ball_screw_torsion": "struts softer towards positive x, as if their screws twisted with the carriage",
+    "strut_crosstalk": "the load of strut 1 moves strut 4 and the other way round",
+    "saddle_overhang": "the workpiece side gives way along X, growing with the square of y",
+    "cable_drag": "a cable pulls along X in proportion to x, and the gauge reads it",
+}
+ODDITIES_IN_TIME = {
+    "warming_leg": "one strut softens in the course of the campaign",
+    "joint_friction": "sticking joints: stiffer at small loads",
+}
+OUTSIDE = (*ODDITIES, *ODDITIES_IN_TIME)
+
 StrArray = NDArray[np.str_]
 
 HERTZ_LOAD = 500.0  # N, load at which contact_nonlinearity's compliance is quoted (assumed; effects catalogue)
 SLACK_LOAD = 0.1  # N, below which a joint's secant compliance is held: far below any load of a campaign
+
+# Resolution of what is printed: whole N/mm, as in the paper's Table 1 (published).
+PRINTED_N_PER_MM = 1.0
+
+
+@dataclass(frozen=True)
+class Oddity:
+    """One of the oddities.
+
+    Attributes
+    ----------
+    kind
+        Its name.
+    size
+        Relative change (1: 100 %), or compliance in m/N for `loose_preload`, `cracked_bed`, `saddle_overhang`.
+    strut
+        Number of the strut concerned, from 0 (`warming_leg`).
+    wavelength, phase
+        m and rad, of `screw_pitch_error`.
+    """
+
+    kind: str
+    size: float
+    strut: int = 0
+    wavelength: float = 0.15
+    phase: float = 0.0
+
+
+def strut_block(odd: Oddity | None, stiffness: FloatArray, lengths: FloatArray, rows: Rows) -> FloatArray:
+    """(n, 6, 6) N/m from the struts' own stiffnesses (n, 6)."""
+    factor: FloatArray = np.ones(stiffness.shape)
+    if odd is not None and odd.kind == "screw_pitch_error":
+        factor += odd.size * np.sin(2.0 * np.pi * lengths / odd.wavelength + odd.phase)
+    if odd is not None and odd.kind == "ball_screw_torsion":
+        # Compliance greater by `size` at the right edge of the workspace, by less and less towards the left.
+        factor /= 1.0 + odd.size * np.exp(rows.position[:, :1] / REACH - 1.0)
+    if odd is not None and odd.kind == "warming_leg":
+        factor[:, odd.strut] = 1.0 / (1.0 + odd.size * rows.elapsed)
+    block = (stiffness * factor)[:, :, None] * np.eye(6)
+    if odd is not None and odd.kind == "strut_crosstalk":
+        # Flexibility with an off-diagonal term; below 1 the block stays positive definite.
+        first, second = 0, 3  # struts 1 and 4
+        coupled = odd.size * np.sqrt(1.0 / (stiffness[:, first] * stiffness[:, second]))
+        flexibility = (1.0 / stiffness)[:, :, None] * np.eye(6)
+        flexibility[:, first, second] = flexibility[:, second, first] = coupled
+        return np.asarray(np.linalg.inv(flexibility))
+    return block
+
+
+def extra_joint(odd: Oddity | None, forces: FloatArray) -> FloatArray:
+    """(n, 6) m/N along the struts, for strut forces (n, 6) N, tension positive."""
+    if odd is None or odd.kind != "loose_preload":
+        return np.zeros_like(forces)
+    return np.where(forces > 0.0, odd.size, 0.0)
+
+
+def extra_table(odd: Oddity | None, rows: Rows) -> FloatArray:
+    """(n, 3) m/N along the base axes, on the workpiece side."""
+    extra = np.zeros((len(rows.force), 3))
+    y = rows.position[:, 1]
+    if odd is not None and odd.kind == "cracked_bed":
+        extra[:, :2] = np.where(y > 0.0, odd.size, 0.0)[:, None]
+    if odd is not None and odd.kind == "saddle_overhang":
+        extra[:, 0] = odd.size * (y / REACH) ** 2
+    return extra
+
+
+def reading_factor(odd: Oddity | None, rows: Rows) -> FloatArray:
+    """(n,) on the stiffness that is read."""
+    factor = np.ones(len(rows.force))
+    if odd is not None and odd.kind == "cable_drag":
+        factor += odd.size * rows.position[:, 0] / REACH * np.abs(rows.direction[:, 0])
+    if odd is not None and odd.kind == "joint_friction":
+        # Friction carries a share of the load that shrinks as the load grows.
+        factor += odd.size * REFERENCE_LOAD / (REFERENCE_LOAD + rows.force)
+    return factor
 
 
 @dataclass(frozen=True)
@@ -231,3 +334,66 @@ def _gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:
     else:
         hit = rows.setup == hidden.gauge_target
     return np.where(hit, hidden.gauge_factor, 1.0)
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """Standard deviations. The sizes are the issue's; repeat noise is the caller's (2 % unless said).
+
+    Attributes
+    ----------
+    repeat
+        Relative, of one reading.
+    clamping
+        Relative, common to the rows of one clamp.
+    strut_spread
+        Relative, of the struts' stiffnesses.
+    joint_error
+        m, of each coordinate of each joint.
+    outliers
+        Share of readings whose repeat noise is `outlier_width` times as wide.
+    """
+
+    repeat: float = 0.02
+    clamping: float = 0.01
+    strut_spread: float = 0.01
+    joint_error: float = 0.5e-3
+    outliers: float = 0.02
+    outlier_width: float = 4.0
+    rounded: bool = True
+
+    @classmethod
+    def none(cls) -> Nuisances:
+        """No nuisance at all, not even rounding."""
+        return cls(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, rounded=False)
+
+
+def disturb_machine(hidden: HiddenMachine, nuisances: Nuisances, rng: Generator) -> HiddenMachine:
+    """The machine with its struts spread and its joints displaced."""
+    return dataclasses.replace(
+        hidden,
+        strut_factors=hidden.strut_factors * (1.0 + nuisances.strut_spread * rng.standard_normal(6)),
+        frame_errors=hidden.frame_errors + nuisances.joint_error * rng.standard_normal((6, 3)),
+        platform_errors=hidden.platform_errors + nuisances.joint_error * rng.standard_normal((6, 3)),
+    )
+
+
+def disturb_readings(
+    stiffness: FloatArray, clamps: NDArray[np.int64], nuisances: Nuisances, rng: Generator
+) -> FloatArray:
+    """(n,) N/m as printed, from what undisturbed instruments would show; `clamps` (n,) numbers the clamps from 0."""
+    n = len(stiffness)
+    wide = np.where(rng.random(n) < nuisances.outliers, nuisances.outlier_width, 1.0)
+    repeat = nuisances.repeat * wide * rng.standard_normal(n)
+    clamping = nuisances.clamping * rng.standard_normal(int(clamps.max()) + 1)[clamps]
+    # On the logarithm, so that no reading can come out negative.
+    shown = stiffness * np.exp(repeat + clamping)
+    if not nuisances.rounded:
+        return np.asarray(shown)
+    printed = np.round(n_per_mm_from_n_per_m(shown) / PRINTED_N_PER_MM) * PRINTED_N_PER_MM
+    return np.asarray(n_per_m_from_n_per_mm(printed))
+
+
+def reading_sd(stiffness: FloatArray, nuisances: Nuisances) -> FloatArray:
+    """(n,) N/m, one reading's standard deviation, re-clamping included, as an experimenter would state it."""
+    return np.asarray(stiffness * np.hypot(nuisances.repeat, nuisances.clamping))

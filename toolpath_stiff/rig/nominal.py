@@ -1,8 +1,9 @@
-"""The nominal machine, read from its TOML file by the rig's own reader.
+"""The nominal machine, read from its TOML file by the rig's own reader, and its kinematics.
 
 The rig must not trust the reader of the model that it judges, so it has this one. It takes what it needs (joints,
 tool, strut law, limits of strut length and swing) and refuses machine files that carry effects: what the machine
-hides is the rig's to choose.
+hides is the rig's to choose. `true_poses` says where the platform really stands when the control, with the nominal
+geometry, commands a pose.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from toolpath_stiff.files import read_text
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 # Joints of one vertex of the frame lie within this angle about the machine's axis; vertices are far more apart.
 VERTEX_WIDTH = rad_from_deg(15.0)
@@ -168,3 +170,100 @@ def _joints(table: dict[str, Any], section: str, file: str) -> FloatArray:
         return m_from_mm(joints)
     radius, angle, height = m_from_mm(joints[:, 0]), rad_from_deg(joints[:, 1]), m_from_mm(joints[:, 2])
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+
+
+def rotations(angles: FloatArray) -> FloatArray:
+    """(n, 3, 3) R = Rz(yaw) Ry(pitch) Rx(roll) from (n, 3) roll, pitch, yaw in rad."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(angles).T, np.sin(angles).T
+    return np.stack(
+        [
+            np.stack([cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr], axis=-1),
+            np.stack([sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], axis=-1),
+            np.stack([-sp, cp * sr, cp * cr], axis=-1),
+        ],
+        axis=1,
+    )
+
+
+def commanded_lengths(nominal: Nominal, tips: FloatArray, turned: FloatArray, extension: FloatArray) -> FloatArray:
+    """(n, 6) m, strut lengths for tool tips (n, 3), rotations (n, 3, 3) and tools longer by `extension` (n,)."""
+    joints = platform_points(nominal.platform_joints, tips, turned, extension)
+    return np.asarray(np.linalg.norm(joints - nominal.frame_joints, axis=2))
+
+
+def platform_points(points: FloatArray, tips: FloatArray, turned: FloatArray, extension: FloatArray) -> FloatArray:
+    """(n, k, 3) m in base axes: platform points (k, 3), given from the reference tool's tip."""
+    raised = points + extension[:, None, None] * np.array([0.0, 0.0, 1.0])
+    return np.asarray(tips[:, None, :] + np.einsum("nij,nkj->nki", turned, raised))
+
+
+def true_poses(
+    lengths: FloatArray, frame: FloatArray, platform: FloatArray, tips: FloatArray, turned: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Poses (n, 3), (n, 3, 3) of the platform at which the true joints have the commanded strut lengths (n, 6).
+
+    Newton's method on the six closure equations, from the commanded pose; `platform` (6, 3) m counts from the origin
+    of the platform frame. Joint errors are millimetres, so three or four steps reach rounding.
+
+    Raises
+    ------
+    RuntimeError
+        No convergence: the errors are beyond anything that the rig draws.
+    """
+    position, orientation = tips.copy(), turned.copy()
+    for _ in range(20):
+        arms = np.einsum("nij,kj->nki", orientation, platform)
+        strut = position[:, None, :] + arms - frame
+        found = np.linalg.norm(strut, axis=2)
+        gap = lengths - found
+        if np.abs(gap).max() < 1e-13:
+            return position, orientation
+        unit = strut / found[:, :, None]
+        step = np.linalg.solve(np.concatenate([unit, np.cross(arms, unit)], axis=2), gap[:, :, None])[:, :, 0]
+        position = position + step[:, :3]
+        orientation = _turn(step[:, 3:]) @ orientation
+        if np.abs(step).max() < 1e-12:
+            return position, orientation
+    raise RuntimeError("the closure equations of the platform did not converge")
+
+
+def _turn(vector: FloatArray) -> FloatArray:
+    """(n, 3, 3) rotation matrices of rotation vectors (n, 3) (Rodrigues)."""
+    angle = np.linalg.norm(vector, axis=1)
+    x, y, z = vector.T
+    zero = np.zeros_like(x)
+    skew = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], 1)
+    # sin(t)/t and (1 - cos t)/t^2 through sinc, which is safe at 0.
+    first = np.sinc(angle / np.pi)[:, None, None]
+    second = 0.5 * np.sinc(angle / (2.0 * np.pi))[:, None, None] ** 2
+    return np.asarray(np.eye(3) + first * skew + second * (skew @ skew))
+
+
+def reachable(nominal: Nominal, tips: FloatArray, angles: FloatArray, extension: FloatArray) -> BoolArray:
+    """(n,) whether strut lengths and joint swings stay within the nominal machine's limits."""
+    turned = rotations(angles)
+    lengths = commanded_lengths(nominal, tips, turned, extension)
+    low, high = nominal.strut_range
+    inside = ((lengths >= low) & (lengths <= high)).all(axis=1)
+    if nominal.swing is None:
+        return np.asarray(inside)
+    rest, moved = (
+        _strut_directions(nominal, *pose)
+        for pose in (
+            (nominal.neutral_pose[None, :3], rotations(nominal.neutral_pose[None, 3:]), np.zeros(1)),
+            (tips, turned, extension),
+        )
+    )
+    for limit, before, after in zip(nominal.swing, rest, moved, strict=True):
+        cosine = np.clip(np.einsum("nki,nki->nk", np.broadcast_to(before, after.shape), after), -1.0, 1.0)
+        inside &= (np.arccos(cosine) <= limit).all(axis=1)
+    return np.asarray(inside)
+
+
+def _strut_directions(
+    nominal: Nominal, tips: FloatArray, turned: FloatArray, extension: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors (n, 6, 3) along the struts in base axes and in platform axes."""
+    strut = platform_points(nominal.platform_joints, tips, turned, extension) - nominal.frame_joints
+    unit = strut / np.linalg.norm(strut, axis=2, keepdims=True)
+    return unit, unit @ turned

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
-from toolpath_stiff.stiffness.platform_truss import free_platform_flexibility
+from toolpath_stiff.stiffness.truss import free_platform_flexibility
 
 FloatArray = NDArray[np.float64]
 

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
-from toolpath_stiff.stiffness.effects.registry import find_effect
 from toolpath_stiff.updating.correction.machines import fitted_machine
 from toolpath_stiff.updating.diagnosis import FEWEST, make_problem, testable_effects
 from toolpath_stiff.updating.inference.candidates import Candidate, Component, candidates_of

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.machine import Machine, StrutLaw, load_machine, solve_struts
-from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.machine.uncertainty import STRUT_LAW, Uncertainty
+from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.effects.contract import SETUP
 from toolpath_stiff.stiffness.model import build_model

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.acting import setup_of
+from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
-from toolpath_stiff.stiffness.effects.registry import known_effects
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.stiffness.model import ActiveEffect, build_model, setup_of
 from toolpath_stiff.updating.inference import NONE, Judgement, judge
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import Baseline, Fit, HeldOut, held_out, refine

@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.acting import idle_on_readings
 from toolpath_stiff.stiffness.effects.contract import LoadPath
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
 from toolpath_stiff.updating.measurements import Measurements, measured_path
 
 FloatArray = NDArray[np.float64]

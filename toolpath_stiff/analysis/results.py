@@ -4,24 +4,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.cut_classes import headline_of, plunging_rows
-from toolpath_stiff.analysis.evaluate import PoseStiffness, Progress, evaluate
 from toolpath_stiff.analysis.loads import RULES, Load, parse_load
-from toolpath_stiff.analysis.parameter_band import ParameterBand, parameter_band
+from toolpath_stiff.analysis.poses import PoseStiffness, Progress, evaluate
+from toolpath_stiff.analysis.statistics import (
+    EvaluatedPath,
+    ParameterBand,
+    band_figures,
+    class_figures,
+    describe_sample,
+    parameter_band,
+    path_length,
+    per_operation,
+    per_tool,
+    samples_frame,
+    share,
+    weakest_places,
+)
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
-from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path import place, sample_moves
 from toolpath_stiff.path.samples import Samples
-from toolpath_stiff.stiffness.acting import acting_effects, condition_warnings, conditions_stated
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
-from toolpath_stiff.stiffness.model import StiffnessModel, build_model
+from toolpath_stiff.stiffness.model import (
+    StiffnessModel,
+    acting_effects,
+    build_model,
+    condition_warnings,
+    conditions_stated,
+    effects_stated,
+)
 from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
@@ -34,34 +51,25 @@ DEFAULT_STEP = 1e-3  # m; 1 mm resolves any feature that a mill can cut, and cos
 
 
 @dataclass(frozen=True)
-class Analysis:
-    """A program evaluated on a machine.
+class Analysis(EvaluatedPath):
+    """A program evaluated on a machine: the evaluated path, and what it was asked.
 
     Attributes
     ----------
-    program, model
-        What was analysed, on what.
+    model
+        The machine with its effects.
     origin, origin_source
         Where program zero sits (m, rad) and who said so: "option", "program" or "default".
-    load, force, step
-        Direction of the load; its size in N; distance of the samples in m.
-    samples
-        The path in machine coordinates.
-    at
-        Stiffness, struts, reach at every sample.
+    step
+        Distance of the samples in m.
     warnings
         What deserves a look, sentences for people, the program's own included.
     """
 
-    program: Program
     model: StiffnessModel
     origin: Pose
     origin_source: str
-    load: Load
-    force: float
     step: float
-    samples: Samples
-    at: PoseStiffness
     warnings: tuple[str, ...]
 
     @property
@@ -75,60 +83,16 @@ class Analysis:
         return self.model.machine
 
     @cached_property
-    def counted(self) -> BoolArray:
-        """(n,) samples in the statistics: cutting, reachable, with a load in the asked direction."""
-        return np.asarray(self.samples.cutting & self.at.reachable & (self.samples.weight > 0.0))
-
-    @cached_property
-    def plunging(self) -> BoolArray:
-        """(n,) counted samples of plunges along the tool axis; none where the load does not follow the motion."""
-        return plunging_rows(self.load, self.samples.tangent, self.samples.abc, self.counted)
-
-    @property
-    def headline(self) -> BoolArray:
-        """(n,) counted samples that mean, range and weakest place are about: those of `headline_rows`."""
-        return headline_of(self.counted, self.plunging)
-
-    @property
-    def set_aside(self) -> BoolArray:
-        """(n,) plunges beside the headline; none of a program that only plunges."""
-        return np.asarray(self.counted & ~self.headline)
-
-    @property
-    def deflection(self) -> FloatArray:
-        """(n,) m, the tip's deflection along the load under `force`."""
-        return np.asarray(self.force / self.at.stiffness)
-
-    @property
-    def out_of_reach(self) -> BoolArray:
-        """(n,) cutting samples that the machine cannot reach."""
-        return np.asarray(self.samples.cutting & ~self.at.reachable)
-
-    @cached_property
-    def operations(self) -> Operations:
-        """The program's operations, and the row of its operation for every move."""
-        return operations(self.program)
-
-    @property
-    def operation(self) -> NDArray[np.int64]:
-        """(n,) number of each sample's operation, from 1."""
-        return np.asarray(self.operations.of_move[self.samples.move] + 1)
-
-    @cached_property
     def parameter_band(self) -> ParameterBand | None:
         """What the uncertainty of the machine's fitted parameters does to the stiffness; None if none is known."""
-        return parameter_band(self)
+        return parameter_band(self, self.model)
 
     def to_frame(self) -> pd.DataFrame:
         """The samples as a pandas DataFrame, columns as in `samples.csv` (mm, degrees, N/mm)."""
-        from toolpath_stiff.analysis.tables import samples_frame
-
         return samples_frame(self)
 
     def summary(self) -> dict[str, object]:
         """The figures of `summary.json`."""
-        from toolpath_stiff.analysis.statistics import summarise
-
         return summarise(self)
 
 
@@ -327,6 +291,51 @@ def assumptions(analysis: Analysis) -> list[str]:
     if not acting:
         found.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
     return found
+
+
+def summarise(analysis: Analysis) -> dict[str, Any]:
+    """The figures of `summary.json`, in the shop's units."""
+    from toolpath_stiff import __version__
+
+    samples = analysis.samples
+    places = weakest_places(analysis)
+    cutting = samples.cutting & analysis.at.reachable
+    x, y, z, a, b, c = analysis.origin
+    nearest = int(np.argmin(np.where(cutting, analysis.at.margin, np.inf)))
+    band = None if analysis.parameter_band is None else band_figures(analysis, analysis.parameter_band)
+    return {
+        "program": analysis.program.name,
+        "interpreter": analysis.program.interpreter,
+        "kinematics": analysis.program.kinematics,
+        "machine": analysis.machine.name,
+        "load": str(analysis.load),
+        "force_N": analysis.force,
+        "step_mm": mm_from_m(analysis.step),
+        "origin_mm_deg": [mm_from_m(x), mm_from_m(y), mm_from_m(z), *(deg_from_rad(v) for v in (a, b, c))],
+        "origin_source": analysis.origin_source,
+        "samples": len(samples),
+        "cutting_length_mm": mm_from_m(path_length(samples, rapid=False)),
+        "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
+        "time_s": float(samples.t[-1]) if len(samples) else 0.0,
+        **class_figures(analysis, np.arange(len(samples))),
+        **({} if band is None else {"parameter_uncertainty": band}),
+        "weakest_places": [describe_sample(analysis, row) for row in places],
+        "per_tool": per_tool(analysis),
+        "per_operation": per_operation(analysis),
+        "min_margin": float(analysis.at.margin[nearest]),
+        "min_margin_limit": analysis.at.reach.describe(nearest),
+        "min_margin_line": int(samples.line[nearest]),
+        "out_of_reach_samples": int(analysis.out_of_reach.sum()),
+        "extrapolated_share": share(analysis.at.extrapolated, cutting),
+        **effects_stated(analysis.model),
+        "unsupported": [
+            {"line": u.line, "column": u.column, "word": u.word, "reason": u.reason}
+            for u in analysis.program.unsupported
+        ],
+        "assumptions": assumptions(analysis),
+        "warnings": list(analysis.warnings),
+        "version": __version__,
+    }
 
 
 def required_stiffness_missed(analysis: Analysis, required: float) -> list[tuple[int, float]]:

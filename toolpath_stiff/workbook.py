@@ -1,4 +1,4 @@
-"""One sheet of an Excel workbook (.xlsx) as cells of text, for `reading`. openpyxl is imported only here."""
+"""One sheet of an Excel workbook (.xlsx) as cells of text, for `tables`. openpyxl is imported only here."""
 
 from __future__ import annotations
 
@@ -7,16 +7,42 @@ import math
 import re
 import warnings
 import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.tables.grid import Grid, counts, typed
+
+SPREADSHEET_ERROR = re.compile(r"#[A-ZÄÖÜ][A-ZÄÖÜ0-9/_]*[!?]|#N/A|#N/?V")
 
 ZIP, OLD_EXCEL = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 LARGEST_BYTES = 200_000_000  # unpacked
 LARGEST_CELLS = 5_000_000
 SAVE_AS = "save it as .xlsx or CSV"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Line (row of a sheet) and cells of every row that is neither empty nor a comment.
+
+    `separator` is "" for a sheet; `merged` are cells that are merged side by side, row -> which.
+    """
+
+    rows: list[tuple[int, list[str]]]
+    separator: str
+    notes: tuple[str, ...] = ()
+    merged: Mapping[int, str] = field(default_factory=dict)
+
+
+def typed(cell: str) -> str:
+    """A cell without space around it; the printer's minus as a keyboard's."""
+    return cell.strip().replace("\u2212", "-")
+
+
+def counts(cells: list[str]) -> bool:
+    """Whether a row is neither empty nor a comment; an error of the spreadsheet begins like one."""
+    return any(cells) and (not cells[0].startswith("#") or bool(SPREADSHEET_ERROR.fullmatch(cells[0])))
 
 
 def split_name(path: str) -> tuple[str, str]:

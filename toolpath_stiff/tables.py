@@ -16,9 +16,7 @@ from dataclasses import dataclass
 
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import decoded, read_bytes
-from toolpath_stiff.tables.grid import SPREADSHEET_ERROR, Grid, counts, typed
-from toolpath_stiff.tables.marks import with_points
-from toolpath_stiff.tables.workbook import is_workbook, sheet_grid, split_name
+from toolpath_stiff.workbook import SPREADSHEET_ERROR, Grid, counts, is_workbook, sheet_grid, split_name, typed
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
 LOOKED_AT = 20  # rows among which the heading is searched
@@ -28,6 +26,17 @@ LENGTHS, FORCES = ("nm", "um", "mm", "cm", "m", "in", "inch"), ("n", "kn")
 OTHERS = ("n_per_um", "n_per_mm", "n_per_m", "kn_per_mm", "deg", "rad", "mrad", "s", "min", "h", "c", "k", "f", "%")
 UNITS = frozenset((*LENGTHS, *FORCES, *OTHERS))
 SAME_TOKEN = {"degc": "c", "degrees": "deg", "minutes": "min", "micron": "um", "microns": "um"}
+
+PLAIN = re.compile(r"[+-]?\d+(?:e[+-]?\d+)?", re.IGNORECASE)
+ONE_MARK = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
+LIKE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[.,'’ \u00a0\u202f]\d{3})+(?:[.,]\d*)?")
+REMOVE_THEM = "write numbers without thousands separators"
+
+Rows = list[tuple[int, list[str]]]
+Cell = tuple[int, str, str]  # line, column, text
+
+__all__ = ["Columns", "Table", "parse_table", "read_table", "split_name"]
 
 
 @dataclass(frozen=True)
@@ -264,3 +273,84 @@ def _refuse_spreadsheet_errors(heading: Sequence[str], rows: list[tuple[int, lis
     ]
     if errors:
         raise InputErrors(errors)
+
+
+def with_points(
+    heading: Sequence[str], rows: Rows, numbers: Sequence[int], separator: str, file: str
+) -> tuple[Rows, bool]:
+    """Numbers with decimal points, and whether they had commas.
+
+    A comma in a number is a decimal comma only if some number of the file shows it: "1,234" alone says nothing. Between
+    semicolons, which go with decimal commas, a column of "353" and "1.268" is as doubtful.
+
+    Parameters
+    ----------
+    heading, rows
+        Names; lines and cells.
+    numbers
+        Columns that may hold numbers.
+    separator
+        Between the cells, "" for a sheet.
+    file
+        For messages.
+
+    Raises
+    ------
+    InputError, InputErrors
+        Thousands separators, two kinds of decimal marks, or numbers that can be read in two ways.
+    """
+    cells = [(line, heading[i], row[i]) for line, row in rows for i in numbers if i < len(row)]
+    marked = [cell for cell in cells if ONE_MARK.fullmatch(cell[2])]
+    commas = [cell for cell in marked if "," in cell[2]]
+    points = [cell for cell in marked if "." in cell[2]]
+    grouped = [cell for cell in cells if THOUSANDS.fullmatch(cell[2]) and not ONE_MARK.fullmatch(cell[2])]
+    if grouped:
+        raise InputErrors(
+            InputError(f"{name} = {text!r} has thousands separators", hint=REMOVE_THEM, file=file, line=line)
+            for line, name, text in grouped
+        )
+    if commas and points:
+        raise _two_marks(commas, points, file)
+    if commas and all(LIKE_THOUSANDS.fullmatch(text) for _, _, text in commas):
+        raise _ambiguous(commas[0], file)
+    if separator == ";":
+        _refuse_doubtful_points(cells, points, file)
+    if not commas:
+        return rows, False
+    chosen = frozenset(numbers)
+    return [
+        (line, [c.replace(",", ".") if i in chosen and ONE_MARK.fullmatch(c) else c for i, c in enumerate(row)])
+        for line, row in rows
+    ], True
+
+
+def _refuse_doubtful_points(cells: list[Cell], points: list[Cell], file: str) -> None:
+    """A column in which only numbers from 1000 up have a point."""
+    whole = {name for _, name, text in cells if PLAIN.fullmatch(text)}
+    sure = {name for _, name, text in points if not LIKE_THOUSANDS.fullmatch(text)}
+    for cell in points:
+        if cell[1] in whole and cell[1] not in sure:
+            raise _ambiguous(cell, file)
+
+
+def _two_marks(commas: list[Cell], points: list[Cell], file: str) -> InputError:
+    rare, usual = (commas, points) if len(commas) < len(points) else (points, commas)
+    (line, name, text), (other_line, other_name, other) = rare[0], usual[0]
+    return InputError(
+        f"{name} = {text!r} and {other_name} = {other!r} (line {other_line}) have different decimal marks",
+        expected="decimal points, or decimal commas, in the whole file",
+        hint=REMOVE_THEM,
+        file=file,
+        line=line,
+    )
+
+
+def _ambiguous(cell: Cell, file: str) -> InputError:
+    line, name, text = cell
+    return InputError(
+        f"{name} = {text!r} could be {text.replace(',', '.')} or {re.sub('[.,]', '', text)}",
+        expected="a number that can be read in one way",
+        hint=f"{REMOVE_THEM}, decimals with a point",
+        file=file,
+        line=line,
+    )

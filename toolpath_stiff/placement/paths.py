@@ -1,8 +1,11 @@
-"""The path that is placed: cutting samples and rapids in the set-up frame, and the rapids that do not move with it.
+"""The path that is placed, sampled in the set-up frame; thinned for a search, and for drawing.
 
 A placement (x, y, z, A, B, C; the numbers of `--origin`) turns and moves the samples rigidly, as `path.turns`. Rapids
 to a point of the machine (G53, G28, G30), and the first one, which comes from where the control stands, are anchored:
 one of their ends, or some of its axes, stays where it is.
+
+A page cannot hold every sample of a long program at sixty placements. Of a drawn path the ends of every cut and its
+corners are kept first, then samples evenly along the path; the stiffness is evaluated at just these.
 """
 
 from __future__ import annotations
@@ -14,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.cut_classes import headline_rows
-from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
+from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
 from toolpath_stiff.path import place, place_orientations, sample_moves
 from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose
 
 FloatArray = NDArray[np.float64]
@@ -30,6 +34,9 @@ BoolArray = NDArray[np.bool_]
 Read = Callable[[Pose], Program]  # the program as it is read where its zero sits there
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others
 LEG_SAMPLES = 40  # of an anchored rapid, at most; 25 mm apart over a metre, and reach changes slowly
+
+CORNER = np.deg2rad(10.0)  # a sharper one is kept before samples along straight cuts are
+SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
 
 
 @dataclass(frozen=True)
@@ -94,7 +101,7 @@ class WorkPath:
     tool_length
         (m,) m; nan: the reference tool.
     headline
-        (m,) samples that mean, range and weakest place are about (`analysis.cut_classes`).
+        (m,) samples that mean, range and weakest place are about (`analysis.loads`).
     cutting
         (m,) samples of cuts; the others are rapids that move with the work, held to the limits alone.
     anchored
@@ -306,3 +313,92 @@ def placed_path(path: WorkPath | Samples, placement: FloatArray) -> tuple[FloatA
     turn = rotation_matrices(placement[3:])
     position = path.position @ turn.T + placement[:3]
     return position, path.tangent @ turn.T, place_orientations(path.abc, placement)
+
+
+@dataclass(frozen=True)
+class DrawnPath:
+    """m samples of a path in the set-up frame, and their stiffness at k placements. SI.
+
+    Attributes
+    ----------
+    position, axis
+        (m, 3) m, tool tip; (m, 3) unit vectors from the tip up the tool.
+    s
+        (m,) m along the path, rapids included.
+    cut
+        (m,) number of the cut: samples of different cuts have a rapid between them.
+    plunge
+        (m,) plunges along the tool axis, where they stand beside the headline figures.
+    stiffness
+        (k, m) N/m along the load; nan out of reach.
+    samples
+        How many samples the whole path has.
+    """
+
+    position: FloatArray
+    axis: FloatArray
+    s: FloatArray
+    cut: IntArray
+    plunge: BoolArray
+    stiffness: FloatArray
+    samples: int
+
+
+def drawn_path(
+    model: StiffnessModel,
+    program: Program,
+    placements: FloatArray,
+    load: Load,
+    *,
+    force: float,
+    step: float,
+    points: int,
+) -> DrawnPath:
+    """At most `points` samples of the cutting path, evaluated at placements (k, 6) m and rad.
+
+    `program` is in the set-up frame, as read; `step` is the distance in m of the samples that are chosen from.
+    """
+    samples = sample_moves(program.moves, step)
+    counted = samples.cutting & (samples.weight > 0.0)
+    rows = np.flatnonzero(counted if counted.any() else samples.cutting)
+    cut = np.unique(np.cumsum(~samples.cutting)[rows], return_inverse=True)[1]
+    chosen = thinned_rows(samples.take(rows), cut, points)
+    few = samples.take(rows[chosen])
+    stiffness = []
+    for placement in placements:
+        position, tangent, abc = placed_path(few, placement)
+        stiffness.append(evaluate(model, position, abc, tangent, few.tool_length, load, force).stiffness)
+    counting = few.weight > 0.0
+    beside = plunging_rows(load, few.tangent, few.abc, counting)
+    beside &= ~headline_rows(load, few.tangent, few.abc, counting)
+    axis = rotation_matrices(few.abc)[:, :, 2]
+    return DrawnPath(few.position, axis, few.s, cut[chosen], beside, np.array(stiffness), len(rows))
+
+
+def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:
+    """Rising rows of at most `points` samples: ends of cuts, then corners, then evenly along the path.
+
+    Of more cuts than there is room for, some are left out whole.
+    """
+    n = len(samples)
+    if n <= points:
+        return np.arange(n)
+    first = np.flatnonzero(np.diff(cut, prepend=-1))
+    last = np.append(first[1:] - 1, n - 1)
+    cuts = _evenly(np.arange(len(first)), points // 2)
+    kept = np.unique(np.concatenate([first[cuts], last[cuts]]))
+    if len(cuts) < len(first):
+        return kept
+    cosine = np.einsum("ij,ij->i", samples.tangent[1:], samples.tangent[:-1])
+    corners = np.flatnonzero((np.diff(cut) == 0) & (np.diff(samples.move) != 0) & (cosine < np.cos(CORNER)))
+    corners = _evenly(corners, max(0, int(SHARE_OF_CORNERS * points) - len(kept)) // 2)
+    kept = np.unique(np.concatenate([kept, corners, corners + 1]))  # both of a corner's samples: the tangent jumps
+    others = np.setdiff1d(np.arange(n), kept)
+    return np.sort(np.concatenate([kept, _evenly(others, points - len(kept))]))
+
+
+def _evenly(rows: IntArray, count: int) -> IntArray:
+    """`count` of the rows, evenly spread; all if there are no more."""
+    if len(rows) <= count:
+        return rows
+    return rows[np.linspace(0, len(rows) - 1, max(count, 0)).astype(np.int64)]

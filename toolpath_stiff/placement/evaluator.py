@@ -2,7 +2,7 @@
 
 The path is sampled once, in the set-up frame; a placement turns and moves the samples rigidly. Limits come from strut
 lengths and determinants that the closed form computes on its way; so does the stiffness of linear struts on a rigid
-platform under a load that the geometry alone directs. Everything else asks `analysis.evaluate` for the stiffness.
+platform under a load that the geometry alone directs. Everything else asks `analysis.poses.evaluate` for the stiffness.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load, load_directions
+from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.machine.kinematics import neutral_axes, solve_struts, solve_struts_at
 from toolpath_stiff.machine.limits import machine_limits, reach
 from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.placement.work_path import WorkPath
+from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -289,7 +289,7 @@ class Evaluator:
     def _asked(
         self, position: FloatArray, tangent: FloatArray, rotation: FloatArray | None, margin: FloatArray
     ) -> FloatArray:
-        """(k, h) stiffness at the headline samples by `analysis.evaluate`, where all cuts are within reach."""
+        """(k, h) stiffness at the headline samples by `analysis.poses.evaluate`, where all cuts are within reach."""
         found = np.full(position.shape[:2], np.nan)
         possible = np.flatnonzero((margin[:, self.path.cutting] >= 0.0).all(axis=1))
         if len(possible):

@@ -1,0 +1,171 @@
+"""The paper's direct stiffness method: the platform as a pin-jointed truss, and the 25-element reference solver.
+
+Nodes 0 to 5 are the platform joints, 6 the hub (where the tool axis meets the plane of the joints), 7 the tool
+tip. 19 bars: 6 rim bars between neighbouring joints, 6 spokes to the hub, 6 from joint to tip, 1 from hub to tip
+(Clinton, Zhang, Wavering 1997, Figure 2b and "twenty-five elements" with the six struts). The effect
+`platform_flexibility` uses the truss by itself.
+
+The reference solver is as plain as can be, one pose at a time: struts and bars are pin-jointed truss elements
+(Armenakas 1991; the paper's equations 2 and 3). Assemble, apply a force at the tool tip, solve by Gaussian
+elimination, k = F / x (equation 4). It knows neither effects nor batches: it exists to test the exact route.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import Machine
+
+FloatArray = NDArray[np.float64]
+
+HUB, TIP = 6, 7
+
+
+def platform_nodes(platform_joints: FloatArray) -> FloatArray:
+    """(8, 3) m, nodes of the truss in the platform frame with the tip at the origin.
+
+    `platform_joints` (6, 3) m, relative to the tip. The hub lies on the tool axis at the joints' mean height.
+    """
+    hub = np.array([0.0, 0.0, platform_joints[:, 2].mean()])
+    return np.vstack([platform_joints, hub, np.zeros(3)])
+
+
+def platform_bars(platform_joints: FloatArray) -> list[tuple[int, int]]:
+    """The 19 bars as pairs of nodes; the rim joins joints that are neighbours in angle about the tool axis."""
+    order = np.argsort(np.arctan2(platform_joints[:, 1], platform_joints[:, 0]), kind="stable")
+    rim = [(int(order[i]), int(order[(i + 1) % 6])) for i in range(6)]
+    spokes = [(i, HUB) for i in range(6)]
+    legs = [(i, TIP) for i in range(6)]
+    return [*rim, *spokes, *legs, (HUB, TIP)]
+
+
+def free_platform_flexibility(platform_joints: FloatArray) -> FloatArray:
+    """Flexibility of the free platform truss for bars of 1 N/m: (21, 21), 1/(N/m) relative to that.
+
+    Loads l are the forces on the six joints and on the tip, in platform axes (18 + 3 components); l^T G l is twice
+    the energy stored, for bars of unit stiffness. Loads that do not balance are first balanced by the smallest joint
+    forces that do so: a moment at the tip, or what springs parallel to the struts carry, enters that way. For
+    balanced loads (forces at the tip alone, pin-jointed struts) this changes nothing.
+
+    Raises
+    ------
+    InputError
+        Two joints coincide, or the bars form a mechanism, so that this truss cannot stand for the platform.
+    """
+    nodes = platform_nodes(platform_joints)
+    stiffness = np.zeros((24, 24))
+    for i, j in platform_bars(platform_joints):
+        bar = nodes[j] - nodes[i]
+        length = np.linalg.norm(bar)
+        if length < 1e-9:
+            raise InputError(
+                f"platform nodes {i + 1} and {j + 1} coincide, so the platform truss has a bar of no length",
+                hint="set bar_stiffness_N_per_m = inf (a rigid platform)",
+            )
+        unit = bar / length
+        ends = np.zeros(24)
+        ends[3 * i : 3 * i + 3], ends[3 * j : 3 * j + 3] = -unit, unit
+        stiffness += np.outer(ends, ends)
+    rigid = _rigid_motions(nodes)
+    basis, _ = np.linalg.qr(rigid)
+    # Springs on the rigid motions alone: balanced loads do not feel them, and the matrix can be inverted.
+    held = stiffness + basis @ basis.T
+    if np.linalg.cond(held) > 1e10:
+        raise InputError(
+            "the platform truss is a mechanism: its bars do not lock the joints and the tip",
+            hint="set bar_stiffness_N_per_m = inf (a rigid platform)",
+        )
+    loaded = np.r_[0:18, 21:24]
+    flexibility = np.linalg.inv(held)[np.ix_(loaded, loaded)]
+    balance = np.eye(21)
+    resultants = rigid[loaded].T  # (6, 21): total force and moment about the tip
+    joints = rigid[:18]  # (18, 6)
+    balance[:18] -= joints @ np.linalg.solve(joints.T @ joints, resultants)
+    return np.asarray(balance.T @ flexibility @ balance)
+
+
+def _rigid_motions(nodes: FloatArray) -> FloatArray:
+    """(3 N, 6) displacements of the nodes for unit translations and unit rotations about the tip."""
+    motions = np.zeros((3 * len(nodes), 6))
+    for i, node in enumerate(nodes):
+        rows = slice(3 * i, 3 * i + 3)
+        motions[rows, :3] = np.eye(3)
+        motions[rows, 3:] = np.cross(np.eye(3), node).T
+    return motions
+
+
+def structure_stiffness(machine: Machine, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Structure stiffness matrix at one pose, (24, 24) N/m; nodes as in the module's heading, base axes.
+
+    Parameters
+    ----------
+    machine
+        Its platform bars must have a finite stiffness.
+    position
+        (3,) m, tool tip.
+    rotation
+        (3, 3) orientation of the platform.
+    """
+    bar_stiffness = machine.platform_bar_stiffness
+    if not np.isfinite(bar_stiffness):
+        raise InputError(
+            "the reference solver cannot take rigid platform bars",
+            expected="a finite bar stiffness",
+            hint="use 1e12 N/m, which lowers the tip stiffness by 5e-5",
+        )
+    nodes = np.asarray(position, dtype=float) + platform_nodes(machine.platform_joints) @ np.asarray(rotation).T
+    structure = np.zeros((24, 24))
+    for i, j in platform_bars(machine.platform_joints):
+        block = bar_stiffness * axis_products(nodes[i], nodes[j])
+        at_i, at_j = slice(3 * i, 3 * i + 3), slice(3 * j, 3 * j + 3)
+        structure[at_i, at_i] += block
+        structure[at_j, at_j] += block
+        structure[at_i, at_j] -= block
+        structure[at_j, at_i] -= block
+    law = machine.strut_law
+    for i in range(6):
+        strut = nodes[i] - machine.frame_joints[i]
+        length = np.sqrt(strut @ strut)
+        stiffness = law.stiffness_1 + law.slope * (length - law.length_1)
+        # The frame joint is held, so only the platform joint's block enters.
+        at_i = slice(3 * i, 3 * i + 3)
+        structure[at_i, at_i] += stiffness * axis_products(machine.frame_joints[i], nodes[i])
+    return structure
+
+
+def axis_products(start: FloatArray, end: FloatArray) -> FloatArray:
+    """(3, 3) c_i c_j of an element's direction cosines c.
+
+    Times E A / L they are the blocks [[+, -], [-, +]] of a truss element in global coordinates (equation 3).
+    """
+    axis = end - start
+    return np.asarray(np.outer(axis, axis) / (axis @ axis))
+
+
+def tip_compliance(machine: Machine, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """(3, 3) m/N, displacements of the tip under unit forces along x, y, z."""
+    loads = np.zeros((24, 3))
+    loads[3 * TIP : 3 * TIP + 3] = np.eye(3)
+    displacements = np.linalg.solve(structure_stiffness(machine, position, rotation), loads)
+    return np.asarray(displacements[3 * TIP : 3 * TIP + 3])
+
+
+def wrench_compliance(machine: Machine, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """(6, 6) compliance of the tip: m/N, m/(N m), rad/N, rad/(N m) blocks.
+
+    A truss node has no rotation, so a moment acts through the smallest forces on the six platform joints that
+    add up to it, and the tip's rotation is its work-conjugate, the least-squares rotation of the six joints.
+    """
+    joints = platform_nodes(machine.platform_joints)[:6] @ np.asarray(rotation).T
+    arms = joints - joints.mean(axis=0)
+    inertia = sum(((arm @ arm) * np.eye(3) - np.outer(arm, arm) for arm in arms), np.zeros((3, 3)))
+    loads = np.zeros((24, 6))
+    loads[3 * TIP : 3 * TIP + 3, :3] = np.eye(3)
+    for column in range(3):
+        turn = np.linalg.solve(inertia, np.eye(3)[column])
+        for i, arm in enumerate(arms):
+            loads[3 * i : 3 * i + 3, 3 + column] = np.cross(turn, arm)
+    structure = structure_stiffness(machine, position, rotation)
+    return np.asarray(loads.T @ np.linalg.solve(structure, loads))
