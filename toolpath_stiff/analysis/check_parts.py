@@ -10,7 +10,7 @@ import numpy as np
 from toolpath_stiff.analysis.program_check import Figures, figures_of_parts
 from toolpath_stiff.nc.checking import Checked
 from toolpath_stiff.nc.operations import find_operations
-from toolpath_stiff.path.sampling import RAPID_FEED
+from toolpath_stiff.path import RAPID_FEED
 
 
 def check_parts(

@@ -17,8 +17,7 @@ from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
 from toolpath_stiff.nc.operations import Operations, operations
-from toolpath_stiff.path import place, sample_moves
-from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.path import Samples, place, sample_moves
 from toolpath_stiff.stiffness.acting import acting_effects, condition_warnings, conditions_stated
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis.loads import softest_directions, stiffest_directions
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, reach
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import StiffnessModel

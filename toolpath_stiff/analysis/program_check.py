@@ -11,11 +11,10 @@ from toolpath_stiff.machine import Machine
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding
+from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves
-from toolpath_stiff.path import move_lengths, place, sample_moves
-from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.path.samples import Samples
-from toolpath_stiff.path.sampling import BLOCK, RAPID_FEED, move_durations
+from toolpath_stiff.path import BLOCK, RAPID_FEED, Samples, move_durations, place, sample_moves
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import Pose, deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
 
 FloatArray = NDArray[np.float64]

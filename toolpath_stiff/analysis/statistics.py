@@ -15,7 +15,7 @@ from toolpath_stiff.stiffness.acting import effects_stated
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 if TYPE_CHECKING:
-    from toolpath_stiff.path.samples import Samples
+    from toolpath_stiff.path import Samples
 
 BoolArray = NDArray[np.bool_]
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.analysis.cut_classes import along_tool_axis
 from toolpath_stiff.analysis.path_analysis import Analysis
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
-from toolpath_stiff.path.samples import Samples
-from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
+from toolpath_stiff.path import PATH_COLUMNS, Samples, path_columns
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 if TYPE_CHECKING:

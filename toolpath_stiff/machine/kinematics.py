@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 
 FloatArray = NDArray[np.float64]
 

@@ -15,10 +15,9 @@ from toolpath_stiff.analysis.cut_classes import headline_rows, plunging_rows
 from toolpath_stiff.analysis.evaluate import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.path import sample_moves
-from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.path import Samples, sample_moves
 from toolpath_stiff.placement.work_path import placed_path
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 FloatArray = NDArray[np.float64]

@@ -18,12 +18,12 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.placement import batch
 from toolpath_stiff.placement.batch import Evaluator, Keepout, PlacementFigures
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules
 from toolpath_stiff.placement.front import apart, front_rows, thin
 from toolpath_stiff.placement.work_path import WorkPath, placed_path, telling_path
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 

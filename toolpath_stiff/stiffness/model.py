@@ -14,7 +14,7 @@ from toolpath_stiff.machine.forward import forward_kinematics
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.machine.uncertainty import STRUT_LAW, with_parameter
-from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Conditions, Effect, LoadPath, read_parameters
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
