@@ -22,8 +22,8 @@ from benchmarks.hunt_programs import Cam, Harsh, Zeros
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
-from toolpath_stiff.nc.linuxcnc.reading import refusal
-from toolpath_stiff.nc.source import split_lines
+from toolpath_stiff.nc.linuxcnc import refusal
+from toolpath_stiff.nc.words import split_lines
 
 TOLERANCE = 0.01  # mm and degrees
 PRINTED = 0.011  # a move shorter than rs274's digits, and twice their sum

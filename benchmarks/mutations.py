@@ -19,8 +19,7 @@ from types import FrameType
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.dialects import DIALECTS
+from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import read_tool_table
 

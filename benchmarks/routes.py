@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.machine import Machine, load_machine
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.model import build_model

@@ -95,11 +95,11 @@ def reading(report: Report, lines: int, rounds: int) -> None:
 def one_by_one(text: str) -> None:
     """Our reader without its fast way."""
     from toolpath_stiff.nc.frames import Frames
+    from toolpath_stiff.nc.interpreter import ProgramRun
     from toolpath_stiff.nc.reader import ZERO
-    from toolpath_stiff.nc.source import split_lines
     from toolpath_stiff.nc.state import State
-    from toolpath_stiff.nc.subprograms import ProgramRun
     from toolpath_stiff.nc.tables import Offsets
+    from toolpath_stiff.nc.words import split_lines
 
     state = State("p", Frames(Offsets(), None, ZERO), None)
     ProgramRun(state, split_lines(text, "p"), "p", frozenset(), fast=False).run()

@@ -145,7 +145,7 @@ def test_load_directions():
 
 def test_tilted_axis_for_axial_loads():
     abc = np.array([[0.0, np.pi / 2, 0.0]])
-    from toolpath_stiff.path.rotations import rotation_matrices
+    from toolpath_stiff.rotations import rotation_matrices
 
     turn = rotation_matrices(abc)
     zero = np.zeros((1, 3))

@@ -9,7 +9,7 @@ from tests.effects.cases import model_with, readings
 from tests.stiffness.cases import nist, orthogonal_hexapod, random_poses
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import StrutLaw
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import load_path
 

@@ -127,7 +127,7 @@ def test_packaged_machines_work_where_their_programs_start(name):
 
 def test_limits_of_the_default_machine_admit_the_poses_that_the_paper_and_the_reference_show():
     from toolpath_stiff.machine.kinematics import solve_struts_at
-    from toolpath_stiff.path.rotations import rotation_matrices
+    from toolpath_stiff.rotations import rotation_matrices
 
     machine = load_machine("nist")
     assert machine.limits.strut_length[0] <= 2.25 and machine.limits.strut_length[1] >= 3.60

@@ -22,7 +22,7 @@ from toolpath_stiff.machine import (
     solve_struts,
 )
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.path.rotations import rotation_about_z, rotation_matrices
+from toolpath_stiff.rotations import rotation_about_z, rotation_matrices
 
 NIST = load_machine("nist")
 small = st.floats(-0.35, 0.35)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import inspect
+import runpy
 from pathlib import Path
 
 import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import parse_program
-from toolpath_stiff.nc.codes.contract import EVERYWHERE, MOTION, ONCE, STEPS, Code, holds_anyway
-from toolpath_stiff.nc.codes.document import BEGIN, END, codes_table
-from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED, code_meaning, table
-from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.dialects import DIALECTS
-from toolpath_stiff.nc.plain_moves import MODE_NAMES
+from toolpath_stiff.nc.codes import EVERYWHERE, MOTION, ONCE, STEPS, Code, holds_anyway
+from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED, code_meaning, codes_table, table
+from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.cutter_location.vocabulary import words_table
+from toolpath_stiff.nc.plain_lines import MODE_NAMES
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
 
 PAGE = Path(__file__).parents[2] / "docs" / "nc.md"
@@ -107,10 +107,12 @@ def test_groups_that_other_modules_name():
     }  # fmt: skip
 
 
-def test_the_page_holds_the_table_as_it_is():
+def test_the_page_holds_the_tables_as_they_are():
+    """Of codes, and of the words of cutter-location files."""
     page = PAGE.read_text("utf-8")
-    written = page[page.index(BEGIN) : page.index(END)].removeprefix(BEGIN).strip()
-    assert written == codes_table().strip(), "make it again: python -m toolpath_stiff.nc.codes.document docs/nc.md"
+    with_tables = runpy.run_path(str(PAGE.with_name("tables.py")))["with_tables"]
+    assert with_tables(page) == page, "make it again: python docs/tables.py"
+    assert codes_table() in page and words_table() in page
 
 
 def test_the_table_names_every_code_once():

@@ -12,17 +12,15 @@ import pytest
 
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.nc import cutter_location, parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
-from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.cutter_location import reading
+from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
-from toolpath_stiff.nc.dialects import DIALECTS
+from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
-from toolpath_stiff.path import move_lengths
-from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.rewriting import offset_blocks
+from toolpath_stiff.rotations import rotation_matrices
 
 FOLDER = Path(__file__).parents[2] / "programs"
 SAMPLE = FOLDER / "conical_boss.apt"
@@ -47,7 +45,7 @@ def test_long_files_give_the_same_moves(monkeypatch):
     """Moves are packed now and then; pauses, tools and arcs go on over that."""
     text = SAMPLE.read_text().replace("RAPID\n", "DELAY/1\nRAPID\n")
     whole = parse_program(text, "part.apt").moves
-    monkeypatch.setattr(reading, "PACKED_AT", 1)
+    monkeypatch.setattr(cutter_location, "PACKED_AT", 1)
     packed = parse_program(text, "part.apt").moves
     for column in vars(whole):
         np.testing.assert_array_equal(getattr(packed, column), getattr(whole, column))

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from tests.nc.cutter_location import MM, START, leaning, read, refused, tilt
 from toolpath_stiff.nc.cutter_location.geometry import GREAT_CIRCLE_DEG
+from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import ARC
-from toolpath_stiff.path import move_lengths, sample_moves
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.path import sample_moves
+from toolpath_stiff.rotations import rotation_matrices
 
 
 def axes_of(abc) -> np.ndarray:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.nc.cutter_location import MM, START, read, refused
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.cutter_location.vocabulary import WORDS, markdown, table
+from toolpath_stiff.nc.cutter_location.vocabulary import WORDS, table
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.tables import ToolEntry
 
@@ -234,11 +233,6 @@ def test_a_diameter_is_that_of_its_tool():
 
 def test_no_cut_is_an_error():
     assert "no cutting move" in str(refused("UNITS/MM\nRAPID\nGOTO/0,0,0\nRAPID\nGOTO/1,0,0\n"))
-
-
-def test_the_documented_words_are_the_readers():
-    page = (Path(__file__).parents[2] / "docs" / "nc.md").read_text("utf-8")
-    assert markdown() in page, "put vocabulary.markdown() into docs/nc.md"
 
 
 def test_every_word_is_in_the_table_once_with_its_meaning_and_source():

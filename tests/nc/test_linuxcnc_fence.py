@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import parse_program, read_program
-from toolpath_stiff.nc.linuxcnc import reading, runner
+from toolpath_stiff.nc import linuxcnc, parse_program, read_program
+from toolpath_stiff.nc.linuxcnc import runner
 from toolpath_stiff.nc.linuxcnc.runner import Limits
 from toolpath_stiff.nc.tables import Offsets
 
@@ -90,8 +90,8 @@ def started(monkeypatch):
         runs.append(program)
         raise InputError("started")
 
-    monkeypatch.setattr(reading, "run_rs274", run)
-    monkeypatch.setattr(reading, "find_rs274", lambda path=None: "/usr/bin/rs274")
+    monkeypatch.setattr(linuxcnc, "run_rs274", run)
+    monkeypatch.setattr(linuxcnc, "find_rs274", lambda path=None: "/usr/bin/rs274")
     monkeypatch.setattr(runner, "find_rs274", lambda path=None: "/usr/bin/rs274")
     return runs
 
@@ -209,7 +209,7 @@ def test_no_file_appears(tmp_path, monkeypatch):
     text = marker_program(marker)
     with pytest.raises(InputError):
         parse_program(text, interpreter="linuxcnc")
-    monkeypatch.setattr(reading.fence, "check", lambda lines, name: None)
+    monkeypatch.setattr(linuxcnc, "refuse_other_programs", lambda lines, name: None)
     parse_program(text, interpreter="linuxcnc")
     program = parse_program(f"(LOGOPEN,{log})\n(LOG,hello)\n(PROBEOPEN {log})\nG1 X1 F100\nM2", interpreter="linuxcnc")
     assert [(note.line, note.reason) for note in program.unsupported] == [
@@ -251,8 +251,8 @@ def test_a_program_is_not_changed_and_a_run_leaves_no_trace_in_the_next(tmp_path
     assert file.read_bytes() == before and list(tmp_path.iterdir()) == [file]
 
 
-def read_limited(text: str, limits: Limits) -> reading.Reading:
-    return reading.read(text.split("\n"), "part.nc", None, ZERO, Offsets(), None, False, limits=limits)
+def read_limited(text: str, limits: Limits) -> linuxcnc.Reading:
+    return linuxcnc.read(text.split("\n"), "part.nc", None, ZERO, Offsets(), None, False, limits=limits)
 
 
 @needs_rs274

@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.linuxcnc import fence
-from toolpath_stiff.nc.linuxcnc.copy import numbered, split
-from toolpath_stiff.nc.source import split_lines
+from toolpath_stiff.nc.linuxcnc.inputs import numbered, refuse_other_programs, split
+from toolpath_stiff.nc.words import split_lines
 
 PIECES = st.one_of(
     st.sampled_from(
@@ -102,7 +101,7 @@ USER_CODE = re.compile(r"m(?!od)(?:[+-]?0*1\d\d(?!\d)|[+-]?0*99\.\d|[+-]?[#\[a-z
 def test_what_passes_holds_nothing_that_runs(pieces, block_delete):
     try:
         lines = split(split_lines("".join(pieces), "part.nc"), "part.nc")
-        fence.check(lines, "part.nc")
+        refuse_other_programs(lines, "part.nc")
         copy = numbered(lines, "part.nc", block_delete=block_delete, tags=True)
     except InputError:
         return

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import parse_program
-from toolpath_stiff.path import move_lengths
+from toolpath_stiff.nc.geometry import move_lengths
 
 ROUNDING_M = 1e-12  # sums and cosines of numbers up to 1 m
 

@@ -11,8 +11,7 @@ from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import assert_same_path
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import parse_program, read_program
-from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.dialects import DIALECTS
+from toolpath_stiff.nc.controller import DIALECTS, Controller
 
 LINUXCNC = Controller(DIALECTS["linuxcnc"])
 

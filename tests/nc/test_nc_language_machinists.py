@@ -6,8 +6,7 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import parse_program
-from toolpath_stiff.nc.controller import Controller, read_controller
-from toolpath_stiff.nc.dialects import dialect_named
+from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
 
 
 def ends_mm(text: str, **options) -> list[tuple[float, ...]]:

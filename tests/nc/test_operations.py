@@ -8,10 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.nc import rs274
-from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.dialects import DIALECTS
-from toolpath_stiff.nc.headings import headings, plain_name
-from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, find_operations, operations
+from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.operations import MOST_OPERATIONS, Operations, find_operations, headings, operations, plain_name
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 

@@ -10,17 +10,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import arcs, frames, plain_moves, subprograms
+from toolpath_stiff.nc import frames, geometry, interpreter, plain_lines
 from toolpath_stiff.nc.checking import check_lines
-from toolpath_stiff.nc.codes import feeds as feed_rules
-from toolpath_stiff.nc.codes import numbers as number_rules
-from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.dialects import DIALECTS
+from toolpath_stiff.nc.codes import modes, points
+from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.source import read_lines, split_lines
+from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets, ToolEntry
+from toolpath_stiff.nc.words import read_lines, split_lines
 
 PROGRAMS = sorted((Path(__file__).parents[2] / "programs").glob("*.nc"))
 TOOLS = {1: ToolEntry(1, 50.0, 6.0), 2: ToolEntry(2, 80.0, 10.0), 3: ToolEntry(3, 120.0, 8.0)}
@@ -29,8 +27,8 @@ ZERO = (0.0,) * 6
 
 @pytest.fixture(autouse=True)
 def _runs_of_any_length(monkeypatch):
-    monkeypatch.setattr(plain_moves, "FEWEST", 1)
-    monkeypatch.setattr(subprograms, "FEWEST_LINES", 1)
+    monkeypatch.setattr(plain_lines, "FEWEST", 1)
+    monkeypatch.setattr(interpreter, "FEWEST_LINES", 1)
 
 
 def outcome(lines, dialect, fast):
@@ -143,7 +141,7 @@ def test_random_programs_are_checked_alike(blocks):
     lines = split_lines("F300\n" + "\n".join(blocks), "p")
     fast = check_lines(lines, "p", controller=Controller())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(subprograms, "FEWEST_LINES", len(lines) + 1)
+        patch.setattr(interpreter, "FEWEST_LINES", len(lines) + 1)
         slow = check_lines(lines, "p", controller=Controller())
     for found in (fast, slow):
         assert found.used == slow.used
@@ -182,10 +180,10 @@ def moved_by_a_rule(*rule):
     [
         (frames, "shifted", lambda program, shift, offset: program + 2.0 * shift + offset + 1.0),
         (frames, "shifted_back", lambda control, shift, offset: control - offset - shift / 2.0),
-        (arcs, "center_from_radius", lambda start, end, radius, clockwise: ((start[0] + end[0]) / 2.0, start[1])),
-        (arcs, "arc_sweep", lambda start, end, center, clockwise, turns: 0.25),
-        (number_rules, "INCREMENT_MM", 0.5),
-        (feed_rules, "MM_PER_INCH", 20.0),
+        (geometry, "center_from_radius", lambda start, end, radius, clockwise: ((start[0] + end[0]) / 2.0, start[1])),
+        (geometry, "arc_sweep", lambda start, end, center, clockwise, turns: 0.25),
+        (points, "INCREMENT_MM", 0.5),
+        (modes, "MM_PER_INCH", 20.0),
         (State, "feed_scale", property(lambda state: 3.0)),
         (State, "length_scale", property(lambda state: 2.0)),
     ],

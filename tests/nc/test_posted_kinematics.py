@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.posted.chain import roll_pitch, tool_poses
-from toolpath_stiff.nc.posted.kinematics import PostedKinematics, read_kinematics
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.nc.kinematics import PostedKinematics, read_kinematics, roll_pitch, tool_poses
+from toolpath_stiff.rotations import rotation_matrices
 
 TOLERANCE_MM = 1e-3
 

@@ -7,7 +7,7 @@ import numpy as np
 from toolpath_stiff.nc import Program
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.path import place, place_orientations
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 
 
 def cutting_moves(program: Program, origin) -> list[tuple]:

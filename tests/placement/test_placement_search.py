@@ -40,7 +40,7 @@ def program_of(name: str):
 
 def headline_figures(analysis) -> dict:
     """Figures of the cuts across the tool axis (5 degrees), told from the samples alone."""
-    from toolpath_stiff.path.rotations import rotation_matrices
+    from toolpath_stiff.rotations import rotation_matrices
 
     samples = analysis.samples
     axis = rotation_matrices(samples.abc)[:, :, 2]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.machine import Machine, StrutLaw, load_machine
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 
 FloatArray = NDArray[np.float64]
 AXES = ("x", "y", "z")

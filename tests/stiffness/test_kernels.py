@@ -14,7 +14,7 @@ import pytest
 
 from toolpath_stiff.machine import Limits, Machine, StrutLaw, load_machine, singularity_index, solve_struts
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.path.rotations import rotation_about_z, rotation_matrices
+from toolpath_stiff.rotations import rotation_about_z, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import build_model
 

@@ -17,7 +17,7 @@ from tests.stiffness.cases import nist, random_poses
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.poses import evaluate, evaluate_poses
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.path.rotations import roll_pitch_yaw
+from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.stiffness import core, exact
 from toolpath_stiff.stiffness.effects import Effect, find_effect
 from toolpath_stiff.stiffness.effects.contract import Parameter

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.stiffness.cases import nist, random_poses
-from toolpath_stiff.path.rotations import rotation_about_z
+from toolpath_stiff.rotations import rotation_about_z
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.core import BLOCK, tip_compliance

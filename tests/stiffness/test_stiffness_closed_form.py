@@ -11,7 +11,7 @@ import pytest
 from tests.stiffness.cases import nist, orthogonal_hexapod, random_poses
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness import truss as reference
 from toolpath_stiff.stiffness.effects import Effect, LoadPath, Parameter

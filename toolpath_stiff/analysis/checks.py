@@ -20,12 +20,11 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
 from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding
+from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.operations import find_operations
-from toolpath_stiff.path import move_lengths, place, sample_moves
-from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.path.samples import Samples
-from toolpath_stiff.path.sampling import BLOCK, RAPID_FEED, move_durations
+from toolpath_stiff.path import BLOCK, RAPID_FEED, Samples, move_durations, place, sample_moves
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import (
     Pose,

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import rad_from_deg
 
 FloatArray = NDArray[np.float64]

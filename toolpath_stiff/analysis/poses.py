@@ -16,7 +16,7 @@ from toolpath_stiff.analysis.loads import Load, load_directions, softest_directi
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Limit, Reach, machine_limits, reach
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import StiffnessModel

@@ -28,8 +28,7 @@ from toolpath_stiff.analysis.statistics import (
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
-from toolpath_stiff.path import place, sample_moves
-from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.path import Samples, place, sample_moves
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import (
     StiffnessModel,

@@ -22,8 +22,7 @@ from toolpath_stiff.column_files import csv_pieces, parquet_pieces
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.moves import RAPID, Program
 from toolpath_stiff.nc.operations import Operations, operations
-from toolpath_stiff.path.samples import Samples
-from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
+from toolpath_stiff.path import PATH_COLUMNS, Samples, path_columns
 from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 

@@ -283,8 +283,7 @@ def controller_for(args: argparse.Namespace) -> Controller:
     """The control that the options of `add_program_options` describe, tables included."""
     from dataclasses import replace
 
-    from toolpath_stiff.nc.controller import Controller, read_controller
-    from toolpath_stiff.nc.dialects import dialect_named
+    from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
     from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 
     if args.controller:

@@ -55,9 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check and print."""
     from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.nc.checking import ERROR
-    from toolpath_stiff.nc.second_check import check_by
-    from toolpath_stiff.nc.source import read_lines
+    from toolpath_stiff.nc.checking import ERROR, check_by
+    from toolpath_stiff.nc.words import read_lines
 
     machine = None if args.machine == NO_MACHINE else load_machine(args.machine)
     if machine is None and args.strut_speed is not None:

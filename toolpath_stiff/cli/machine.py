@@ -99,7 +99,7 @@ def _show(args: argparse.Namespace) -> int:
 
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine, reach, solve_struts
-    from toolpath_stiff.path.rotations import rotation_matrices
+    from toolpath_stiff.rotations import rotation_matrices
 
     machine = load_machine(args.machine)
     paper = FIGURE_2 if machine.name == "nist" else machine.default_origin

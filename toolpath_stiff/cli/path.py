@@ -61,6 +61,6 @@ def run(args: argparse.Namespace) -> int:
 def path_csv(samples: Samples) -> Iterator[bytes]:
     """The CSV text in pieces."""
     from toolpath_stiff.column_files import csv_pieces
-    from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
+    from toolpath_stiff.path import PATH_COLUMNS, path_columns
 
     return csv_pieces(partial(path_columns, samples), len(samples), PATH_COLUMNS)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
 FloatArray = NDArray[np.float64]

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
-from toolpath_stiff.nc.posted.kinematics import PostedKinematics
+from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import ShopPose
 

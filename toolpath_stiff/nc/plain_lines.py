@@ -1,16 +1,48 @@
-"""Plain lines of CAM programs, lexed many at a time: a G0 to G3, X Y Z A B C, I J K R, F, an N word, comments.
+"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, an N word, comments.
 
 Most of a big program is such lines. One regular expression reads them some twenty times faster than `words.read_block`
-reads blocks; a line that it does not match as a whole is no plain one and is left to `read_block`, with every error.
+reads blocks; a line that it does not match as a whole is not plain and is left to `read_block`, with every error.
+
+The lines become moves by the codes' own rules (`codes`, `frames`) on arrays, digit for digit. Here is only what a mode
+does along lines: a word holds until the next one. What a number, a feed, a point, an arc means is decided by the
+functions that the interpreter calls. A line about which there is anything to say (a word that nothing takes, an arc
+that does not fit) ends the run before it: the interpreter then executes it and says so. mm, degrees, mm/min inside.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
-from toolpath_stiff.nc.arcs import CENTER_LETTERS
-from toolpath_stiff.nc.words import AXES
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.modes import bare_feed_is_open, length_of_move, rotary_feed
+from toolpath_stiff.nc.codes.motion import (
+    ARCS,
+    STILL,
+    center_by_offsets,
+    center_by_radius,
+    normal_of,
+    note_tool,
+    sweep_about,
+)
+from toolpath_stiff.nc.codes.points import (
+    ANGLES,
+    LINEAR,
+    assume_increments,
+    coordinate,
+    increment,
+    warn_of_points,
+    watches_points,
+)
+from toolpath_stiff.nc.codes.registry import CODES
+from toolpath_stiff.nc.geometry import CENTER_LETTERS
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, MovesInMm
+from toolpath_stiff.nc.state import FARTHEST_MM, State
+from toolpath_stiff.nc.words import AXES, read_block
 
 CHUNK = 8192  # lines: their words fit into a processor's cache
 LETTERS = AXES + CENTER_LETTERS
@@ -92,3 +124,321 @@ def first_bare(columns: Sequence[Sequence[str]]) -> int | None:
             row = text.count("\n", 0, match.start())
             found = row if found is None else min(found, row)
     return found
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+FEWEST = 8  # lines; below, one by one is as fast
+MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_lines` reads
+MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
+NO_MODE = -1
+CLOCKWISE = MODES[ARCS[0]]
+
+
+class PlainRun:
+    """Executes runs of plain lines of a program on the state of a control."""
+
+    def __init__(self, state: State, lines: Sequence[str], name: str) -> None:
+        self.state, self.name = state, name
+        self.lines = PlainLines(lines, state.dialect.semicolon)
+        self._pause = 0  # the line before which another run is not worth trying
+
+    def execute(self, at: int) -> list[Row]:
+        """Execute plain lines from `at` (from 0); returns their words. None may be executed."""
+        count = self.lines.run(at)
+        if count < FEWEST or at < self._pause or not _suits(self.state):
+            return []
+        rows = self.lines.rows(at, count)
+        if self.state.motion not in MODES and not rows[0][G_COLUMN] and any(rows[0]):
+            return []
+        lines = _Lines(self.state, rows)
+        done = lines.execute(at)
+        if done < FEWEST:
+            self._pause = at + done + 4 * FEWEST
+        self._watch_points(at, lines, done)
+        return rows[:done]
+
+    def _watch_points(self, at: int, lines: _Lines, done: int) -> None:
+        """As `points.read_numbers`, of all lines executed."""
+        state = self.state
+        if not watches_points(state):
+            return
+        columns = [lines.texts[letter][:done] for letter in LENGTH_LETTERS if letter in lines.texts]
+        state.pointed = state.pointed or any(has_pointed(column) for column in columns)
+        row = first_bare(columns) if state.bare is None else None
+        if row is not None:
+            words = read_block(self.lines.lines[at + row], at + row + 1, self.name, state.dialect.semicolon).words
+            word = next(w for w in words if w.letter in LENGTH_LETTERS and is_bare(w.text[1:].replace(" ", "")))
+            state.bare = (at + row + 1, word)
+        warn_of_points(state)
+
+
+def _suits(state: State) -> bool:
+    """Whether the modes in force leave plain words their plain meaning."""
+    frames = state.frames
+    return (
+        state.feed_mode in ("G93", "G94")
+        and state.polar is None
+        and state.unsettled is None
+        and not state.height_lost
+        and not state.arc_absolute
+        and not frames.rotated
+        and not frames.bound
+    )
+
+
+class _Lines:
+    """The words of lines in columns, and what they make of the state; the line `end` is left to the interpreter."""
+
+    def __init__(self, state: State, rows: list[Row]) -> None:
+        self.state = state
+        self.n = self.end = len(rows)
+        columns = list(zip(*rows, strict=True))
+        self.codes: Sequence[str] = columns[G_COLUMN]
+        self.feeds = (columns[FIRST_F], columns[LAST_F])
+        self.texts = {
+            letter: column for letter, column in zip(LETTERS, columns[FIRST_LETTER:LAST_F], strict=True) if any(column)
+        }
+        self.values = {
+            letter: np.array([float(text) if text else math.nan for text in column])
+            for letter, column in self.texts.items()
+        }
+        self.given = {letter: ~np.isnan(values) for letter, values in self.values.items()}
+        self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
+        for letter in AXES:
+            if letter in self.values:
+                self._stop(np.abs(self.values[letter]) > FARTHEST_MM)
+        if state.dialect.increments:
+            self._count_increments()
+
+    def _stop(self, where: BoolArray) -> None:
+        """Leave the first such line, and all after it, to the interpreter."""
+        if where.any():
+            self.end = min(self.end, int(np.argmax(where)))
+
+    def _count_increments(self) -> None:
+        for letter, column in self.texts.items():
+            bare = np.array([text != "" and "." not in text for text in column]) & (self.values[letter] != 0.0)
+            unit = increment(letter in ANGLES, self.state.inch)
+            self.values[letter] = np.where(bare, self.values[letter] * unit, self.values[letter])
+            self.counted |= bare
+
+    def execute(self, at: int) -> int:
+        """Move; returns how many lines were executed. `at`: the first one's number, from 0."""
+        self._modes()
+        axes, centers = self._any(AXES), self._any(geometry.CENTER_LETTERS)
+        is_arc = self.mode >= CLOCKWISE
+        self._stop(~is_arc & centers)
+        self._stop((self.mode == NO_MODE) & axes)
+        arc = is_arc & (axes | centers | self.coded)
+        moving = (axes & (self.mode != NO_MODE)) | arc
+        self.cutting = moving & (self.mode != MODES["G0"])
+        self._feed_words()
+        self._stop(self._no_feed())
+        if not moving[: self.end].any():
+            return self._leave(None)
+        control = self._control()
+        start, end = self._set_up(control)
+        found = self._arcs(np.flatnonzero(arc[: self.end]), control)
+        done = slice(self.end)
+        self._record(at, start[done], end[done], found, moving[done], arc[done])
+        return self._leave(control if moving[done].any() else None)
+
+    def _record(
+        self, at: int, start: FloatArray, end: FloatArray, found: dict[int, Arc], moving: BoolArray, arc: BoolArray
+    ) -> None:
+        """Hand over the moves of the lines that are done, those that go anywhere."""
+        state = self.state
+        kept = moving & ((start != end).any(axis=1) | arc)
+        feed = self._feeds(start, end, found, moving)
+        rows = np.flatnonzero(kept)
+        motion = np.where(arc, ARC, np.where(self.mode[: self.end] == MODES["G1"], FEED, RAPID))[rows]
+        place = np.cumsum(kept) - 1
+        state.recorder.add_many(
+            MovesInMm(
+                line=rows + (at + 1),
+                motion=motion,
+                start=start[rows],
+                end=end[rows],
+                arc_rows=[int(place[row]) for row in found],
+                arcs=list(found.values()),
+                feed=np.where(motion == RAPID, math.nan, feed[rows]),
+                dwell=np.zeros(len(rows)),
+                tool=np.full(len(rows), state.tool),
+                tool_length=np.full(len(rows), state.tool_length),
+                from_machine=np.zeros((len(rows), 2), dtype=bool),
+            )
+        )
+        if len(rows):
+            note_tool(state)
+
+    # -- modes -----------------------------------------------------------------------------------------------------
+
+    def _modes(self) -> None:
+        """The motion mode of each line."""
+        self.coded = np.array([code != "" for code in self.codes])
+        codes = np.array([int(code) for code in self.codes if code], dtype=np.int64)
+        before = MODES.get(self.state.motion or "", NO_MODE)
+        self.mode = np.concatenate([[before], codes])[np.cumsum(self.coded)]
+
+    def _any(self, letters: str) -> BoolArray:
+        found = np.zeros(self.n, dtype=bool)
+        for letter in letters:
+            if letter in self.given:
+                found |= self.given[letter]
+        return found
+
+    def _feed_words(self) -> None:
+        """F in force on each line, and the line that said so (-1: a line before these)."""
+        state = self.state
+        first, last = self.feeds
+        texts = (
+            last if not any(first) else first if not any(last) else [a or b for a, b in zip(first, last, strict=True)]
+        )
+        if any(first) and any(last):
+            self._stop(np.array([bool(a and b) for a, b in zip(first, last, strict=True)]))
+        said = np.array([text != "" for text in texts])
+        values = np.array([float(text) for text in texts if text], dtype=float)
+        order = np.cumsum(said)
+        self.feed_row = np.concatenate([[-1], np.flatnonzero(said)])[order]
+        before = math.nan if state.feed is None else state.feed
+        self.feed = np.concatenate([[before], values * state.feed_scale])[order]
+        self._stop(self.feed == 0.0)
+        if bare_feed_is_open(state):
+            self._stop(np.array([text != "" and "." not in text for text in texts]))
+
+    def _no_feed(self) -> BoolArray:
+        """Cutting lines without a feed."""
+        if self.state.feed_mode == "G94":
+            return np.asarray(self.cutting & np.isnan(self.feed))
+        rows = np.flatnonzero(self.cutting)  # G93: each needs its own
+        missing = np.zeros(self.n, dtype=bool)
+        used = np.concatenate([[-2], rows[:-1]])
+        missing[rows] = (self.feed_row[rows] <= used) | np.isnan(self.feed[rows])
+        return missing
+
+    # -- points ----------------------------------------------------------------------------------------------------
+
+    def _control(self) -> FloatArray:
+        """(n + 1, 6) control coordinates before the first line and after each (`points.control_point`)."""
+        state, frames = self.state, self.state.frames
+        control = np.empty((self.n + 1, 6))
+        for axis, letter in enumerate(AXES):
+            here = frames.position[axis]
+            if letter not in self.values:
+                control[:, axis] = here
+                continue
+            scaled = self.values[letter] * (state.length_scale if letter in LINEAR else 1.0)
+            given = self.given[letter]
+            if state.absolute:
+                named = frames.axis_to_control(axis, scaled[given])
+                control[0, axis] = here
+                control[1:, axis] = np.concatenate([[here], named])[np.cumsum(given)]
+            else:
+                control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
+        return control
+
+    def _set_up(self, control: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Set-up coordinates of each line's start and end; an axis that stands keeps its number (`motion.record`)."""
+        setup = np.empty_like(control)
+        for axis in range(6):
+            setup[:, axis] = self.state.frames.axis_to_setup(axis, control[:, axis])
+        start, end = setup[:-1], setup[1:]
+        still = np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start))
+        return start, np.where(still, start, end)
+
+    def _arcs(self, rows: IntArray, control: FloatArray) -> dict[int, Arc]:
+        """The arcs of some lines, one by one; the first that is not right ends the run."""
+        if not len(rows):
+            return {}
+        state = self.state
+        first, second, normal = geometry.PLANES[state.plane]
+        letters = (
+            AXES[first],
+            AXES[second],
+            geometry.CENTER_LETTERS[first],
+            geometry.CENTER_LETTERS[second],
+            "R",
+            geometry.CENTER_LETTERS[normal],
+        )
+        nothing = np.full(self.n, math.nan)
+        words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
+        points = np.stack([state.frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
+        starts = points[:, [first, second]].tolist()
+        middles, sweeps = list[geometry.Point2](), list[float]()
+        for row, start, word in zip(rows.tolist(), starts, words, strict=True):
+            try:
+                center, sweep = self._arc(row, start, *word)
+            except geometry.ArcError:
+                self.end = row
+                break
+            middles.append(center)
+            sweeps.append(sweep)
+        frames, found = state.frames, points[: len(sweeps)]
+        found[:, [first, second]] = np.array(middles).reshape(-1, 2)
+        centers = np.stack(
+            [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
+        )
+        vector = normal_of(state.plane)
+        done = zip(rows.tolist(), centers.tolist(), sweeps, strict=False)
+        return {row: Arc((x, y, z), vector, sweep) for row, (x, y, z), sweep in done}
+
+    def _arc(
+        self, row: int, here: list[float], x: float, y: float, i: float, j: float, radius: float, off_plane: float
+    ) -> tuple[geometry.Point2, float]:
+        """Centre (program coordinates) and sweep of an arc from the words of its plane, nan where there is none.
+
+        Raises `ArcError` for what the interpreter has to look at.
+        """
+        state = self.state
+        scale = state.length_scale
+        start = (here[0], here[1])
+        end = (
+            start[0] if math.isnan(x) else coordinate(state, start[0], x * scale),
+            start[1] if math.isnan(y) else coordinate(state, start[1], y * scale),
+        )
+        clockwise = bool(self.mode[row] == CLOCKWISE)
+        by_radius, by_center = not math.isnan(radius), not (math.isnan(i) and math.isnan(j))
+        no_end = math.isnan(x) and math.isnan(y)
+        if not math.isnan(off_plane) or by_radius == by_center or (by_radius and no_end):
+            raise geometry.ArcError("words that do not fit", "")
+        if by_radius:
+            center = center_by_radius(start, end, radius, scale, clockwise)
+        else:
+            center = center_by_offsets(start, (0.0 if math.isnan(i) else i, 0.0 if math.isnan(j) else j), scale)
+        return center, sweep_about(center, start, end, clockwise)
+
+    # -- feeds -----------------------------------------------------------------------------------------------------
+
+    def _feeds(self, start: FloatArray, end: FloatArray, found: dict[int, Arc], moving: BoolArray) -> FloatArray:
+        """Feed of each line's move (`modes.feed_of_move`); rapids are none."""
+        feed: FloatArray = self.feed[: self.end].copy()
+        if self.state.feed_mode == "G94":
+            standing = (start[:, :3] == end[:, :3]).all(axis=1)
+            standing[list(found)] = False
+            feed[standing] = rotary_feed(self.state, feed[standing])
+            return feed
+        for row in np.flatnonzero(moving & (self.mode[: self.end] != MODES["G0"])).tolist():
+            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), found.get(row))
+        return feed
+
+    def _leave(self, control: FloatArray | None) -> int:
+        """Set the state as the lines executed leave it; their number."""
+        state, last = self.state, self.end - 1
+        if last < 0:
+            return 0
+        if state.dialect.increments and self.counted[: self.end].any():
+            assume_increments(state)
+        if self.mode[last] != NO_MODE:
+            state.motion = MODE_NAMES[self.mode[last]]
+        if state.feed_mode == "G93":
+            used = self.cutting[max(int(self.feed_row[last]), 0) : self.end].any()
+            state.feed = None if used or math.isnan(self.feed[last]) else float(self.feed[last])
+        elif not math.isnan(self.feed[last]):
+            state.feed = float(self.feed[last])
+        if control is not None:
+            state.frames.position = control[self.end].tolist()
+            state.length_changed = state.rotation_changed = False
+        return self.end

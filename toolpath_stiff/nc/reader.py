@@ -1,25 +1,74 @@
-"""An NC program or a cutter-location file, from file or text, to `Program`."""
+"""An NC program or a cutter-location file, from file or text, to `Program`.
+
+Programs in other languages than G code are recognised by their first lines and refused by name.
+"""
 
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc import cutter_location
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
-from toolpath_stiff.nc.cutter_location import reading as cutter_location
 from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
-from toolpath_stiff.nc.foreign import foreign_program
 from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.interpreter import ProgramRun
+from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.nc.posted.kinematics import PostedKinematics
-from toolpath_stiff.nc.source import read_lines, split_lines
 from toolpath_stiff.nc.state import START, State
-from toolpath_stiff.nc.subprograms import ProgramRun
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
+from toolpath_stiff.nc.words import read_lines, split_lines
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm, pose_in_si
+
+HEAD_LINES = 50  # a file says what it is at its beginning
+
+_HEIDENHAIN = "Heidenhain's conversational language"
+_SIEMENS = "Siemens' own language (Sinumerik)"
+HINTS = {
+    _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
+    _SIEMENS: "post it as ISO G code: no frames (TRANS, ROT), no CYCLE calls, no variables, no X=... words",
+}
+# What no G code of the controls read here has at the beginning of a block, blanks and N words apart.
+_SIGNS = (
+    (_HEIDENHAIN, r"BEGIN\s+PGM\b"),
+    (_HEIDENHAIN, r"(?:L|LN|C|CC|CR|CT|RND|CHF)\s[^(;]*\bF\s*MAX\b|C\s+I?[A-Z][+-][^(;]*\bDR[+-]"),
+    (_HEIDENHAIN, r"(?:L|CC|LN)\s+I?[XYZABC][+-]"),
+    (_HEIDENHAIN, r"TOOL\s+(?:CALL|DEF)\b|CYCL\s+(?:DEF|CALL)\b|BLK\s+FORM\b|CALL\s+LBL\b|LBL\s+\d|PLANE\s+[A-Z]+"),
+    (_SIEMENS, r";\s*\$PATH\s*=|%_N_\w+_(?:MPF|SPF)\b"),
+    (_SIEMENS, r"DEF\s+(?:REAL|INT|BOOL|STRING|CHAR|AXIS|FRAME)\b|PROC\s+\w+|EXTERN\s+\w+"),
+    (_SIEMENS, r"MSG\s*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+\s*\(|WORKPIECE\s*\("),
+    (_SIEMENS, r"A?(?:TRANS|ROT|SCALE|MIRROR)(?:\s|;|$)|TRAORI\b|TRAFOOF\b|SUPA\b|D?R\d+\s*="),
+    (_SIEMENS, r"(?:[A-Z]+\d*[\d.+-]*\s+)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
+)
+_PATTERNS = tuple((what, re.compile(r"\s*(?:N\d+\s+|\d+\s+)?(?:" + sign + ")", re.IGNORECASE)) for what, sign in _SIGNS)
+
+
+def language_of(line: str) -> str | None:
+    """The other language that a line is written in, or None."""
+    return next((what for what, pattern in _PATTERNS if pattern.match(line)), None)
+
+
+def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:
+    """The error for a program in another language; `suspect` is a line (from 1) that could not be read as G code."""
+    places = list(range(min(HEAD_LINES, len(lines))))
+    if suspect is not None and 0 < suspect <= len(lines):
+        places.append(suspect - 1)
+    for at in places:
+        what = language_of(lines[at])
+        if what is not None:
+            return InputError(
+                f"{lines[at].strip()[:40]!r} is {what}, which is not read",
+                expected="G code",
+                hint=HINTS[what],
+                file=name,
+                line=at + 1,
+            )
+    return None
+
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -191,7 +240,7 @@ def _read_cutter_location(asked: _Request) -> Program:
 
 def _second_opinion(error: InputError, asked: _Request) -> Program:
     """What the built-in interpreter refused with `error`, by the second one if it is there and the program harmless."""
-    from toolpath_stiff.nc.linuxcnc.reading import refusal
+    from toolpath_stiff.nc.linuxcnc import refusal
     from toolpath_stiff.nc.linuxcnc.runner import find_rs274
 
     refused = refusal(asked.lines, asked.name)
@@ -212,7 +261,7 @@ def _second_opinion(error: InputError, asked: _Request) -> Program:
 
 
 def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
-    from toolpath_stiff.nc.linuxcnc.reading import read
+    from toolpath_stiff.nc.linuxcnc import read
 
     posted = asked.posted
     reading = read(
@@ -282,7 +331,7 @@ def _on_the_part(
     offsets: Offsets,
 ) -> Program:
     """A program as read for the machine that it was posted for, with the moves of the tool on the part."""
-    from toolpath_stiff.nc.posted.program import check_rotary_offsets, recovered
+    from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 
     check_rotary_offsets(offsets, posted, program.name)
     if asked.origin is None:

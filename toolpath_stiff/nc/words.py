@@ -1,8 +1,8 @@
-"""Words of a block: our normalising, then pygcode's reading. The only module that knows pygcode.
+"""Program text to words: bytes to lines, lines to blocks, blocks to words. The only module that knows pygcode.
 
-pygcode 0.2.1 (unmaintained since 2017) stumbles over comments of both styles on one line, `X+1`, spaces inside words,
-drops the E of `1.5E2`, and passes what it does not know. So comments, spaces, signs, exponents and N words are dealt
-with before it, each word keeps its true column, and every word that pygcode does not hand back is an error.
+pygcode 0.2.1 (unmaintained since 2017) fails on comments of both styles in one line, on `X+1` and on spaces inside
+words, drops the E of `1.5E2`, and ignores what it does not know. So comments, spaces, signs, exponents and N words are
+handled before it is called, each word keeps its true column, and every word that pygcode does not return is an error.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from pathlib import Path
 from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError
@@ -255,3 +256,46 @@ def _expected(letter: str) -> str:
     if letter in "LTN":
         return "a whole number that is not negative"
     return "a decimal number"
+
+
+# Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
+# end-of-file mark of CP/M and DOS (0x1A), which some posts still append.
+BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
+
+
+def read_lines(path: str | Path) -> tuple[str, ...]:
+    """Lines of a program file, without line ends. UTF-8 (with or without BOM) or Latin-1; LF, CRLF or CR.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is not text.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {str(path)!r}: {error.strerror}") from None
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    return split_lines(text, Path(path).name)
+
+
+def split_lines(text: str, name: str) -> tuple[str, ...]:
+    """Split into lines; a byte that no text holds is an error with its line and column."""
+    joined = text.replace("\r\n", "\n").replace("\r", "\n")
+    binary = BINARY.search(joined)
+    if binary is not None:
+        at = binary.start()
+        raise InputError(
+            f"binary byte 0x{ord(binary[0]):02X}",
+            expected="the text of an NC program",
+            file=name,
+            line=joined.count("\n", 0, at) + 1,
+            column=at - joined.rfind("\n", 0, at),
+        )
+    found = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
+    if not found[-1]:
+        found.pop()
+    return tuple(found)

@@ -16,8 +16,8 @@ from toolpath_stiff.analysis.loads import Load, load_directions
 from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.machine.kinematics import neutral_axes, solve_struts, solve_struts_at
 from toolpath_stiff.machine.limits import machine_limits, reach
-from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.placement.paths import WorkPath
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -208,7 +208,7 @@ class Evaluator:
         )
 
     def _orientations(self, placements: FloatArray, turn: FloatArray) -> FloatArray | None:
-        """(k, m + q, 3, 3) R' = Q R Rz(-C), the rule of `path.turns`; None: all vertical."""
+        """(k, m + q, 3, 3) R' = Q R Rz(-C), the rule of `path`; None: all vertical."""
         if self.turned is None and not placements[:, 3:5].any():
             return None
         own = np.broadcast_to(np.eye(3), (len(self.abc), 3, 3)) if self.turned is None else self.turned

@@ -1,6 +1,6 @@
 """The path that is placed, sampled in the set-up frame; thinned for a search, and for drawing.
 
-A placement (x, y, z, A, B, C; the numbers of `--origin`) turns and moves the samples rigidly, as `path.turns`. Rapids
+A placement (x, y, z, A, B, C; the numbers of `--origin`) turns and moves the samples rigidly, as `path`. Rapids
 to a point of the machine (G53, G28, G30), and the first one, which comes from where the control stands, are anchored:
 one of their ends, or some of its axes, stays where it is.
 
@@ -21,9 +21,8 @@ from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
-from toolpath_stiff.path import place, place_orientations, sample_moves
-from toolpath_stiff.path.rotations import rotation_matrices
-from toolpath_stiff.path.samples import Samples
+from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose
 

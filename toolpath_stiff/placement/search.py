@@ -18,10 +18,10 @@ from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, front_rows, thin
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures, clearances
 from toolpath_stiff.placement.paths import WorkPath, placed_path, telling_path
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.path.rotations import rotation_matrices
 from toolpath_stiff.report.figure import BLUE, house_style, new_figure, png_bytes
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.truss import HUB, TIP, platform_bars, platform_nodes
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 

@@ -1,7 +1,7 @@
 """The placements as a page: click a point of the front, see the path there. One file, no network.
 
 The page holds the thinned path once, in the program's axes, and its stiffness at every placement, evaluated here. Its
-script turns and moves the points rigidly, by the very rule of `path.turns`, and colours them; it evaluates nothing.
+script turns and moves the points rigidly, by the very rule of `path`, and colours them; it evaluates nothing.
 """
 
 from __future__ import annotations

@@ -6,18 +6,16 @@ import math
 import re
 from collections.abc import Sequence
 
-from toolpath_stiff.nc import arcs
-from toolpath_stiff.nc.blocks import CurrentBlock, Flow
-from toolpath_stiff.nc.codes.circular import ARCS
-from toolpath_stiff.nc.codes.contract import M_STOP, ONCE
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes import M_STOP, ONCE
 from toolpath_stiff.nc.codes.drilling import CYCLES
+from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
-from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.recorder import Arc
+from toolpath_stiff.nc.moves import RAPID, Arc
+from toolpath_stiff.nc.state import CurrentBlock, Flow
 from toolpath_stiff.nc.words import AXES, POLAR, Block, read_block
-from toolpath_stiff.rewriting.controls import OFF, Controls
-from toolpath_stiff.rewriting.line_edit import FEED_DECIMALS, SAME, LineEdit
+from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
 from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_between
 
 HALF_CIRCLE = 0.999  # chord over diameter, from which R magnifies a rounded end more than twenty times
@@ -70,7 +68,7 @@ def _lines(
         controls.note("the reference points of G28 and G30 stay where they are; intermediate points move with the work")
         _home(controls, edit, axes)
     elif source.motion in CYCLES:
-        if controls.matrix[arcs.PLANES[source.plane][2], arcs.PLANES[source.plane][2]] != 1.0:
+        if controls.matrix[geometry.PLANES[source.plane][2], geometry.PLANES[source.plane][2]] != 1.0:
             return _cycle_in_moves(controls, current, edit, axes, first), False
         _cycle(controls, current, edit, axes, plane)
     else:
@@ -121,10 +119,10 @@ def _arc(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[s
     code = source.motion or ""
     code = code if sign > 0.0 else ARCS[1 - ARCS.index(code)]
     controls.motion_word(current, edit, code)
-    first, second, normal = arcs.PLANES[name]
+    first, second, normal = geometry.PLANES[name]
     target = controls.target(last.end)
     start, end = (source.frames.to_program(point) for point in (last.start, last.end))
-    chord = math.dist(*([point[axis] for axis in arcs.PLANES[source.plane][:2]] for point in (start, end)))
+    chord = math.dist(*([point[axis] for axis in geometry.PLANES[source.plane][:2]] for point in (start, end)))
     if chord < SAME:
         _full_circle(controls, edit, target, axes, normal)
     else:
@@ -163,8 +161,8 @@ def _center(
         if _radius_says(controls, edit, here, there, clockwise, plane, exact_chord):
             return
         edit.remove("R")
-    letters = [arcs.CENTER_WORDS[axis] for axis in plane]
-    edit.remove(letter for letter in arcs.CENTER_WORDS if letter not in letters)
+    letters = [geometry.CENTER_WORDS[axis] for axis in plane]
+    edit.remove(letter for letter in geometry.CENTER_WORDS if letter not in letters)
     for axis, letter in zip(plane, letters, strict=True):
         value = (there[axis] if out.arc_absolute else there[axis] - here[axis]) / controls.scale(axis)
         if edit.word(letter) is not None or out.arc_absolute or abs(value) > OFF * 10.0**-controls.digits:
@@ -195,8 +193,8 @@ def _radius_says(
     if abs(chord - exact_chord) > SAME and chord > HALF_CIRCLE * 2.0 * abs(size):
         return False
     try:
-        found = arcs.center_from_radius((here[first], here[second]), (end[first], end[second]), size, clockwise)
-    except arcs.ArcError:
+        found = geometry.center_from_radius((here[first], here[second]), (end[first], end[second]), size, clockwise)
+    except geometry.ArcError:
         return False
     return math.dist(found, (center[first], center[second])) <= NEAR * controls.unit
 
@@ -207,7 +205,7 @@ def _radius_says(
 def _cycle(controls: Controls, current: CurrentBlock, edit: LineEdit, axes: list[str], plane: str) -> None:
     """The hole's place turns and moves, bottom and R plane (in G90) move along the drilling axis."""
     source, out = controls.source, controls.out
-    first, second, normal = arcs.PLANES[source.plane]
+    first, second, normal = geometry.PLANES[source.plane]
     if source.plane != plane:
         edit.add_code(source.plane)
     controls.motion_word(current, edit, source.motion or "")
@@ -231,7 +229,7 @@ def _cycle_in_moves(
     """A cycle along an axis that is none any more: its moves, rapids and dwells, one a line."""
     source = controls.source
     if controls.linearise is None:
-        axis = AXES[arcs.PLANES[source.plane][2]]
+        axis = AXES[geometry.PLANES[source.plane][2]]
         raise controls.refusal(
             f"{source.motion} drills along {axis}, and the placement turns the work out of it", LINEARISE
         )

@@ -1,8 +1,13 @@
-"""A program written for another placement: analysed at the original origin its tool takes the placed path.
+"""A program written for another placement, or its placement as offsets to key in at the control.
 
-`rewrite_program` returns the text. Every motion word has new numbers; everything else stays byte for byte: comments,
-line numbers, order, blank lines, tape marks, line ends, upper and lower case. The rapid with which the tool comes from
-where the control was switched on is the one move that cannot match.
+`rewrite_program` returns the text that, analysed at the original origin, takes the tool along the placed path. Every
+motion word has new numbers; everything else stays byte for byte: comments, line numbers, order, blank lines, tape
+marks, line ends, upper and lower case. The rapid with which the tool comes from where the control was switched on is
+the one move that cannot match.
+
+`offset_blocks` returns LinuxCNC's `G10 L2` and, for Fanuc-style controls, G54 with G68. Both turn X and Y alone, about
+the vertical. So they express a placement of vertical tools in an untilted set-up, and nothing else; for the rest the
+program itself has to be rewritten.
 """
 
 from __future__ import annotations
@@ -13,18 +18,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
-from toolpath_stiff.nc.source import split_lines
 from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.tables import Offsets, ToolEntry
-from toolpath_stiff.nc.words import read_block
+from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
+from toolpath_stiff.nc.words import read_block, split_lines
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
 from toolpath_stiff.rewriting.turn import Turn
-from toolpath_stiff.units import Pose, ShopPose, mm_from_m, pose_in_mm
+from toolpath_stiff.units import Pose, ShopPose, deg_from_rad, mm_from_m, pose_in_mm
 
 LINE_END = re.compile("\r\n|\n|\r")
 FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # 0.01 mm is no machining; beyond nine a double has no more to say
@@ -184,3 +191,104 @@ def _text_of(program: Program) -> tuple[str, str]:
         return content.decode(encoding), encoding
     except UnicodeDecodeError:
         return content.decode("latin-1"), "latin-1"
+
+
+OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
+VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
+NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
+USE_WRITE = "use --write, which transforms the program itself"
+
+
+@dataclass(frozen=True)
+class OffsetBlocks:
+    """What to key in, "" where the control cannot express the placement; the reason is then beside it."""
+
+    linuxcnc: str
+    fanuc: str
+    linuxcnc_reason: str = ""
+    fanuc_reason: str = ""
+
+
+def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> OffsetBlocks:
+    """Offset blocks that put a program at a placement.
+
+    Parameters
+    ----------
+    program
+        The program; its own G10 and its work offsets decide whether a G54 of the operator's suffices.
+    placement
+        x, y, z in m, A, B, C in rad: where program zero shall sit, as `--origin` takes it.
+    decimals
+        Of the numbers, in mm and degrees.
+
+    Notes
+    -----
+    `G10 L2 P1 R` turns X and Y about G54's zero (LinuxCNC manual, "G10 L2"); it goes before the first motion. `G68 X0
+    Y0 R` turns the G17 plane about program zero (Fanuc's manuals, "Coordinate system rotation"); it goes after G54 and
+    G17, and holds until G69. The numbers of G54 are millimetres.
+    """
+    reason = _not_here(program) or _not_about_z(program, placement) or _not_g54_alone(program)
+    if reason:
+        return OffsetBlocks("", "", reason, reason)
+    x, y, z = (_number(mm_from_m(v), decimals) for v in placement[:3])
+    turn = _number(deg_from_rad(placement[5]), decimals)
+    linuxcnc = f"G21 G10 L2 P1 X{x} Y{y} Z{z} R{turn}"
+    if turn == "0":
+        return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}")
+    upright = np.abs(program.moves.arc_normal[:, :2]).max(initial=0.0) < VERTICAL
+    if not upright:
+        return OffsetBlocks(linuxcnc, "", "", f"G68 does not turn arcs of G18 and G19: {USE_WRITE}")
+    return OffsetBlocks(linuxcnc, f"G54: X{x} Y{y} Z{z}\nG17 G54 G68 X0 Y0 R{turn}")
+
+
+def _not_here(program: Program) -> str:
+    """Why the program has no G54 of this machine's control, or ""."""
+    if program.dialect == CUTTER_LOCATION:
+        return NOT_POSTED
+    if not program.kinematics:
+        return ""
+    return (
+        f"the program is posted for another kinematics ({program.kinematics}), whose control its G54 belongs to: "
+        "post it for this machine"
+    )
+
+
+def _not_about_z(program: Program, placement: Pose) -> str:
+    """Why a turn of X and Y cannot express the placement, or ""."""
+    if max(abs(placement[3]), abs(placement[4])) > VERTICAL:
+        return f"the set-up is tilted, and work offsets turn X and Y alone: {USE_WRITE}"
+    moves = program.moves
+    tilted = np.flatnonzero(np.abs(np.concatenate([moves.start, moves.end], axis=1)[:, [3, 4, 5, 9, 10, 11]]).max(1))
+    if placement[5] and len(tilted):
+        line = moves.line[tilted[0]]
+        return f"the tool is tilted (line {line}), and work offsets turn X and Y, not its axis: {USE_WRITE}"
+    return ""
+
+
+def _not_g54_alone(program: Program) -> str:
+    """Why setting G54 would not move the whole program, or ""."""
+    for number, text in enumerate(program.source, 1):
+        if "5" not in text and "10" not in text:
+            continue  # neither a work offset nor G10
+        for code in _codes(text, number, program):
+            if code in OTHER_OFFSETS:
+                return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"
+            if code == "G10":
+                return f"the program sets offsets itself (G10, line {number}): {USE_WRITE}"
+    return ""
+
+
+def _codes(text: str, number: int, program: Program) -> list[str]:
+    """G codes of a line, and its other words; what LinuxCNC's interpreter read holds words that ours does not know."""
+    try:
+        words = read_block(text, number, program.name).words
+    except InputError:
+        if program.interpreter == "builtin":
+            raise
+        return [code_name("G", float(digits)) for digits in re.findall(r"[Gg]\s*(\d+(?:\.\d)?)", text)]
+    return [code_name(word.letter, word.value) for word in words]
+
+
+def _number(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
+    return "0" if text in ("-0", "") else text

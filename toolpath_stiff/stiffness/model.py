@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Machine, with_parameter
-from toolpath_stiff.path.rotations import roll_pitch_yaw, rotation_matrices
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.effects import find_effect, guard, known_effects
 from toolpath_stiff.stiffness.effects.contract import (
     DEFAULT_FORCE,

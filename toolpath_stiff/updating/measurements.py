@@ -15,7 +15,7 @@ from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path

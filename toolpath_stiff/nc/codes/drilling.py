@@ -6,15 +6,14 @@ cycle") where a dialect follows them.
 
 from __future__ import annotations
 
-from toolpath_stiff.nc import arcs
-from toolpath_stiff.nc.blocks import POINT_WORDS, CurrentBlock
-from toolpath_stiff.nc.codes.contract import MOTION, RETRACT, Code, g_codes
-from toolpath_stiff.nc.codes.feeds import SECONDS_PER_DAY, time_word
-from toolpath_stiff.nc.codes.moving import record
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes import MOTION, RETRACT, Code, g_codes
+from toolpath_stiff.nc.codes.modes import SECONDS_PER_DAY, time_word
+from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_spoke
-from toolpath_stiff.nc.cycles import SAME_HEIGHT_MM, Drilling, strokes
+from toolpath_stiff.nc.geometry import SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.moves import CYCLE, RAPID
-from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
 CYCLES = ("G73", "G81", "G82", "G83", "G85", "G89")
@@ -41,7 +40,7 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     given = MOTION in block.groups
     if not given and not any(block.has(letter) for letter in POINT_WORDS):
         return
-    normal = arcs.PLANES[state.plane][2]
+    normal = geometry.PLANES[state.plane][2]
     repeats = _repeats(state, block)
     _keep_heights(state, block, code, normal)
     words = _cycle_words(state, block, code, normal, given)
@@ -176,7 +175,7 @@ def _check_pecks(state: State, block: CurrentBlock, code: str, depth: float, rep
         raise block.fail(None, f"{code} with more than {MOST_STROKES} strokes", "a larger Q, or fewer repeats")
 
 
-CODES = (
+DRILLING_CODES = (
     Code("G73", MOTION, cycle, "chip-breaking drilling", g_codes("G73")),
     Code("G81", MOTION, cycle, "drilling", g_codes("G81")),
     Code("G82", MOTION, cycle, "drilling with dwell", g_codes("G82")),

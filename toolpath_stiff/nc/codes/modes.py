@@ -1,19 +1,40 @@
-"""Units, plane, distance modes: G20 G21, G17 G18 G19, G90 G91, G90.1 G91.1."""
+"""Codes that set what holds from here on, and which block runs next.
+
+Units, plane, distance modes (G20 G21, G17 G18 G19, G90 G91, G90.1 G91.1); F and S, feed and spindle modes (G93 G94 G95,
+G96 G97), G4, the feed of a move; subprogram calls (M97, M98), M99, the end (M2, M30), which `interpreter` carries out.
+mm/min inside.
+"""
 
 from __future__ import annotations
 
-from toolpath_stiff.nc.blocks import CurrentBlock
-from toolpath_stiff.nc.codes.contract import (
+import math
+
+from toolpath_stiff.nc.codes import (
     ARC_DISTANCE,
     DISTANCE,
+    DWELL,
+    FEED,
+    FEED_MODE,
+    M_STOP,
+    M_SUBPROGRAM,
+    ONCE,
     PLANE,
+    SPEED,
+    SPINDLE_MODE,
     UNITS,
     Alias,
     Code,
     g_codes,
+    holds_anyway,
+    m_codes,
 )
-from toolpath_stiff.nc.codes.turning import forget_polar, refuse_while_rotated
-from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
+from toolpath_stiff.nc.controller import MILLISECONDS, SECONDS
+from toolpath_stiff.nc.frames import Numbers
+from toolpath_stiff.nc.moves import Arc
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, State
+from toolpath_stiff.nc.words import Word
+from toolpath_stiff.units import MM_PER_INCH
 
 
 def units(state: State, block: CurrentBlock, code: str) -> None:
@@ -46,7 +67,7 @@ def arc_distance(state: State, block: CurrentBlock, code: str) -> None:
 
 _UNITS, _PLANE, _DISTANCE = g_codes("G20 G21"), g_codes("G17 - G19.1"), g_codes("G90 G91")
 _FANUC = "Fanuc, operator's manuals, Inch/metric conversion (G20 G21, in G-code system C G70 G71)"
-CODES = (
+MODE_CODES = (
     Code("G17", PLANE, plane, "plane XY", _PLANE),
     Code("G18", PLANE, plane, "plane ZX", _PLANE),
     Code("G19", PLANE, plane, "plane YZ", _PLANE),
@@ -57,7 +78,182 @@ CODES = (
     Code("G90.1", ARC_DISTANCE, arc_distance, "absolute arc centres", g_codes("G90.1 G91.1")),
     Code("G91.1", ARC_DISTANCE, arc_distance, "incremental arc centres", g_codes("G90.1 G91.1")),
 )
-ALIASES = (
+MODE_ALIASES = (
     Alias("G70", "G20", "inch", _FANUC, ("fanuc",)),
     Alias("G71", "G21", "mm", _FANUC, ("fanuc",)),
 )
+
+
+SECONDS_PER_DAY = 86400.0
+
+
+def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
+    """G93: F is one over the minutes of the move; G94: per minute; G95: per revolution."""
+    if code != state.feed_mode:
+        state.feed = None  # the old number means something else now
+    state.feed_mode = code
+
+
+def feed_word(state: State, block: CurrentBlock, code: str) -> None:
+    """F: the feed from here on; F0 takes it away."""
+    feed = block.take("F")
+    assert feed is not None
+    word = block.values["F"]
+    if feed < 0.0:
+        raise block.fail(word, "is a negative feed", "F above 0")
+    if "." not in word.text and feed and bare_feed_is_open(state):
+        units = "inch" if state.inch else "mm"
+        raise block.fail(
+            word,
+            f"without a decimal point is a feed that hangs on the control's parameters ({state.dialect.name})",
+            f"{word.text}. if it is that many {units} per {'revolution' if state.feed_mode == 'G95' else 'minute'}",
+        )
+    state.feed = feed * state.feed_scale if feed > 0.0 else None
+
+
+def bare_feed_is_open(state: State) -> bool:
+    """Whether a control's parameters say what F without a decimal point counts."""
+    if state.feed_mode == "G93":
+        return False
+    per_revolution = state.dialect.increments and state.feed_mode == "G95"
+    return per_revolution or ("inch" if state.inch else "mm") in state.dialect.feed_needs_point
+
+
+def speed_word(state: State, block: CurrentBlock, code: str) -> None:
+    """S: the spindle speed, 1/min."""
+    speed = block.take("S")
+    assert speed is not None
+    if speed < 0.0:
+        raise block.fail(block.values["S"], "is a negative speed", "S of 0 or more")
+    state.speed = speed
+
+
+def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
+    """G96: D is its greatest spindle speed, which does not enter."""
+    block.take("D")
+
+
+def dwell(state: State, block: CurrentBlock, code: str) -> None:
+    """G4: a pause, before the block's own moves."""
+    seconds = time_word(state, block, "X" if state.dialect.dwell != SECONDS and block.has("X") else "P")
+    if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
+        raise block.fail(block.codes[code], "needs its time", "P with the seconds, 0 or more")
+    state.recorder.add_dwell(seconds)
+
+
+def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
+    """A time word in s; what its number counts is the dialect's."""
+    value = block.take(letter)
+    if value is None or state.dialect.dwell == SECONDS:
+        return value
+    written = block.as_written(letter)
+    if "." not in written.text:
+        return written.value / 1e3
+    if letter == "P" and state.dialect.dwell == MILLISECONDS:
+        raise block.fail(written, f"has a decimal point, which {state.dialect.name} does not allow", "milliseconds")
+    return value
+
+
+# -- the feed of a move ----------------------------------------------------------------------------------------------
+
+
+def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: list[float], arc: Arc | None) -> float:
+    """Feed of a move in mm/min, or deg/min for one of the rotary axes alone."""
+    if state.feed is None:
+        words: list[Word] = [w for w in block.block.words if w.letter == "G"]
+        raise block.fail(
+            words[0] if words else block.block.words[0],
+            "is a feed move before any feed" if state.feed_mode != "G93" else "is a feed move without F under G93",
+            "F above 0",
+        )
+    if state.feed_mode == "G93":
+        feed, state.feed = state.feed, None  # every move needs its own
+        return feed * length_of_move(start, end, arc)
+    if state.feed_mode == "G95":
+        if state.speed == 0.0:
+            raise block.fail(None, "feed per revolution (G95) with the spindle at S0", "S above 0")
+        return state.feed * state.speed
+    linear = math.dist(start[:3], end[:3]) if arc is None else arc_length(arc, start, end)
+    return rotary_feed(state, state.feed) if linear == 0.0 else state.feed
+
+
+def rotary_feed(state: State, feed: Numbers) -> Numbers:
+    """G94's feed of the rotary axes alone, deg/min: degrees are degrees in inch programs too."""
+    return feed / (MM_PER_INCH if state.inch else 1.0)
+
+
+def length_of_move(start: list[float], end: list[float], arc: Arc | None) -> float:
+    """Millimetres of a move or, of the rotary axes alone, degrees of the one that turns most."""
+    linear = math.dist(start[:3], end[:3]) if arc is None else arc_length(arc, start, end)
+    if linear > 0.0:
+        return linear
+    return max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
+
+
+def arc_length(arc: Arc, start: list[float], end: list[float]) -> float:
+    """Length of an arc or helix as `path.move_lengths` has it, so that G93's F is one over the move's time."""
+    climb = sum((e - s) * n for s, e, n in zip(start, end, arc.normal, strict=False))
+    first = math.dist(start[:3], arc.center)
+    last = math.sqrt(max(math.dist(end[:3], arc.center) ** 2 - climb**2, 0.0))
+    return math.hypot(arc.sweep * (first + last) / 2.0, climb, last - first)
+
+
+_FEEDS, _SPINDLE = g_codes("G93 G94 G95"), g_codes("G96 G97")
+FEED_CODES = (
+    Code("F", FEED, feed_word, "feed", "LinuxCNC, Other Codes, F: Set Feed Rate"),
+    Code("S", SPEED, speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
+    Code("G4", ONCE, dwell, "dwell", g_codes("G4"), step=DWELL),
+    Code("G93", FEED_MODE, feed_mode, "inverse-time feed", _FEEDS),
+    Code("G94", FEED_MODE, feed_mode, "feed per minute", _FEEDS),
+    Code("G95", FEED_MODE, feed_mode, "feed per revolution", _FEEDS),
+    Code(
+        "G96", SPINDLE_MODE, surface_speed, "constant surface speed", _SPINDLE,
+        listed="constant surface speed: the spindle speed does not enter",
+    ),
+    Code("G97", SPINDLE_MODE, holds_anyway, "spindle speed in revolutions", _SPINDLE, label=SPINDLE_MODE),
+)  # fmt: skip
+
+
+def call(state: State, block: CurrentBlock, code: str) -> None:
+    """M98 P L: run a subprogram; M97 P L (Haas): run from the block with that N number. After the block's own moves."""
+    word = block.codes[code]
+    if code == "M97" and not state.dialect.local_calls:
+        raise block.fail(
+            word,
+            "is Haas' call of a block by its N number",
+            hint="give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)",
+        )
+    if block.groups.get(ONCE) in ("G4", "G10"):
+        raise block.fail(word, "beside a code that wants the P word too", "two blocks")
+    number, repeats = block.whole("P", word), block.whole("L", word)
+    if number is None:
+        raise block.fail(word, "without P", "P with the number of what it calls")
+    block.flow = Call(number, repeats, word.column, local=code == "M97")
+
+
+def end_of_subprogram(state: State, block: CurrentBlock, code: str) -> None:
+    """M99: back to the block after the call."""
+    if block.has("P"):
+        raise block.fail(block.values["P"], "makes M99 return to another block, which is not supported", "M99")
+    block.flow = Flow.RETURN
+
+
+def end_of_program(state: State, block: CurrentBlock, code: str) -> None:
+    """M2, M30: nothing runs after this block."""
+    block.flow = Flow.END
+
+
+_CALLS = "LinuxCNC, O Codes, Fanuc-Style Programs; Fanuc, operator's manuals, Subprogram (M98, M99)"
+FLOW_CODES = (
+    Code("M0", M_STOP, holds_anyway, "stop", m_codes("M0 M1")),
+    Code("M1", M_STOP, holds_anyway, "optional stop", m_codes("M0 M1")),
+    Code("M60", M_STOP, holds_anyway, "stop", m_codes("M60")),
+    Code("M2", M_STOP, end_of_program, "end", m_codes("M2 M30")),
+    Code("M30", M_STOP, end_of_program, "end", m_codes("M2 M30")),
+    Code(
+        "M97", M_SUBPROGRAM, call, "call by line number (Haas)", "Haas, mill operator's manual, M97",
+        controls=("haas",),
+    ),
+    Code("M98", M_SUBPROGRAM, call, "subprogram call", _CALLS),
+    Code("M99", M_SUBPROGRAM, end_of_subprogram, "subprogram end", _CALLS),
+)  # fmt: skip

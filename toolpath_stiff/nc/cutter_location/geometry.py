@@ -23,9 +23,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from toolpath_stiff.nc import arcs
-from toolpath_stiff.nc.recorder import Arc
-from toolpath_stiff.nc.tool_axis import roll_pitch_of_axis
+from toolpath_stiff.nc.geometry import (
+    LARGEST_DIFFERENCE,
+    RELATIVE_TOLERANCE,
+    SAME_POINT,
+    ArcError,
+    Point2,
+    roll_pitch_of_axis,
+)
+from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 
 Vector = tuple[float, float, float]
@@ -82,28 +88,28 @@ def _in_plane(circle: Circle, start: Vector) -> tuple[Vector, Vector]:
     out = minus(start, circle.center)
     out = along(out, circle.axis, -dot(out, circle.axis))
     length = math.sqrt(dot(out, out))
-    if length < arcs.SAME_POINT:
-        raise arcs.ArcError("a circle whose centre is the tool's position", "a centre apart from it")
+    if length < SAME_POINT:
+        raise ArcError("a circle whose centre is the tool's position", "a centre apart from it")
     first = (out[0] / length, out[1] / length, out[2] / length)
     return first, cross(circle.axis, first)
 
 
 def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
-    """The arc from start to end. Raises `arcs.ArcError` where they do not lie on the circle within its tolerance."""
+    """The arc from start to end. Raises `ArcError` where they do not lie on the circle within its tolerance."""
     first, second = _in_plane(circle, start)
     from_center, to_end = minus(start, circle.center), minus(end, circle.center)
     here = (dot(from_center, first), 0.0)
     there = (dot(to_end, first), dot(to_end, second))
     radius, last = here[0], math.hypot(*there)
-    allowed = min(max(ROUNDING_MM, arcs.RELATIVE_TOLERANCE * radius), arcs.LARGEST_DIFFERENCE)
-    if last < arcs.SAME_POINT or abs(last - radius) > allowed:
-        raise arcs.ArcError(
+    allowed = min(max(ROUNDING_MM, RELATIVE_TOLERANCE * radius), LARGEST_DIFFERENCE)
+    if last < SAME_POINT or abs(last - radius) > allowed:
+        raise ArcError(
             f"an arc whose end lies {abs(last - radius):.4f} mm off its circle (radius {radius:.4f} mm at the start, "
             f"{last:.4f} mm at the end)",
             f"radii that agree within {allowed:.4f} mm",
         )
     if abs(circle.radius - radius) > allowed:  # never, if the file gives no radius
-        raise arcs.ArcError(
+        raise ArcError(
             f"a circle of radius {circle.radius:.4f} mm whose centre lies {radius:.4f} mm from the tool's position",
             f"radii that agree within {allowed:.4f} mm",
         )
@@ -111,7 +117,7 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
     return Arc(center, circle.axis, _sweep(circle, here, there))
 
 
-def _sweep(circle: Circle, here: arcs.Point2, there: arcs.Point2) -> float:
+def _sweep(circle: Circle, here: Point2, there: Point2) -> float:
     angle = math.atan2(there[1], there[0])
     if math.dist(here, there) < SAME_POINT_MM:
         angle += math.tau * circle.turns
@@ -119,11 +125,11 @@ def _sweep(circle: Circle, here: arcs.Point2, there: arcs.Point2) -> float:
     else:
         angle, whole = angle % math.tau, False
     if circle.turns > 1 and not whole:
-        raise arcs.ArcError("a helix of several turns that does not end above its start", "one CIRCLE a turn")
+        raise ArcError("a helix of several turns that does not end above its start", "one CIRCLE a turn")
     if circle.sweep is not None:
         angle += math.tau * round((math.radians(circle.sweep) - angle) / math.tau)
         if angle <= 0.0 or abs(math.degrees(angle) - circle.sweep) > SWEEP_TOLERANCE_DEG:
-            raise arcs.ArcError(
+            raise ArcError(
                 f"an arc of {math.degrees(angle % math.tau):.3f} degrees where ANGLE says {circle.sweep:g}",
                 "an end that is that far along the circle",
             )
@@ -145,16 +151,16 @@ def part_of(arc: Arc, start: Vector, end: Vector, share: float) -> Vector:
 
 
 def turned_as(center: Vector, axis: Vector, start: Vector, direction: Vector) -> Vector:
-    """The axis with the sign that makes a motion from the start begin in a direction. Raises `arcs.ArcError`."""
+    """The axis with the sign that makes a motion from the start begin in a direction. Raises `ArcError`."""
     tangent = cross(axis, minus(start, center))
     size = math.sqrt(dot(tangent, tangent) * dot(direction, direction))
-    if size < arcs.SAME_POINT or abs(dot(tangent, direction)) < 0.5 * size:
-        raise arcs.ArcError("a direction (INDIRV) that does not go along the circle", "the tangent at the start")
+    if size < SAME_POINT or abs(dot(tangent, direction)) < 0.5 * size:
+        raise ArcError("a direction (INDIRV) that does not go along the circle", "the tangent at the start")
     return axis if dot(tangent, direction) > 0.0 else (-axis[0], -axis[1], -axis[2])
 
 
 def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which: int) -> Vector:
-    """Where a motion along the circle meets a line for the first or second time. Raises `arcs.ArcError`.
+    """Where a motion along the circle meets a line for the first or second time. Raises `ArcError`.
 
     Parameters
     ----------
@@ -169,14 +175,14 @@ def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which
     a, b = (minus(point, circle.center) for point in line)
     p, q = (dot(a, first), dot(a, second)), (dot(b, first), dot(b, second))
     length = math.dist(p, q)
-    if length < arcs.SAME_POINT:
-        raise arcs.ArcError("a line of no length", "two points")
+    if length < SAME_POINT:
+        raise ArcError("a line of no length", "two points")
     u = ((q[0] - p[0]) / length, (q[1] - p[1]) / length)
     foot = -(p[0] * u[0] + p[1] * u[1])
     miss = abs(p[0] * u[1] - p[1] * u[0])
     radius = dot(minus(start, circle.center), first)
     if miss > radius:
-        raise arcs.ArcError("a line that does not meet its circle", "one that does")
+        raise ArcError("a line that does not meet its circle", "one that does")
     half = math.sqrt(radius * radius - miss * miss)
     met = [(p[0] + (foot + s * half) * u[0], p[1] + (foot + s * half) * u[1]) for s in (-1.0, 1.0)]
     # The start itself, if the line goes through it, is met after a whole turn.
@@ -184,7 +190,7 @@ def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which
     order.sort(key=lambda m: math.dist(m, (radius, 0.0)) < 10.0 * SAME_POINT_MM)
     x, y = order[which - 1]
     if abs(math.hypot(*q) - radius) < 10.0 * SAME_POINT_MM and math.dist(q, (x, y)) > 10.0 * SAME_POINT_MM:
-        raise arcs.ArcError(
+        raise ArcError(
             "a line whose second point lies on the circle, where the motion does not end",
             "that point at the intersection that is asked for",
         )

@@ -305,7 +305,7 @@ def fini(state: State, statement: Statement) -> None:
 
 
 _MOST = f"{CATIA}, {CREO}, {AUTODESK}"
-WORDS = (
+MODE_WORDS = (
     Word("FEDRAT", fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
     Word("SPINDL", spindl, "spindle speed", ALL, ISO),
     Word("UNITS", units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),

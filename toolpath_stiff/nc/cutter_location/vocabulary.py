@@ -1,6 +1,6 @@
 """The table of words of cutter-location files: word to function, meaning, who writes it, source; and how it is used.
 
-A word that acts is a row beside its function in `modes`, `motion` and `cycles`. Those that need no function of their
+A word that acts is a row beside its function in `modes` and `motion`. Those that need no function of their
 own, because they are listed, doubted or refused, are rows here.
 """
 
@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterable
 from itertools import groupby
 
-from toolpath_stiff.nc.cutter_location import cycles, modes, motion
-from toolpath_stiff.nc.cutter_location.modes import COMPENSATION, HEADING, TOOL, TOOL_CENTRE
+from toolpath_stiff.nc.cutter_location.modes import COMPENSATION, HEADING, MODE_WORDS, TOOL, TOOL_CENTRE
+from toolpath_stiff.nc.cutter_location.motion import CYCLE_WORDS, MOTION_WORDS
 from toolpath_stiff.nc.cutter_location.state import (
     ALL,
     APT,
@@ -160,7 +160,7 @@ def table(words: Iterable[Word]) -> dict[str, Word]:
     return found
 
 
-WORDS = table((*motion.WORDS, *cycles.WORDS, *modes.WORDS, *LISTED_WORDS, *DOUBTFUL_WORDS, *REFUSED_WORDS))
+WORDS = table((*MOTION_WORDS, *CYCLE_WORDS, *MODE_WORDS, *LISTED_WORDS, *DOUBTFUL_WORDS, *REFUSED_WORDS))
 REFUSED_HEADS = table(REFUSED_WORDS)
 
 
@@ -178,7 +178,7 @@ def meaning_of(name: str) -> str:
 
 
 def execute(state: State, statement: Statement) -> None:
-    """Execute a statement. Raises `InputError`, `arcs.ArcError` and `AxisError`."""
+    """Execute a statement. Raises `InputError`, `ArcError` and `AxisError`."""
     found = look_up(statement.word)
     if found is None:
         _unknown(state, statement)
@@ -202,8 +202,8 @@ def _unknown(state: State, statement: Statement) -> None:
     state.note(state.doubtful, f"{name} {UNKNOWN}, and not acted upon")
 
 
-def markdown() -> str:
-    """The table for people, as it stands in docs/nc.md: neighbours that say the same share a row."""
+def words_table() -> str:
+    """The words as a Markdown table, as it stands in docs/nc.md: neighbours with the same meaning share a row."""
     lines = ["| words | taken for | | written by | source |", "| --- | --- | --- | --- | --- |"]
     order = (READ, LISTED, DOUBTFUL, REFUSED)
     words = sorted(WORDS.values(), key=lambda word: order.index(word.kind))

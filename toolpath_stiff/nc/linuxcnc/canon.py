@@ -14,10 +14,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.arcs import arc_sweep
-from toolpath_stiff.nc.linuxcnc.copy import Line
-from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID
-from toolpath_stiff.nc.recorder import Arc, Recorder
+from toolpath_stiff.nc.geometry import arc_sweep
+from toolpath_stiff.nc.linuxcnc.inputs import Line
+from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH

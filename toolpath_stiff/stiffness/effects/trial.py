@@ -15,7 +15,7 @@ from toolpath_stiff.errors import EffectFault, InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path

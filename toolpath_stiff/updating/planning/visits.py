@@ -20,7 +20,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.path.rotations import rotation_matrices
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.units import RAD_PER_DEG
 from toolpath_stiff.updating.measurements import Measurements

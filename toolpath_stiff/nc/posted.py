@@ -1,4 +1,4 @@
-"""A program posted for another machine: what of it can be known on the part, and what is said of it."""
+"""A program posted for another machine: what of it can be known on the part, and what is reported about it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis, tool_poses
 from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
-from toolpath_stiff.nc.posted.chain import tool_poses
-from toolpath_stiff.nc.posted.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis
-from toolpath_stiff.nc.posted.moves import recover_moves, turns_far
+from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 

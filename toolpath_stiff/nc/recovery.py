@@ -1,7 +1,7 @@
 """Moves of the tool on the part, from those of the machine that a program was posted for. SI.
 
-Where rotary axes turn, a straight move of the axes is a curve on the part: it is divided. `posted_chain` has the
-kinematics.
+Where rotary axes turn, a straight move of the axes is a curve on the part: it is divided. `kinematics` has the chain of
+axes.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.curves import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.kinematics import HEAD, LETTERS, PostedKinematics, line_point, roll_pitch, tool_poses, turned
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves
-from toolpath_stiff.nc.posted.chain import line_point, roll_pitch, tool_poses, turned
-from toolpath_stiff.nc.posted.kinematics import HEAD, LETTERS, PostedKinematics
 from toolpath_stiff.units import deg_from_rad, mm_from_m, rad_from_deg
 
 FloatArray = NDArray[np.float64]

@@ -1,19 +1,130 @@
-"""Moves to samples along the true path: lines, arcs, helices, spirals; all moves at once."""
+"""Moves to sampled poses: arc length, time, tangents, weights; rigid turns of the work; the path as a table.
+
+Samples follow the true path: lines, arcs, helices, spirals; all moves at once. Placing moves of the set-up frame on the
+machine has one rule: points p' = o + Q p with Q = Rz(C) Ry(B) Rx(A); orientations R' = Q R Rz(-C). Path and tool axis
+turn with the work, the vertical platform never yaws. With it the machine's 120-degree symmetry holds exactly.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.curves import arc_frame, move_lengths, points_along
-from toolpath_stiff.nc.moves import RAPID, Moves
-from toolpath_stiff.path.samples import Samples
-from toolpath_stiff.path.turns import place_orientations
-from toolpath_stiff.units import mm_from_m, rad_from_deg
+from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Columns over n samples along the true path, in machine coordinates.
+
+    Every move has samples at both of its ends, so a corner appears twice: once as the end of a move, with
+    that move's tangent, and once as the start of the next, with the next one's. This is the rule for the
+    tangent at corners.
+
+    Attributes
+    ----------
+    move
+        (n,) row of the move in `Moves`.
+    line, motion, tool
+        (n,) as in `Moves`.
+    tool_length
+        (n,) m; nan: the machine's reference tool.
+    s
+        (n,) m, length of tip path from the program's start, rapids included.
+    t
+        (n,) s, time from the program's start, dwells included.
+    position
+        (n, 3) m, tool tip.
+    abc
+        (n, 3) rad, roll, pitch, yaw of the platform.
+    tangent
+        (n, 3) unit vector of the tip's motion; 0 where only rotary axes move.
+    weight
+        (n,) m, the length of cutting path that the sample stands for (trapezoidal rule within its move);
+        0 for rapids and for moves of the rotary axes alone.
+    feed
+        (n,) m/s; nan for rapids.
+    """
+
+    move: IntArray
+    line: IntArray
+    motion: IntArray
+    tool: IntArray
+    tool_length: FloatArray
+    s: FloatArray
+    t: FloatArray
+    position: FloatArray
+    abc: FloatArray
+    tangent: FloatArray
+    weight: FloatArray
+    feed: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    @property
+    def cutting(self) -> BoolArray:
+        """(n,) samples that count in the statistics: not of a rapid."""
+        return np.asarray(self.motion != 0)
+
+    def take(self, index: IntArray | BoolArray | slice) -> Samples:
+        """The samples at `index` (integers, a mask or a slice)."""
+        return Samples(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+
+def place(moves: Moves, origin: ArrayLike) -> Moves:
+    """Moves in machine coordinates, positions only.
+
+    `start`, `end`, arc centres and normals are turned; the rotary words stay as programmed, because a control
+    interpolates them as such. `place_orientations` turns the sampled orientations.
+
+    Parameters
+    ----------
+    moves
+        In the set-up frame.
+    origin
+        (6,) x, y, z in m, A, B, C in rad: where program zero sits.
+    """
+    at = np.asarray(origin, dtype=float)
+    turn = rotation_matrices(at[3:])
+
+    def placed(pose: FloatArray) -> FloatArray:
+        # Plain addition where nothing turns: a multiplication by the unit matrix would cost the last digit.
+        point = pose[:, :3] @ turn.T if at[3:].any() else pose[:, :3]
+        return np.concatenate([point + at[:3], pose[:, 3:]], axis=1)
+
+    placed_moves = replace(moves, start=placed(moves.start), end=placed(moves.end))
+    if not moves.arc_sweep.any():  # a long program of straight moves need not hold its zeros twice
+        return placed_moves
+    arc = (moves.arc_sweep != 0.0)[:, None]
+    return replace(
+        placed_moves,
+        arc_center=np.where(arc, moves.arc_center @ turn.T + at[:3], 0.0),
+        arc_normal=moves.arc_normal @ turn.T,
+    )
+
+
+def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
+    """Roll, pitch, yaw (n, 3) rad on the machine of programmed angles (n, 3) rad; unturned ones stay as they are."""
+    angles = np.asarray(origin, dtype=float)[3:]
+    if not angles.any():
+        return abc
+    if not angles[:2].any() and not abc.any():
+        return abc  # a vertical platform never yaws
+    turn, back = rotation_matrices(angles), rotation_about_z(-angles[2])
+    return roll_pitch_yaw(turn @ rotation_matrices(abc) @ back)
+
 
 RAPID_FEED = 10.0 / 60.0  # m/s, assumed where no machine says otherwise
 ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
@@ -151,3 +262,40 @@ def _durations(moves: Moves, length: FloatArray, turn: FloatArray, rapid_feed: f
     feed = np.where(moves.motion == RAPID, rapid_feed, moves.feed)
     distance = np.where(length > 0.0, length, np.where(moves.motion == RAPID, 0.0, turn))
     return np.asarray(distance / np.where(feed > 0.0, feed, 1.0))
+
+
+# Column -> decimals; None: a whole number or a word. A millionth of a millimetre is finer than any machine and
+# lets sums over a long path keep their digits.
+PATH_COLUMNS: dict[str, int | None] = {
+    "line": None,
+    "motion": None,
+    "tool": None,
+    "s_mm": 6,
+    "t_s": 6,
+    "x_mm": 6,
+    "y_mm": 6,
+    "z_mm": 6,
+    "a_deg": 6,
+    "b_deg": 6,
+    "c_deg": 6,
+    "feed_mm_per_min": 3,
+}
+
+
+def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+    """Column of `PATH_COLUMNS` -> values, for some rows."""
+    position, abc = mm_from_m(samples.position[rows]), deg_from_rad(samples.abc[rows])
+    return {
+        "line": samples.line[rows],
+        "motion": np.array(MOTION_NAMES)[samples.motion[rows]],
+        "tool": samples.tool[rows],
+        "s_mm": mm_from_m(samples.s[rows]),
+        "t_s": samples.t[rows],
+        "x_mm": position[:, 0],
+        "y_mm": position[:, 1],
+        "z_mm": position[:, 2],
+        "a_deg": abc[:, 0],
+        "b_deg": abc[:, 1],
+        "c_deg": abc[:, 2],
+        "feed_mm_per_min": mm_per_min_from_m_per_s(samples.feed[rows]),
+    }

@@ -1,0 +1,295 @@
+"""G0 to G3, G53, G28, G30: straight moves, arcs, full circles, helices, from the words of a block. mm, degrees.
+
+A move is recorded with its ends in the set-up frame, its feed and its tool; beside it stands whether the present height
+is known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes import MOTION, ONCE, Code, g_codes
+from toolpath_stiff.nc.codes.modes import feed_of_move
+from toolpath_stiff.nc.codes.points import (
+    XY,
+    axis_words,
+    cartesian,
+    control_point,
+    destination,
+    forget_polar,
+    know_place,
+    point_words,
+    refuse_while_rotated,
+)
+from toolpath_stiff.nc.geometry import Point2
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, ToolUse
+from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Segment, State
+from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.words import Word
+from toolpath_stiff.units import m_from_mm
+
+STILL = 1e-12  # of a coordinate, or of 1 mm if that is more: what frames' sums leave of an axis that stands
+
+
+def record(
+    state: State,
+    block: CurrentBlock,
+    motion: int,
+    control: list[float],
+    work: Collection[int] = (),
+    machine: Collection[int] = (),
+    arc: Arc | None = None,
+) -> None:
+    """Move to a point in control coordinates; `work`, `machine`: axes that were given in each."""
+    frames = state.frames
+    state.length_changed = state.rotation_changed = False
+    if state.height_lost:
+        find_height(state, block, motion, (2 in work and state.absolute) or 2 in machine)
+    start, was = frames.to_setup(frames.position), frames.bound
+    for axis in work:
+        frames.from_machine[axis] = False
+    for axis in machine:
+        frames.from_machine[axis] = True
+    end = frames.to_setup(control)
+    # An axis that was not asked to move keeps its number to the last digit, whatever the frames' sums say.
+    for axis in range(6):
+        if abs(end[axis] - start[axis]) < STILL * max(1.0, abs(start[axis])):
+            end[axis] = start[axis]
+    feed = math.nan if motion == RAPID else feed_of_move(state, block, start, end, arc)
+    bound = (was, frames.bound)
+    added = state.recorder.add(block.line, motion, start, end, feed, state.tool, state.tool_length, bound, arc)
+    if state.trace is not None:
+        state.trace.append(Segment(motion, list(frames.position), list(control), arc))
+    frames.position = control
+    if added:
+        note_tool(state)
+
+
+def note_tool(state: State) -> None:
+    """Keep the tool in the spindle among those that moved."""
+    if state.tool in state.used_tools:
+        return
+    entry = (state.tools or {}).get(state.tool, ToolEntry(state.tool))
+    state.used_tools[state.tool] = ToolUse(
+        state.tool,
+        m_from_mm(entry.length),
+        m_from_mm(entry.diameter),
+        entry.remark,
+        m_from_mm(entry.stick_out),
+        entry.material,
+    )
+
+
+def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> None:
+    """A move where the present height is lost: a cut is refused, a Z finds it again."""
+    if motion != RAPID:
+        know_height(state, block, None)
+    state.height_lost = not named
+
+
+def know_height(state: State, block: CurrentBlock, word: Word | None) -> None:
+    """Refuse what hangs on the present height, if that is lost."""
+    if state.height_lost:
+        raise block.fail(
+            word,
+            "a cut before any Z" if word is None else "takes the present height",
+            "G0 with Z before it: the tool length changed between the last move and M6, and LinuxCNC's interpreter "
+            "forgets that",
+        )
+
+
+def know_position(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
+    """Refuse a code that takes the present numbers of axes that LinuxCNC's interpreter may have otherwise."""
+    if 2 in axes:
+        know_height(state, block, word)
+    if XY & set(axes):
+        know_place(state, block, word)
+
+
+def straight(state: State, block: CurrentBlock, code: str) -> None:
+    """G0, G1: straight to the point that the axis words name."""
+    if any(block.has(letter) for letter in POINT_WORDS):
+        words = point_words(state, block)
+        target = control_point(state, block, state.frames.to_program(state.frames.position), words)
+        record(state, block, RAPID if code == "G0" else FEED, target, words)
+    elif MOTION in block.groups and code == "G1" and state.height_lost:  # rs274 moves then
+        find_height(state, block, FEED, named=False)
+
+
+def motion_off(state: State, block: CurrentBlock, code: str) -> None:
+    """G80: no motion mode; axis words have none to move in."""
+    state.motion = None
+
+
+def machine_move(state: State, block: CurrentBlock, code: str) -> None:
+    """G53: the axis words are machine coordinates, for this block only."""
+    word = block.codes[code]
+    if state.motion not in ("G0", "G1"):
+        raise block.fail(word, f"with {state.motion}", "G0 or G1")
+    if not state.absolute:
+        raise block.fail(word, "in incremental mode (G91)", "G90")
+    words = axis_words(state, block)
+    frames = state.frames
+    if any(axis > 2 for axis in words) and any(frames.origin[3:]):
+        raise block.fail(word, "with rotary axes, while the work is turned", "X, Y, Z alone")
+    if words:
+        _leave_program_coordinates(state, block, word, words)
+    point = frames.machine_position()
+    for axis, value in words.items():
+        point[axis] = value
+    motion = RAPID if state.motion == "G0" else FEED
+    record(state, block, motion, frames.control_of_machine(point), machine=words)
+
+
+def go_home(state: State, block: CurrentBlock, code: str) -> None:
+    """G28, G30: rapid to the intermediate point, then the axes named there, or all, to the reference point."""
+    words = axis_words(state, block)
+    frames = state.frames
+    _leave_program_coordinates(state, block, block.codes[code], words)
+    if words:
+        between = cartesian(state, frames.to_program(frames.position), words)
+        record(state, block, RAPID, frames.to_control(between), words)
+    home = frames.offsets.home_g28 if code == "G28" else frames.offsets.home_g30
+    if not any(home):
+        state.assume(f"the reference point of {code}, not given by any offsets file, is machine 0, 0, 0")
+    going = set(words) or set(range(6))
+    # Axis by axis in program coordinates, as LinuxCNC does: with a rotation in force it is not the same.
+    there = frames.to_program(frames.control_of_machine(list(home)))
+    here = frames.to_program(frames.position)
+    point = [there[axis] if axis in going else here[axis] for axis in range(6)]
+    record(state, block, RAPID, frames.to_control(point), machine=going)
+
+
+def set_home(state: State, block: CurrentBlock, code: str) -> None:
+    """G28.1, G30.1: the present point is the reference point from here on."""
+    know_position(state, block, block.codes[code], range(6))
+    offsets = state.frames.offsets
+    home = offsets.home_g28 if code == "G28.1" else offsets.home_g30
+    home[:] = state.frames.machine_position()
+
+
+def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, words: dict[int, float]) -> None:
+    """A move of `words` (none: all axes) by machine coordinates: harmless under G68 only off the rotated plane."""
+    if state.frames.tip_held:
+        raise block.fail(word, "while tool centre point control is on (G43.4)", "G49 before it")
+    if words and not words.keys() >= XY:
+        know_place(state, block, word)
+    if not words or XY & words.keys():
+        refuse_while_rotated(state, block, word, "moves X and Y by machine coordinates")
+        forget_polar(state)
+        if not words or words.keys() >= XY:
+            state.unsettled = None
+
+
+_G28, _G30 = g_codes("G28 - G28.1"), g_codes("G30 - G30.1")
+STRAIGHT_CODES = (
+    Code("G0", MOTION, straight, "rapid", g_codes("G0"), many=True),
+    Code("G1", MOTION, straight, "feed", g_codes("G1"), many=True),
+    Code("G80", MOTION, motion_off, "motion mode off", g_codes("G80")),
+    Code("G53", ONCE, machine_move, "machine coordinates", g_codes("G53"), step=MOTION),
+    Code("G28", ONCE, go_home, "to the first reference point", _G28, takes_axes=True),
+    Code("G30", ONCE, go_home, "to the second reference point", _G30, takes_axes=True),
+    Code("G28.1", ONCE, set_home, "set the first reference point", _G28, label=ONCE),
+    Code("G30.1", ONCE, set_home, "set the second reference point", _G30, label=ONCE),
+)
+
+
+ARCS = ("G2", "G3")
+MOST_TURNS = 10_000
+
+
+def arc(state: State, block: CurrentBlock, code: str) -> None:
+    """G2, G3: clockwise and counter-clockwise in the plane in force, to the point that the axis words name."""
+    if not (any(block.has(letter) for letter in (*POINT_WORDS, *geometry.CENTER_LETTERS)) or MOTION in block.groups):
+        return
+    first, second, _ = geometry.PLANES[state.plane]
+    frames = state.frames
+    here = frames.to_program(frames.position)
+    words = point_words(state, block)
+    target = destination(state, block, here, words)
+    start, end = (here[first], here[second]), (target[first], target[second])
+    turns = _turns(block)
+    clockwise = code == "G2"
+    try:
+        center = _center(state, block, start, end, clockwise, words)
+        sweep = sweep_about(center, start, end, clockwise, turns)
+    except geometry.ArcError as error:
+        raise block.fail(None, error.found, error.expected) from None
+    middle = list(here)
+    middle[first], middle[second] = center
+    x, y, z = frames.to_setup(frames.to_control(middle))[:3]
+    turned = frames.turn_direction(normal_of(state.plane))
+    record(state, block, ARC, control_point(state, block, here, words), words, arc=Arc((x, y, z), turned, sweep))
+
+
+def normal_of(plane: str) -> tuple[float, float, float]:
+    """Unit normal of a plane, in program axes."""
+    normal = geometry.PLANES[plane][2]
+    return (float(normal == 0), float(normal == 1), float(normal == 2))
+
+
+def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, turns: int = 1) -> float:
+    """Signed angle of an arc in rad. Raises `ArcError` unless start and end lie on one circle about the centre."""
+    geometry.check_radii(start, end, center)
+    return geometry.arc_sweep(start, end, center, clockwise, turns)
+
+
+def center_by_offsets(start: Point2, offsets: tuple[float, float], scale: float) -> Point2:
+    """Centre that lies at I, J or K (in units of `scale` mm) from the start."""
+    return (start[0] + offsets[0] * scale, start[1] + offsets[1] * scale)
+
+
+def center_by_radius(start: Point2, end: Point2, radius: float, scale: float, clockwise: bool) -> Point2:
+    """Centre of an arc given by R (in units of `scale` mm). Raises `ArcError`."""
+    return geometry.center_from_radius(start, end, radius * scale, clockwise)
+
+
+def _turns(block: CurrentBlock) -> int:
+    turns = block.take("P")
+    if turns is None:
+        return 1
+    if turns != int(turns) or not 1 <= turns <= MOST_TURNS:
+        raise block.fail(block.values["P"], "is no number of turns", "a whole number from 1")
+    return int(turns)
+
+
+def _center(
+    state: State,
+    block: CurrentBlock,
+    start: Point2,
+    end: Point2,
+    clockwise: bool,
+    words: dict[int, float],
+) -> Point2:
+    """Centre by R, or by the two of I, J, K that belong to the plane. Raises `InputError`, `ArcError`."""
+    first, second, normal = geometry.PLANES[state.plane]
+    radius = block.take("R")
+    off_plane = geometry.CENTER_WORDS[normal]
+    in_plane = (geometry.CENTER_WORDS[first], geometry.CENTER_WORDS[second])
+    if block.has(off_plane):
+        raise block.fail(block.values[off_plane], f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
+    offsets = [block.take(letter) for letter in in_plane]
+    if state.polar is not None and offsets != [None, None]:
+        raise geometry.ArcError("an arc with I, J or K in polar mode (G16)", "R")
+    if radius is not None:
+        if offsets != [None, None]:
+            raise block.fail(block.values["R"], "and a centre (I, J, K) are both given", "one of them")
+        if not {first, second} & words.keys():
+            raise geometry.ArcError("an arc with R and without an end point", "an axis word of the plane")
+        return center_by_radius(start, end, radius, state.length_scale, clockwise)
+    if offsets == [None, None]:
+        raise geometry.ArcError("an arc without a centre", f"{in_plane[0]}, {in_plane[1]} or R")
+    if state.arc_absolute:
+        if None in offsets:
+            raise geometry.ArcError("an absolute centre (G90.1) with one word", f"{in_plane[0]} and {in_plane[1]}")
+        a, b = (v * state.length_scale for v in offsets if v is not None)
+        return (a, b)
+    return center_by_offsets(start, (offsets[0] or 0.0, offsets[1] or 0.0), state.length_scale)
+
+
+ARC_CODES = (
+    Code("G2", MOTION, arc, "clockwise arc", g_codes("G2 G3"), many=True),
+    Code("G3", MOTION, arc, "counter-clockwise arc", g_codes("G2 G3"), many=True),
+)

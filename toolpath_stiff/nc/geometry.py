@@ -1,0 +1,227 @@
+"""Geometry of moves: arcs from their words, tool axes, strokes of drilling cycles; lengths and points along all moves.
+
+Arcs of G2 and G3 have LinuxCNC's tolerances. Canned drilling cycles are expanded to their moves as LinuxCNC does
+(manual, "Canned cycles"; interp_cycles.cc). Words are in mm and degrees, `Moves` in SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.nc.moves import Moves
+
+# LinuxCNC's defaults (manual, "INI configuration", CENTER_ARC_RADIUS_TOLERANCE_MM; interp_arc.cc): start and end radius
+# may differ by a thousandth of the radius, or by 0.00127 mm if that is more, and never by more than 0.127 mm.
+RELATIVE_TOLERANCE = 1e-3
+ABSOLUTE_TOLERANCE = 1.27e-3
+LARGEST_DIFFERENCE = 100.0 * ABSOLUTE_TOLERANCE
+RADIUS_FORMAT_TOLERANCE = 1.27e-2  # a half chord may exceed R by this much (interp_internal.hh)
+SAME_POINT = 1e-12
+
+PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}  # first, second axis, normal: right-handed
+CENTER_WORDS = ("I", "J", "K")
+CENTER_LETTERS = "IJKR"  # words that an arc alone has
+
+Point2 = tuple[float, float]
+
+
+class ArcError(Exception):
+    """What is wrong with an arc: found, expected."""
+
+    def __init__(self, found: str, expected: str) -> None:
+        super().__init__(found)
+        self.found, self.expected = found, expected
+
+
+def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: bool) -> Point2:
+    """Centre of an arc given by R; a negative radius takes the longer way. Raises `ArcError`."""
+    if start == end:
+        raise ArcError("an arc with R that ends where it starts", "another end point, or I, J, K for a full circle")
+    if radius == 0.0:
+        raise ArcError("an arc of radius 0", "R other than 0")
+    chord = math.dist(start, end)
+    half, size = chord / 2.0, abs(radius)
+    if half - size > RADIUS_FORMAT_TOLERANCE:
+        raise ArcError(
+            f"an arc whose radius {size:g} mm cannot reach its end {chord:.4f} mm away",
+            f"a radius of at least {half:.4f} mm",
+        )
+    height = math.sqrt(max(size * size - half * half, 0.0))
+    # The centre lies left of the chord for a short counter-clockwise arc.
+    side = 1.0 if (radius > 0.0) != clockwise else -1.0
+    along = ((end[0] - start[0]) / chord, (end[1] - start[1]) / chord)
+    middle = ((start[0] + end[0]) / 2.0, (start[1] + end[1]) / 2.0)
+    return (middle[0] - side * height * along[1], middle[1] + side * height * along[0])
+
+
+def check_radii(start: Point2, end: Point2, center: Point2) -> None:
+    """Raise `ArcError` if start and end do not lie on one circle about the centre within LinuxCNC's tolerance."""
+    first, last = math.dist(start, center), math.dist(end, center)
+    if first < SAME_POINT or last < SAME_POINT:
+        raise ArcError("an arc of radius 0", "a centre apart from the start and the end point")
+    difference = abs(first - last)
+    relative = difference / max(first, last)
+    if difference > LARGEST_DIFFERENCE or (difference > ABSOLUTE_TOLERANCE and relative > RELATIVE_TOLERANCE):
+        allowed = min(max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * max(first, last)), LARGEST_DIFFERENCE)
+        raise ArcError(
+            f"an arc whose end lies {difference:.4f} mm off its circle (radius {first:.4f} mm at the start, "
+            f"{last:.4f} mm at the end)",
+            f"radii that agree within {allowed:.4f} mm",
+        )
+
+
+def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns: int) -> float:
+    """Signed angle in rad (counter-clockwise positive); start = end is a full circle; P words add whole turns."""
+    first = math.atan2(start[1] - center[1], start[0] - center[0])
+    last = math.atan2(end[1] - center[1], end[0] - center[0])
+    sweep = (first - last if clockwise else last - first) % math.tau
+    # The modulus of a tiny negative difference is almost a whole turn, and must be one.
+    if sweep < 1e-10:
+        sweep = math.tau
+    sweep += math.tau * (turns - 1)
+    return -sweep if clockwise else sweep
+
+
+def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
+    """Roll and pitch in degrees that turn the spindle's z onto a tool axis, at a yaw of 0.
+
+    With R = Rz(c) Ry(b) Rx(a) and c = 0 the tool axis, from the tip to the spindle, is R z = (sin b cos a, -sin a,
+    cos b cos a) (the convention of `rotations`). Roll is in [-90, 90]; where it is +-90, pitch is 0.
+
+    Parameters
+    ----------
+    i, j, k
+        The tool axis from tip to spindle, of any length above 0.
+    """
+    across = math.hypot(i, k)
+    pitch = math.degrees(math.atan2(i, k)) if across else 0.0
+    return math.degrees(math.atan2(-j, across)), pitch
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def move_lengths(moves: Moves) -> FloatArray:
+    """(n,) m, length of the tip's path in each move.
+
+    An arc's is sqrt((r sweep)^2 + climb^2); where start and end radius differ (a control's tolerance, or a spiral)
+    r is their mean, which is exact to second order in the difference.
+    """
+    chord = np.linalg.norm(moves.end[:, :3] - moves.start[:, :3], axis=1)
+    arc = moves.arc_sweep != 0.0
+    if arc.any():
+        frame = arc_frame(moves, np.flatnonzero(arc))
+        radius = 0.5 * (frame.radius_start + frame.radius_end)
+        sweep = moves.arc_sweep[arc]
+        chord[arc] = np.sqrt((radius * sweep) ** 2 + frame.climb**2 + (frame.radius_end - frame.radius_start) ** 2)
+    return np.asarray(chord)
+
+
+class ArcFrame:
+    """Plane, radii and climb of some arcs: position(u) = c + r(u) (cos e1 + sin e2) + (lift + u climb) n."""
+
+    def __init__(self, center: FloatArray, normal: FloatArray, start: FloatArray, end: FloatArray) -> None:
+        from_center, to_end = start - center, end - center
+        self.normal, self.center = normal, center
+        lift = np.einsum("ni,ni->n", from_center, normal)
+        self.climb = np.einsum("ni,ni->n", to_end, normal) - lift
+        in_plane = from_center - lift[:, None] * normal
+        self.radius_start = np.linalg.norm(in_plane, axis=1)
+        end_in_plane = to_end - (lift + self.climb)[:, None] * normal
+        self.radius_end = np.linalg.norm(end_in_plane, axis=1)
+        self.e1 = in_plane / self.radius_start[:, None]
+        self.e2 = np.cross(normal, self.e1)
+        self.lift = lift
+
+
+def arc_frame(moves: Moves, rows: IntArray) -> ArcFrame:
+    """The frames of the arcs in `rows` of moves."""
+    return ArcFrame(moves.arc_center[rows], moves.arc_normal[rows], moves.start[rows, :3], moves.end[rows, :3])
+
+
+def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positions (n, 3) and unit tangents (n, 3) at shares u of moves; ends are met exactly."""
+    start, end = moves.start[:, :3], moves.end[:, :3]
+    chord = end - start
+    length = np.linalg.norm(chord, axis=1)
+    direction = chord / np.where(length > 0.0, length, 1.0)[:, None]
+    position = start[move] + u[:, None] * chord[move]
+    tangent = direction[move]
+    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
+    if len(arcs):
+        frame = arc_frame(moves, arcs)
+        which = np.full(len(moves), -1)
+        which[arcs] = np.arange(len(arcs))
+        rows = np.flatnonzero(moves.arc_sweep[move] != 0.0)
+        position[rows], tangent[rows] = _along_arcs(frame, moves.arc_sweep[arcs], which[move[rows]], u[rows])
+    position[u == 0.0] = start[move[u == 0.0]]
+    position[u == 1.0] = end[move[u == 1.0]]
+    return position, tangent
+
+
+def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    angle = (u * sweep[arc])[:, None]
+    growth = (frame.radius_end - frame.radius_start)[arc][:, None]
+    radius = frame.radius_start[arc][:, None] + u[:, None] * growth
+    e1, e2, normal = frame.e1[arc], frame.e2[arc], frame.normal[arc]
+    outward = np.cos(angle) * e1 + np.sin(angle) * e2
+    around = -np.sin(angle) * e1 + np.cos(angle) * e2
+    height = (frame.lift[arc] + u * frame.climb[arc])[:, None]
+    position = frame.center[arc] + radius * outward + height * normal
+    velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
+    return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
+
+
+PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
+
+SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
+
+
+@dataclass(frozen=True)
+class Drilling:
+    """One hole along the plane's normal: heights in mm, `dwell` in s."""
+
+    code: str
+    bottom: float
+    retract: float  # the R plane
+    clear: float  # where the cycle ends: the R plane (G99) or where it began (G98)
+    peck: float
+    dwell: float
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One move along the normal: to which height, at feed or rapid, how long to wait there in s."""
+
+    height: float
+    feed: bool
+    dwell: float = 0.0
+
+
+def strokes(hole: Drilling) -> Iterator[Stroke]:
+    """Moves of one hole, from the R plane."""
+    if hole.code in ("G73", "G83"):
+        yield from _pecks(hole)
+    dwell = hole.dwell if hole.code in ("G82", "G89") else 0.0
+    yield Stroke(hole.bottom, feed=True, dwell=dwell)
+    if hole.code == "G85":  # out to the R plane at feed, from there at rapid
+        yield Stroke(hole.retract, feed=True)
+    yield Stroke(hole.clear, feed=hole.code == "G89")
+
+
+def _pecks(hole: Drilling) -> Iterator[Stroke]:
+    """The pecks above the bottom. G73 breaks the chip at depth, G83 clears it at the R plane."""
+    count = 1
+    while hole.retract - count * hole.peck > hole.bottom + SAME_HEIGHT_MM:
+        depth = hole.retract - count * hole.peck
+        yield Stroke(depth, feed=True)
+        if hole.code == "G83":
+            yield Stroke(hole.retract, feed=False)
+        yield Stroke(depth + PECK_CLEARANCE_MM, feed=False)
+        count += 1
