@@ -74,6 +74,9 @@ CALLS_FILES = [
     "o</srv/evil> call\no</srv/evil> sub\no</srv/evil> endsub",
     "/o<../evil> sub",
     "o<sub/evil> call",
+    "1o</srv/evil> call",  # the digits join the line number of the copy, and what is left is a call
+    "N5 .5 o<other> call",
+    "/1 2 o<other> call",
 ]
 
 
@@ -225,6 +228,7 @@ def test_no_file_appears(tmp_path, monkeypatch):
     [
         "%\no<{0}> call\nG1 X1 F100\n%\no<{0}> sub\no<{0}> endsub\n",
         "/o<{0}> sub\n/o<{0}> endsub\no<{0}> call\nG1 X1 F100\nM2\n",
+        "G1 X1 F100\n1o<{0}> call\nM2\n",
     ],
 )
 def test_a_file_beside_the_program_is_not_run(call, tmp_path, monkeypatch):
@@ -232,7 +236,7 @@ def test_a_file_beside_the_program_is_not_run(call, tmp_path, monkeypatch):
     marker, other = tmp_path / "marker", tmp_path / "other.ngc"
     other.write_text(f"o<other> sub\n;py,open('{marker}','w').close()\no<other> endsub\n")
     program = call.format(other.with_suffix(""))
-    with pytest.raises(InputError, match="path"):
+    with pytest.raises(InputError, match=r"path|begins with a number"):
         parse_program(program, interpreter="linuxcnc", block_delete=True)
     with pytest.raises(InputError):  # by its name alone, from beside the program
         monkeypatch.chdir(tmp_path)

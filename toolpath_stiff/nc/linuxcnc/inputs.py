@@ -169,6 +169,8 @@ SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
 OPENS_OR_ENDS = re.compile(r"O(<[^<>]*>|\d+)(END)?(SUB|IF|WHILE|REPEAT)")
 M98 = re.compile(r"M[+]?0*98(?!\d)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
+# These would join the line number that the copy puts before them: `1O<x>CALL` would be N11 and a call that nobody saw.
+BARE_NUMBER = tuple("0123456789.")
 
 
 def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
@@ -178,6 +180,13 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
         for column, text in line.comments:
             if PYTHON.match(text):
                 raise _refused("a comment that runs Python", name, line.number, column)
+        if line.words.startswith(BARE_NUMBER):
+            raise InputError(
+                f"a block that begins with a number: {line.words[:20]!r}",
+                expected="a letter before each number",
+                file=name,
+                line=line.number,
+            )
         if "M" in line.words:
             _check_m_codes(line, name)
     _check_calls(lines, name)
