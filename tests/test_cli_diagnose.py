@@ -14,8 +14,8 @@ import pytest
 
 from tests.effects.cases import BENCH_FILE
 from toolpath_stiff import rig
-from toolpath_stiff.cli.diagnose import DATA, PICTURES
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.report.diagnose import names
 from toolpath_stiff.results_folder import MANIFEST
 
 
@@ -54,7 +54,7 @@ def test_it_writes_a_report_and_says_what_it_found(strut):
     assert "weak_strut" in said and "IDENTIFIED" in said
     assert "Traceback" not in told
     written = {file.name for file in out.iterdir()} - {MANIFEST}
-    assert {"diagnose.json", "residuals.csv", "report.html"} <= written <= {*DATA, *PICTURES}
+    assert {"diagnose.json", "residuals.csv", "report.html"} <= written <= set(names())
     for name in written:
         assert name in said
     found = json.loads((out / "diagnose.json").read_text("utf-8"))

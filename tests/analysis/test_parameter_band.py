@@ -133,7 +133,7 @@ def test_no_such_parameter():
 
 
 def test_the_profile_holds_the_band(program):
-    from toolpath_stiff.report.profile_picture import profile_band, profile_curve, profile_picture
+    from toolpath_stiff.report.profile import profile_band, profile_curve, profile_picture
 
     found = analyse(with_uncertainty(STRUT_LAW, [1.0, 1.0]), program, step=0.05)
     low, high = profile_band(found)

@@ -11,9 +11,9 @@ from urllib.parse import unquote
 import pytest
 
 from tests.report.test_report_page import BROWSER, EVIL, Page
-from toolpath_stiff.report.batch import Outcome, summary_csv, terminal_summary
-from toolpath_stiff.report.batch_page import batch_page
-from toolpath_stiff.report.sections import script_hash
+from toolpath_stiff.report.batch import batch_page
+from toolpath_stiff.report.batch.outcome import Outcome, summary_csv, terminal_summary
+from toolpath_stiff.report.pages import script_hash
 
 
 def outcome(name, low, mean, high, **more):

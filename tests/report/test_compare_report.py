@@ -17,8 +17,8 @@ from tests.updating.cases import campaign, readings_by_hand, table_1
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.report.compare_page import QUESTIONS, compare_html, compare_pictures
-from toolpath_stiff.report.compare_text import residuals_csv, terminal_text
+from toolpath_stiff.report.compare import QUESTIONS, compare_html, compare_pictures, residuals_csv
+from toolpath_stiff.report.compare import text as terminal_text
 from toolpath_stiff.updating.comparison import Comparison, compare
 from toolpath_stiff.updating.measurements import Measurements
 

@@ -16,21 +16,17 @@ from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
-from toolpath_stiff.report import (
-    case_study_picture,
-    compare_pictures,
-    diagnose_pictures,
-    machine_picture,
-    map_picture,
-    plan_picture,
-)
-from toolpath_stiff.report.batch_page import batch_page
-from toolpath_stiff.report.diagnose_page import diagnose_html
+from toolpath_stiff.report import case_study, figure, machine, plan
+from toolpath_stiff.report import map as map_report
+from toolpath_stiff.report.analysis import summary_with_options
+from toolpath_stiff.report.analysis.page import page
+from toolpath_stiff.report.batch import batch_page
+from toolpath_stiff.report.compare import pictures as compare_pictures
+from toolpath_stiff.report.diagnose import diagnose_html
+from toolpath_stiff.report.diagnose import pictures as diagnose_pictures
 from toolpath_stiff.report.figure import INK
-from toolpath_stiff.report.map_page import map_page
-from toolpath_stiff.report.page import page
-from toolpath_stiff.report.template import asset
-from toolpath_stiff.report.write import summary_with_options
+from toolpath_stiff.report.map import map_page
+from toolpath_stiff.report.pages import asset
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.updating.comparison import compare
 from toolpath_stiff.updating.measurements import read_measurements
@@ -45,7 +41,7 @@ def last(monkeypatch):
     """The figures that were drawn, last one last."""
     figures = []
     for module in (
-        case_study_picture, compare_pictures, diagnose_pictures, machine_picture, map_picture, plan_picture,
+        case_study, compare_pictures, diagnose_pictures, machine, map_report, plan,
     ):  # fmt: skip
 
         def kept(*size, new=module.new_figure):
@@ -106,8 +102,8 @@ def used_width(figure):
 
 @pytest.mark.parametrize("pose", [(-0.3, 0.3, 0.3, np.radians(-30.0), 0.0, 0.0), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)])
 def test_the_machine_is_whole_and_its_axes_named(last, pose):
-    machine, at = nist(), np.array(pose)
-    machine_picture.machine_picture(machine, at, solve_struts(machine, at[None, :3], at[None, 3:]))
+    at = np.array(pose)
+    machine.machine_picture(nist(), at, solve_struts(nist(), at[None, :3], at[None, 3:]))
     figure = last[-1]
     figure.draw_without_rendering()
     for i, axes in enumerate(figure.axes):
@@ -120,14 +116,14 @@ def test_the_machine_is_whole_and_its_axes_named(last, pose):
 
 
 def test_slices_of_a_map_fill_their_rows_and_no_figure_lies_on_another(last, mapped):
-    map_picture.map_picture(nist(), mapped)
+    map_report.map_picture(nist(), mapped)
     assert len({round(axes.get_position().x0, 3) for axes in last[-1].axes[:4]}) == 2
     assert_whole_and_apart(last[-1])
 
 
 def test_the_regions_of_the_case_study_are_whole_and_apart(last):
     study = run_case_study(build_model(nist()))
-    case_study_picture.regions_picture(study)
+    case_study.regions_picture(study)
     assert_whole_and_apart(last[-1])
     assert used_width(last[-1]) > 0.95
 
@@ -170,7 +166,7 @@ def visits_at(z):
 @pytest.mark.parametrize("heights", [[0.43, 0.78, 1.2, 1.49], [0.07, 0.43, 0.78, 1.13, 1.49, 1.2], [0.5]])
 def test_every_pose_is_in_the_panel_of_its_own_height(last, heights):
     visits = visits_at(np.array([*heights, heights[0]]))
-    plan_picture.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
+    plan.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
     found = {}
     for axes in last[-1].axes:
         z = float(re.match(r"z = ([\d.]+) mm", axes.get_title(loc="left")).group(1))
@@ -229,10 +225,8 @@ def test_a_picture_in_a_page_takes_the_page_s_colours(compared):
 
 
 def test_many_marks_are_put_in_as_an_image(monkeypatch, compared):
-    from toolpath_stiff.report import vector
-
     sharp = compare_pictures.measured_modelled_png(compared).svg
-    monkeypatch.setattr(vector, "MOST_MARKS", 10)
-    monkeypatch.setattr(vector, "FEW_MARKS", 5)
+    monkeypatch.setattr(figure, "MOST_MARKS", 10)
+    monkeypatch.setattr(figure, "FEW_MARKS", 5)
     heavy = compare_pictures.measured_modelled_png(compared).svg
     assert "<image" not in sharp and "data:image/png" in heavy

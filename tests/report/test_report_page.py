@@ -13,11 +13,11 @@ import pytest
 
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.nc.moves import ToolUse, Unsupported
-from toolpath_stiff.report import page_data as page_data_module
-from toolpath_stiff.report.page import json_for_script, page
-from toolpath_stiff.report.page_data import NONE, OUT_OF_REACH, PLUNGE, page_rows
-from toolpath_stiff.report.wording import number
-from toolpath_stiff.report.write import summary_with_options
+from toolpath_stiff.report.analysis import page as page_module
+from toolpath_stiff.report.analysis import summary_with_options
+from toolpath_stiff.report.analysis.page import NONE, OUT_OF_REACH, PLUNGE, page, page_rows
+from toolpath_stiff.report.pages import json_for_script
+from toolpath_stiff.report.words import number
 
 EVIL = "</script><script>alert(1)</script>"
 VOID = {"meta", "input", "br", "hr", "img", "link"}
@@ -184,7 +184,7 @@ def test_the_same_analysis_gives_the_same_page(analysis):
 
 
 def test_very_many_samples_are_thinned_aloud_and_keep_the_extremes(analysis, monkeypatch):
-    monkeypatch.setattr(page_data_module, "MOST_SAMPLES", 1200)
+    monkeypatch.setattr(page_module, "MOST_SAMPLES", 1200)
     rows = page_rows(analysis)
     assert len(rows) <= 1200 < len(analysis.samples)
     stiffness, counted = analysis.at.stiffness, analysis.counted
@@ -218,7 +218,7 @@ def test_one_operation_has_no_table():
 
 
 def test_a_thinned_page_keeps_where_operations_begin(monkeypatch):
-    monkeypatch.setattr(page_data_module, "MOST_SAMPLES", 240)
+    monkeypatch.setattr(page_module, "MOST_SAMPLES", 240)
     analysis = spiral()
     rows = page_rows(analysis)
     assert len(rows) < len(analysis.samples)

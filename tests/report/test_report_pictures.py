@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 from matplotlib.image import imread
 
 from tests.report.factory import make_analysis, short, spiral
-from toolpath_stiff.report import path_picture as path_picture_module
-from toolpath_stiff.report.figure import PLUNGE_SLATE, new_figure
-from toolpath_stiff.report.path_picture import path_picture
-from toolpath_stiff.report.profile_picture import MOST_OPERATIONS, _set_limits, extremes_by_column, profile_picture
-from toolpath_stiff.report.scale import CLASSES, UNREACHABLE, scale_limits, segment_classes
+from toolpath_stiff.report.analysis import path as path_module
+from toolpath_stiff.report.analysis.path import path_picture
+from toolpath_stiff.report.figure import CLASSES, PLUNGE_SLATE, UNREACHABLE, new_figure, scale_limits, segment_classes
+from toolpath_stiff.report.profile import MOST_OPERATIONS, _set_limits, extremes_by_column, profile_picture
 
 
 def pixels(png: bytes) -> np.ndarray:
@@ -48,8 +47,8 @@ def test_the_same_analysis_gives_the_same_bytes_whatever_the_users_own_settings(
 def test_pictures_need_no_pyplot():
     code = (
         "import sys; from tests.report.factory import short;"
-        "from toolpath_stiff.report.path_picture import path_picture;"
-        "from toolpath_stiff.report.profile_picture import profile_picture;"
+        "from toolpath_stiff.report.analysis.path import path_picture;"
+        "from toolpath_stiff.report.profile import profile_picture;"
         "a = short(); before = 'matplotlib' in sys.modules; path_picture(a); profile_picture(a);"
         "print(before, 'matplotlib.pyplot' in sys.modules)"
     )
@@ -71,7 +70,7 @@ def test_unreachable_samples_are_red_and_only_they():
 def test_a_very_long_path_keeps_its_shape_and_what_is_red(monkeypatch):
     beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
     whole = path_picture(beyond)
-    monkeypatch.setattr(path_picture_module, "MOST_POINTS", 200)  # of 900 mm in steps of 1 mm
+    monkeypatch.setattr(path_module, "MOST_POINTS", 200)  # of 900 mm in steps of 1 mm
     thinned = path_picture(beyond)
     red = (0xD6, 0x45, 0x45)
     assert count_colour(thinned, red) == pytest.approx(count_colour(whole, red), rel=0.1)

@@ -5,9 +5,8 @@ import copy
 import pytest
 
 from tests.report.factory import make_analysis, short, spiral
-from toolpath_stiff.report.comparison import compare_summaries
-from toolpath_stiff.report.terminal import MOST_OPERATIONS, WIDTH, comparison_table, terminal_table
-from toolpath_stiff.report.wording import duration, number
+from toolpath_stiff.report.analysis import MOST_OPERATIONS, compare_summaries, comparison_table, terminal_table
+from toolpath_stiff.report.words import WIDTH, duration, number
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,15 @@ import pytest
 
 from tests.report.factory import make_analysis, short
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report import page as page_module
-from toolpath_stiff.report.write import write_analysis
-from toolpath_stiff.results_folder import MANIFEST
+from toolpath_stiff.report.analysis import files, names
+from toolpath_stiff.report.analysis import page as page_module
+from toolpath_stiff.results_folder import MANIFEST, write_folder
 
 PLOTS = {"samples.csv", "summary.json", "path.png", "profile.png", "report.html"}
+
+
+def write(analysis, folder, **options):
+    return write_folder(folder, files(analysis, **options), command="analyze")
 
 
 @pytest.fixture(scope="module")
@@ -27,21 +31,21 @@ def tree(folder):
 
 
 def test_all_files_are_written_and_nothing_else(analysis, tmp_path):
-    files = write_analysis(analysis, tmp_path / "deep" / "out")
-    assert {f.name for f in files} == PLOTS
+    written = write(analysis, tmp_path / "deep" / "out")
+    assert {f.name for f in written} == PLOTS == set(names())
     assert set(tree(tmp_path)) == {f"deep/out/{name}" for name in {*PLOTS, MANIFEST}}
 
 
 def test_the_same_analysis_writes_the_same_bytes(analysis, tmp_path):
     for name in ("a", "b"):
-        write_analysis(short(), tmp_path / name, required=5e7, other=analysis)
+        write(short(), tmp_path / name, required=5e7, other=analysis)
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
 
 
 def test_without_plots_matplotlib_is_not_imported(tmp_path):
     code = (
-        "import sys; from tests.report.factory import short; from toolpath_stiff.report.write import write_analysis;"
-        f"print([p.name for p in write_analysis(short(), {str(tmp_path / 'o')!r}, plots=False)]);"
+        "import sys; from tests.report.factory import short; from tests.report.test_report_write import write;"
+        f"print([p.name for p in write(short(), {str(tmp_path / 'o')!r}, plots=False)]);"
         "print([m for m in ('matplotlib', 'pandas', 'pyarrow') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -49,7 +53,7 @@ def test_without_plots_matplotlib_is_not_imported(tmp_path):
 
 
 def test_summary_is_json_without_nan_and_equals_the_analysis(analysis, tmp_path):
-    write_analysis(analysis, tmp_path / "o", plots=False, required=1e9, other=analysis)
+    write(analysis, tmp_path / "o", plots=False, required=1e9, other=analysis)
     text = (tmp_path / "o" / "summary.json").read_text()
     read = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
     compare, required = read.pop("compare"), read.pop("required")
@@ -63,11 +67,11 @@ def test_out_of_reach_is_null_in_json_an_empty_cell_in_csv_and_a_null_in_parquet
     from pyarrow import parquet as pq
 
     beyond = make_analysis([{"end": (0.7, 0.0, 0.0)}, {"end": (0.9, 0.0, 0.0)}], partial=True)
-    write_analysis(beyond, tmp_path / "o", plots=False)
+    write(beyond, tmp_path / "o", plots=False)
     rows = list(csv.DictReader((tmp_path / "o" / "samples.csv").open()))
     empty = [row["stiffness_N_per_mm"] == "" for row in rows]
     assert np.array_equal(empty, ~beyond.at.reachable)
-    write_analysis(beyond, tmp_path / "o", plots=False, table="parquet")
+    write(beyond, tmp_path / "o", plots=False, table="parquet")
     table = pq.read_table(tmp_path / "o" / "samples.parquet")
     assert table.column_names == list(rows[0])
     assert table["stiffness_N_per_mm"].null_count == sum(empty)
@@ -75,9 +79,9 @@ def test_out_of_reach_is_null_in_json_an_empty_cell_in_csv_and_a_null_in_parquet
 
 
 def test_old_files_of_ours_go_and_foreign_ones_stay(analysis, tmp_path):
-    write_analysis(analysis, tmp_path)
+    write(analysis, tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
-    write_analysis(analysis, tmp_path, plots=False)
+    write(analysis, tmp_path, plots=False)
     assert set(tree(tmp_path)) == {"samples.csv", "summary.json", "notes.txt", MANIFEST}
     assert json.loads((tmp_path / "summary.json").read_text())["samples"] == len(analysis.samples)
 
@@ -87,7 +91,7 @@ def test_old_files_of_ours_go_and_foreign_ones_stay(analysis, tmp_path):
 def test_an_error_midway_leaves_everything_as_it_was(analysis, tmp_path, monkeypatch, error, exists):
     out = tmp_path / "reports" / "part"
     if exists:
-        write_analysis(analysis, out, plots=False)
+        write(analysis, out, plots=False)
     before = tree(tmp_path)
 
     def fail(*_args, **_kwargs):
@@ -95,7 +99,7 @@ def test_an_error_midway_leaves_everything_as_it_was(analysis, tmp_path, monkeyp
 
     monkeypatch.setattr(page_module, "page", fail)
     with pytest.raises(type(error)):
-        write_analysis(analysis, out)
+        write(analysis, out)
     assert tree(tmp_path) == before
     assert (tmp_path / "reports").exists() == exists
 
@@ -104,5 +108,5 @@ def test_a_file_in_the_place_of_the_folder_is_one_clear_error(analysis, tmp_path
     (tmp_path / "o").write_text("a file")
     for folder in (tmp_path / "o", tmp_path / "o" / "below"):
         with pytest.raises(InputError, match="cannot write"):
-            write_analysis(analysis, folder, plots=False)
+            write(analysis, folder, plots=False)
     assert tree(tmp_path) == {"o": b"a file"}

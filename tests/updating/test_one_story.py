@@ -18,12 +18,14 @@ from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, table_1
 from toolpath_stiff.hints import Asked, parted
-from toolpath_stiff.report import compare_text, diagnose_text, update_text
-from toolpath_stiff.report.compare_page import QUESTIONS as COMPARE_QUESTIONS
-from toolpath_stiff.report.compare_page import compare_html
-from toolpath_stiff.report.compare_variables import stiffness_deviation_percent
-from toolpath_stiff.report.diagnose_page import diagnose_html
-from toolpath_stiff.report.diagnose_words import explanations, headline, is_plausible, model_rows
+from toolpath_stiff.report import compare as compare_report
+from toolpath_stiff.report import diagnose as diagnose_report
+from toolpath_stiff.report import update as update_report
+from toolpath_stiff.report.compare import QUESTIONS as COMPARE_QUESTIONS
+from toolpath_stiff.report.compare import compare_html
+from toolpath_stiff.report.compare.variables import stiffness_deviation_percent
+from toolpath_stiff.report.diagnose import diagnose_html
+from toolpath_stiff.report.explanations import explanations, headline, is_plausible, model_rows
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.comparison import Comparison, compare
@@ -89,11 +91,11 @@ def test_every_text_prints_these_two_errors():
     story = f"as given {found['baseline']['as_given'][MEAN]:.2f} %, strut law refitted {found['baseline'][MEAN]:.2f} %"
     last = f", with {diagnosis.best} {found['candidates'][0][MEAN]:.2f} %"
     texts = [
-        (compare_text.terminal_text(comparison.document), ""),
+        (compare_report.text(comparison.document), ""),
         (compare_html(comparison, dict.fromkeys(COMPARE_QUESTIONS, b"")), ""),
-        (diagnose_text.terminal_text(found), last),
+        (diagnose_report.text(found), last),
         (diagnose_html(found, {}), last),
-        (update_text.terminal_text(update_told), last),
+        (update_report.text(update_told), last),
     ]
     for text, rest in texts:
         assert story + rest in re.sub(r"\s+", " ", text)
@@ -128,7 +130,7 @@ def test_minus_is_softer_than_modelled_everywhere(factor, sign):
         signs += [one["bias_percent"] for one in found.document[by].values()]
     signs += [one["size_percent"] for one in found.document["findings"][:1]]
     signs += [one["statistic"] for one in found.document["findings"][:1]]
-    rows = list(csv.DictReader(io.StringIO(compare_text.residuals_csv(found))))
+    rows = list(csv.DictReader(io.StringIO(compare_report.residuals_csv(found))))
     signs += [np.mean([float(row["deviation_percent"]) for row in rows])]
     signs += [float(found.residual.mean())]  # what every picture of residuals draws, as 100 (exp r - 1)
     compliance = np.mean(1.0 / data.stiffness) / np.mean(np.exp(-found.log_model))
@@ -142,7 +144,7 @@ def test_minus_is_softer_than_modelled_everywhere(factor, sign):
     signs += [np.mean([float(row["as_given_deviation_percent"]) for row in rows])]
     assert (np.sign(signs) == sign).all()
     side = "softer" if sign < 0 else "stiffer"
-    text = compare_text.terminal_text(found.document)
+    text = compare_report.text(found.document)
     assert f"{side} than modelled on balance" in text
     assert "too soft" not in text and "too stiff" not in text
 
@@ -151,7 +153,7 @@ def test_pages_say_which_sign_they_have():
     rule = "(measured - modelled) / modelled, minus: softer than modelled"
     found = compared(table_1())
     assert rule in compare_html(found, dict.fromkeys(COMPARE_QUESTIONS, b""))
-    assert rule in compare_text.terminal_text(found.document)
+    assert rule in compare_report.text(found.document)
     assert rule in diagnose_html(told("identified"), {"before_after.png": b""})
 
 
@@ -159,7 +161,7 @@ def test_pages_say_which_sign_they_have():
 
 
 def texts(found: dict[str, Any]) -> str:
-    return re.sub(r"\s+", " ", " ".join([headline(found), found["text"], diagnose_text.terminal_text(found)]))
+    return re.sub(r"\s+", " ", " ".join([headline(found), found["text"], diagnose_report.text(found)]))
 
 
 @pytest.mark.parametrize("verdict", CASES)

@@ -11,7 +11,7 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import active, table_1
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.report.update_page import update_html
+from toolpath_stiff.report.update import update_html
 from toolpath_stiff.updating.inference.prediction import Predictor
 
 WEAK = ("--add", "weak_strut:strut=3", "--strut-law")

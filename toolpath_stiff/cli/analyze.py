@@ -156,7 +156,7 @@ def analyse_and_write(
 ) -> Report:
     """Analyse a program and write its report folder. Raises `TpsError`, with nothing written."""
     from toolpath_stiff.analysis.results import analyse, required_stiffness_missed
-    from toolpath_stiff.report.write import write_analysis
+    from toolpath_stiff.report.analysis import files
     from toolpath_stiff.units import n_per_m_from_n_per_mm
 
     program = read_program_for(args, file, models.first.machine)
@@ -172,52 +172,45 @@ def analyse_and_write(
     if models.second is not None:
         second = analyse(models.second, read_program_for(args, file, models.second.machine), **options)
     required = None if args.require is None else n_per_m_from_n_per_mm(args.require)
-    files = write_analysis(
+    contents = files(
         analysis,
-        target.folder,
         plots=not args.no_plots,
         table=args.format,
         required=required,
         other=second,
         show_plunges=args.show_plunges,
-        rules=target.rules,
     )
+    written = target.write(contents)
     return Report(
         program=program,
         summary=json.loads((target.folder / "summary.json").read_text(encoding="utf-8")),
         second=second,
         missed=required_stiffness_missed(analysis, required) if required is not None else [],
-        files=files,
+        files=written,
     )
 
 
 def _run_single(args: argparse.Namespace, file: str) -> int:
     """Analyse, write, print; the exit code."""
     from toolpath_stiff.cli.progress import progress_bar
-    from toolpath_stiff.report.write import names_of
+    from toolpath_stiff.report.analysis import names
 
-    target = destination(args, "analyze", [file]).check(names_of(not args.no_plots, args.format))
+    target = destination(args, "analyze", [file]).check(names(not args.no_plots, args.format))
     with progress_bar(f"{Path(file).name}: samples", quiet=args.json) as progress:
         report = analyse_and_write(args, file, target, load_models(args), progress)
     if args.json:
         json.dump(report.summary, sys.stdout, indent=2)
         sys.stdout.write("\n")
     else:
-        _print(args, report)
+        _print(report)
     if report.missed:
         return BELOW_REQUIRED
     return PARTIAL if report.summary["out_of_reach_samples"] else 0
 
 
-def _print(args: argparse.Namespace, report: Report) -> None:
-    from toolpath_stiff.report.terminal import comparison_table, terminal_table
-    from toolpath_stiff.report.wording import plain
+def _print(report: Report) -> None:
+    from toolpath_stiff.report.analysis import text
+    from toolpath_stiff.report.words import plain
 
-    print(terminal_table(report.summary))
-    if report.second is not None:
-        print(comparison_table(report.summary, report.second.summary()))
-    if report.missed:
-        print(f"below the required {args.require:g} N/mm:")
-        for line, stiffness in report.missed:
-            print(f"  line {line}: {stiffness:.0f} N/mm  {report.program.source[line - 1].strip()}")
+    print(text(report.summary, report.program.source, report.second.summary() if report.second else None))
     print("\n".join(["written:", *(f"  {plain(str(path))}" for path in report.files)]))

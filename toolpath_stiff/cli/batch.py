@@ -16,16 +16,16 @@ from pathlib import Path
 from toolpath_stiff.cli.analyze import BELOW_REQUIRED, Models, analyse_and_write, load_models
 from toolpath_stiff.cli.arguments import controller_for
 from toolpath_stiff.cli.outputs import Destination, inputs_of
-from toolpath_stiff.cli.programs import RESERVED, FolderCount, Found, Listed, report_folders
+from toolpath_stiff.cli.programs import FolderCount, Found, Listed, report_folders
 from toolpath_stiff.cli.progress import say
 from toolpath_stiff.cli.workers import answers, one_thread
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.report.batch import Outcome, figures_of, summary_csv, terminal_summary
-from toolpath_stiff.report.wording import plain
+from toolpath_stiff.report.batch import files, names, text
+from toolpath_stiff.report.batch.outcome import Outcome, figures_of
+from toolpath_stiff.report.words import plain
 from toolpath_stiff.results_folder import STAGE, Rules
 
 INCOMPLETE = 1  # exit code: a program failed, or samples were left out
-INDEX, SUMMARY = RESERVED
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,12 @@ def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
             print(plain(str(count)), flush=True)
     with _folders_for(setting.out, programs):
         outcomes = _outcomes(programs, setting, jobs)
-        files = _write_overview(setting, outcomes)
+        written = setting.target().write(files(outcomes))
     if args.json:
         _print_json(setting.out, programs, outcomes)
     else:
-        print(terminal_summary(outcomes))
-        print("\n".join(["written:", *(f"  {plain(str(path))}" for path in files)]))
+        print(text(outcomes))
+        print("\n".join(["written:", *(f"  {plain(str(path))}" for path in written)]))
     if any(one.status != "done" for one in outcomes):
         return INCOMPLETE
     return BELOW_REQUIRED if any((one.figures or {}).get("lines_below_required") for one in outcomes) else 0
@@ -78,7 +78,7 @@ def _check(setting: Setting) -> None:
     controller_for(setting.args)
     if setting.args.interpreter == "linuxcnc":
         find_rs274(setting.args.rs274)
-    setting.target().check(RESERVED)
+    setting.target().check(names())
 
 
 @contextmanager
@@ -171,12 +171,6 @@ def _reason(program: Listed, message: str) -> str:
     if line.startswith(f"{last}:"):
         return program.file + line[len(last) :]
     return line if program.file in line else f"{program.file}: {line}"
-
-
-def _write_overview(setting: Setting, outcomes: Sequence[Outcome]) -> list[Path]:
-    from toolpath_stiff.report.batch_page import batch_page
-
-    return setting.target().write({INDEX: batch_page(outcomes), SUMMARY: summary_csv(outcomes)})
 
 
 def _print_json(out: Path, programs: Sequence[Listed], outcomes: Sequence[Outcome]) -> None:

@@ -87,7 +87,9 @@ def run(args: argparse.Namespace) -> int:
         json.dump(document, sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
         sys.stdout.write("\n")
     else:
-        sys.stdout.write(_text(document))
+        from toolpath_stiff.report.check import text
+
+        sys.stdout.write(text(document))
     return 1 if any(finding["severity"] == ERROR for finding in document["findings"]) else 0
 
 
@@ -127,45 +129,3 @@ def _document(args: argparse.Namespace, checked: Checked, lines: tuple[str, ...]
         "modal_start": checked.start,
         "modal_end": checked.end,
     }
-
-
-def _text(document: dict[str, Any]) -> str:
-    """The same for people."""
-    from toolpath_stiff.report.check_text import check_tables
-
-    posted = f", posted for {document['kinematics']}" if document["kinematics"] else ""
-    lines = [f"{document['program']}, read as {document['dialect']}{posted}"]
-    if document["interpreter"] != "builtin":
-        lines.append("read by LinuxCNC's interpreter: codes are counted where they stand, modal states are not known")
-    if not document["complete"]:
-        lines.append("NOT READ TO ITS END AS IT STANDS: figures are those of the blocks that could be read")
-    lines.append("\nfindings:")
-    for finding in document["findings"]:
-        place = f"{finding['line']}:{finding['column']}" if finding["column"] else f"{finding['line'] or '-'}"
-        lines.append(f"  {finding['severity']:<7} {place:>9}  {finding['text']}")
-    lines += ["  none"] if not document["findings"] else []
-    lines.append("\nnot acted upon:")
-    for word in document["unsupported"]:
-        lines.append(f"  {word['code']:<7} {word['line']}:{word['column']}  {word['text']}")
-    lines += ["  nothing"] if not document["unsupported"] else []
-    lines.append("\ncodes used (times, first line):")
-    lines += [f"  {code['code']:<6} {code['count']:>7}  {code['line']:>7}  {code['text']}" for code in document["used"]]
-    lines.append("\nextents of cuts:")
-    for unit, key in (("mm", "extents_mm"), ("deg", "extents_deg")):
-        lines += [
-            f"  {axis.upper()}  {low:10.3f} to {high:10.3f} {unit}" for axis, (low, high) in document[key].items()
-        ]
-    lines.append("\nlengths and times:")
-    for key, length in document["lengths_mm"].items():
-        lines.append(f"  {key:<8} {length:12.1f} mm {document['times_s'][key]:10.1f} s")
-    if "dwell" in document["times_s"]:
-        lines.append(f"  dwell    {'':12}    {document['times_s']['dwell']:10.1f} s")
-    if document["fastest_strut"]:
-        speed = document["fastest_strut"]
-        lines.append(f"  fastest strut in a cut: {speed['mm_per_min']:.0f} mm/min, line {speed['line']}")
-    tables = check_tables(document["tools"], document["operations"])
-    lines += ["\nextents of cuts in mm, by tool and operation:", *(f"  {line}" for line in tables)] if tables else []
-    lines.append("\nmodal state at the start, at the end:")
-    for key, value in document["modal_start"].items():
-        lines.append(f"  {key:<18} {value:<10} {document['modal_end'][key]}")
-    return "\n".join(lines) + "\n"

@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import pose_argument
 from toolpath_stiff.cli.outputs import add_replace_option, check_new, check_written, keep
@@ -14,7 +14,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint
 
 if TYPE_CHECKING:
-    from toolpath_stiff.machine import Machine
+    pass
 
 EPILOG = """\
 examples:
@@ -99,6 +99,7 @@ def _show(args: argparse.Namespace) -> int:
 
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine, reach, solve_struts
+    from toolpath_stiff.report.machine import figure_entries, machine_picture, text
     from toolpath_stiff.rotations import rotation_matrices
 
     machine = load_machine(args.machine)
@@ -107,27 +108,12 @@ def _show(args: argparse.Namespace) -> int:
     turn = rotation_matrices(pose[3:])
     struts = solve_struts(machine, pose[:3], turn)
     stand = reach(machine, pose[:3], struts, turn[None])
-    rows = _figures(machine)
     if args.json:
-        json.dump(
-            [dict(zip(("quantity", "value", "unit", "origin", "remark"), r, strict=True)) for r in rows],
-            sys.stdout,
-            indent=2,
-        )
+        json.dump(figure_entries(machine), sys.stdout, indent=2)
         print()
     else:
-        print(f"{machine.title}\n{machine.source}\n")
-        width = max(len(row[0]) for row in rows)
-        for quantity, value, unit, origin, _ in rows:
-            print(f"  {quantity:<{width}}  {value} {unit}".rstrip() + f"  [{origin}]")
-        remarks = {row[4] for row in rows if row[4]}
-        for name, remark in machine.remarks.items():
-            if remark in remarks:
-                print(f"\n  {name}: {remark}", end="")
-        print(f"\n\n  at the pose drawn: {stand.describe(0)}")
+        print(text(machine, stand))
     if args.out or not args.json:
-        from toolpath_stiff.report.machine_picture import machine_picture
-
         target = args.out or f"reports/{machine.name}.png"
         keep(check_written(args, [target]), quiet=args.json)
         write_atomically(target, machine_picture(machine, pose, struts))
@@ -136,67 +122,16 @@ def _show(args: argparse.Namespace) -> int:
     return 0 if stand.reachable[0] else OUT_OF_REACH
 
 
-def _figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
-    """Quantity, value, unit, origin, remark of a machine's figures, in the shop's units."""
-    from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
-
-    limits, law = machine.limits, machine.strut_law
-
-    def row(quantity: str, value: str, unit: str, section: str) -> tuple[str, str, str, str, str]:
-        return quantity, value, unit, machine.origins.get(section, "assumed"), machine.remarks.get(section, "")
-
-    def numbers(values: Any, decimals: int = 3) -> str:
-        return ", ".join(f"{round(float(v), decimals) + 0.0:g}" if abs(v) < 1e5 else f"{v:g}" for v in values)
-
-    rows = [
-        row(f"frame joint {i + 1}", numbers(mm_from_m(joint), 3), "mm", "frame_joints")
-        for i, joint in enumerate(machine.frame_joints)
-    ]
-    rows += [
-        row(f"platform joint {i + 1}", numbers(mm_from_m(joint), 3), "mm from the tool tip", "platform_joints")
-        for i, joint in enumerate(machine.platform_joints)
-    ]
-    pose = [*(mm_from_m(v) for v in limits.neutral_pose[:3]), *(deg_from_rad(v) for v in limits.neutral_pose[3:])]
-    origin = [
-        *(mm_from_m(v) for v in machine.default_origin[:3]),
-        *(deg_from_rad(v) for v in machine.default_origin[3:]),
-    ]
-    low, high = mm_from_m(limits.workspace)
-    return [
-        *rows,
-        row("reference tool length", f"{mm_from_m(machine.reference_tool_length):g}", "mm", "reference_tool"),
-        row(
-            "strut stiffness",
-            f"{law.stiffness_1 / 1e6:g} N/um at {mm_from_m(law.length_1):g} mm, "
-            f"{law.stiffness_2 / 1e6:g} N/um at {mm_from_m(law.length_2):g}",
-            "mm, linear",
-            "strut_law",
-        ),
-        row("platform bar stiffness", f"{machine.platform_bar_stiffness:g}", "N/m", "platform"),
-        row("strut length", numbers([mm_from_m(v) for v in limits.strut_length]), "mm", "limits.strut_length"),
-        row("frame joint angle up to", f"{deg_from_rad(limits.frame_joint_angle):g}", "deg", "limits.joint_angle"),
-        row(
-            "platform joint angle up to", f"{deg_from_rad(limits.platform_joint_angle):g}", "deg", "limits.joint_angle"
-        ),
-        row("neutral pose of the joints", numbers(pose), "mm, deg", "limits.joint_angle"),
-        row("workspace from", numbers(low), "mm", "limits.workspace"),
-        row("workspace to", numbers(high), "mm", "limits.workspace"),
-        row("singularity index at least", f"{limits.singularity:g}", "", "limits.singularity"),
-        row("default origin (program zero)", numbers(origin), "mm, deg", "setup"),
-        row("rapid feed", f"{mm_per_min_from_m_per_s(machine.rapid_feed):g}", "mm/min", "setup"),
-    ]
-
-
 def _check(args: argparse.Namespace) -> int:
     """Load the file, say what is wrong or doubtful, draw the machine at its neutral pose."""
     import numpy as np
 
-    from toolpath_stiff.analysis.checks import check_machine, neutral_words, symmetry_words
+    from toolpath_stiff.analysis.checks import check_machine
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine
     from toolpath_stiff.machine.kinematics import solve_struts_at
-    from toolpath_stiff.report.machine_picture import machine_views
-    from toolpath_stiff.stiffness.model import acting_names, build_model, condition_warnings
+    from toolpath_stiff.report.machine import check_text, machine_views
+    from toolpath_stiff.stiffness.model import build_model
 
     if not Path(args.file).is_file():
         new = command_line("machine", "new", args.file)
@@ -210,23 +145,7 @@ def _check(args: argparse.Namespace) -> int:
     marked = tuple((stray.body, stray.joint) for stray in found.symmetry.strays)
     keep(replaced)
     write_atomically(target, machine_views(machine, pose, solve_struts_at(machine, pose), marked))
-    verdict = "the file is good" if found.good else f"{len(found.wrong)} things cannot be right"
-    if len(found.wrong) == 1:
-        verdict = "one thing cannot be right"
-    if found.good and found.doubtful:
-        verdict = "the file can be used; look at what is doubtful"
-    print(f"{args.file}: {machine.title}: {verdict}")
-    for word, texts in (("WRONG", found.wrong), ("doubtful", found.doubtful), ("warning", condition_warnings(model))):
-        for text in texts:
-            print(f"  {word}: {text}")
-    effects = ", ".join([*acting_names(model), *(active.effect.name for active in model.instruments)]) or "none"
-    print(f"  effects: {effects}\n  {symmetry_words(found.symmetry)}")
-    if found.neutral.reach.reachable[0]:
-        print(f"  {neutral_words(machine, found.neutral)}")
-    if found.origin.reach.reachable[0]:
-        kx, ky, kz = found.origin.along_axes[0] / 1e3
-        print(f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; ", end="")
-        print(found.origin.reach.describe(0))
+    print(check_text(args.file, model, found))
     print(f"written:\n  {target}")
     return 0 if found.good else NOT_GOOD
 

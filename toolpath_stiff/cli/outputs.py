@@ -7,7 +7,7 @@ same where it has no other meaning) the old file is kept beside the new one.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,7 +86,7 @@ class Destination:
         check_folder(self.folder, names, self.rules)
         return self
 
-    def write(self, contents: Mapping[str, Content]) -> list[Path]:
+    def write(self, contents: Mapping[str, Content | Callable[[], Content]]) -> list[Path]:
         """Write the files, all or none; see `write_folder`."""
         return write_folder(self.folder, contents, command=self.command, rules=self.rules)
 

@@ -21,14 +21,14 @@ from toolpath_stiff.cli.arguments import (
     read_program_for,
 )
 from toolpath_stiff.cli.measurement_arguments import check_seed
-from toolpath_stiff.cli.outputs import Destination, add_replace_option, check_written, destination, keep
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
     from toolpath_stiff.placement.climb import Bounds
     from toolpath_stiff.placement.evaluator import Keepout
-    from toolpath_stiff.placement.placing import Placed, Task
+    from toolpath_stiff.placement.placing import Task
 
 EPILOG = """\
 examples:
@@ -46,8 +46,6 @@ report.html (click a placement of the front, see the path there).
 """
 FARTHEST_MM = 1e5
 FARTHEST_TURN = 720.0
-DATA = ("placements.csv", "placement.json")
-PICTURES = ("report.html", "front.png", "profiles.png", "map.png", "setup.pdf")
 OBJECTIVES = ("balanced", "mean", "range", "weakest")
 
 
@@ -165,14 +163,14 @@ def run(args: argparse.Namespace) -> int:
     from toolpath_stiff.cli.progress import progress_bar
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.placement.placing import place_again, place_program
-    from toolpath_stiff.report.place_text import placement_text
+    from toolpath_stiff.report.place import files, names, text
 
     if not 2 <= args.points <= 1000:
         raise InputError(f"--points {args.points}", expected="2 to 1000")
     check_seed(args.seed)
     _check_write(args)
     replaced = check_written(args, [args.write])
-    target = destination(args, "place", [args.program], "-place").check(DATA if args.no_plots else (*DATA, *PICTURES))
+    target = destination(args, "place", [args.program], "-place").check(names(not args.no_plots))
     earlier = _earlier(target.folder) if args.pick is not None else None
     task = _task(args)
     if earlier is not None:
@@ -181,15 +179,15 @@ def run(args: argparse.Namespace) -> int:
         with progress_bar(f"{task.program.name}: search", quiet=args.json) as progress:
             placed = place_program(task, progress)
     keep(replaced, quiet=args.json)
-    files = _write(args, target, placed)
+    written = target.write(files(placed, plots=not args.no_plots))
     if placed.rewritten is not None:
-        files.append(write_atomically(args.write, placed.rewritten))
+        written.append(write_atomically(args.write, placed.rewritten))
     if args.json:
         json.dump(placed.summary, sys.stdout, indent=2)
         print()
     else:
-        print(placement_text(placed.summary))
-        print("\n".join(["written:", *(f"  {file}" for file in files)]))
+        print(text(placed.summary))
+        print("\n".join(["written:", *(f"  {file}" for file in written)]))
     return 0
 
 
@@ -288,32 +286,3 @@ def _keepouts(args: argparse.Namespace) -> tuple[Keepout, ...]:
         x0, y0, z0, x1, y1, z1 = (m_from_mm(v) for v in values)
         boxes.append(Keepout(name, (x0, y0, z0), (x1, y1, z1)))
     return tuple(boxes)
-
-
-def _write(args: argparse.Namespace, target: Destination, placed: Placed) -> list[Path]:
-    from toolpath_stiff.placement.document import COLUMNS
-
-    summary = placed.summary
-    rows = [",".join(_cell(row[name]) for name in COLUMNS) for row in summary["front"]]
-    contents: dict[str, str | bytes] = {
-        "placements.csv": "\n".join([",".join(COLUMNS), *rows, ""]),
-        "placement.json": json.dumps(summary, indent=2) + "\n",
-    }
-    if not args.no_plots:
-        from toolpath_stiff.report.place_page import place_page
-        from toolpath_stiff.report.place_picture import front_picture, profiles_picture, workspace_picture
-        from toolpath_stiff.report.setup_sheet import setup_sheet
-
-        contents["report.html"] = place_page(summary, placed.best, placed.program, placed.task.rules.keepouts)
-        contents["front.png"] = front_picture(summary)
-        contents["profiles.png"] = profiles_picture(placed.best, placed.before)
-        contents["map.png"] = workspace_picture(placed.best, placed.before)
-        contents["setup.pdf"] = setup_sheet(summary, placed.best)
-    return target.write(contents)
-
-
-def _cell(value: float | None) -> str:
-    """A number of placements.csv; nothing where there is none."""
-    if value is None:
-        return ""
-    return str(value) if isinstance(value, int) else f"{value:.6f}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +32,6 @@ examples:
 
 Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png.
 """
-DATA, PICTURES = ("plan.csv", "plan.json"), ("plan.png",)
 COSTS = ("reading", "pose", "tool", "setup")
 PLAN_POSES, CAMPAIGN_POSES = 6, 24
 CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
@@ -94,21 +92,20 @@ def _cost(text: str) -> tuple[str, float]:
 def run(args: argparse.Namespace) -> int:
     """Plan, write the files, say what the plan promises."""
     check_seed(args.seed)
-    target = destination(args, "plan", args.data or [args.machine], "-plan").check(
-        DATA if args.no_plots else (*DATA, *PICTURES)
-    )
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.report.plan import files, names, text
     from toolpath_stiff.stiffness.effects import known_effects
     from toolpath_stiff.updating.planning.visits import Costs
 
+    target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
     machine = load_machine(args.machine)
     effects = known_effects(args.effects)
     costs = Costs(**dict(args.cost))
     if args.data or args.between:
-        document, contents = _told_apart(args, machine, effects, costs)
+        document, rows, picture = _told_apart(args, machine, effects, costs)
     else:
-        document, contents = _campaign(args, machine, effects, costs)
+        document, rows, picture = _campaign(args, machine, effects, costs)
     document |= {
         "machine": machine.name,
         "data": list(args.data),
@@ -116,12 +113,12 @@ def run(args: argparse.Namespace) -> int:
         "costs_minutes": {name: getattr(costs, name) for name in COSTS},
         "command": args.command_line,
     }
-    text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
-    written = target.write({"plan.csv": contents["plan.csv"], "plan.json": text, **contents})
+    contents = files(document, rows, picture)
+    written = target.write(contents)
     if args.json:
-        print(text, end="")
+        print(contents["plan.json"], end="")
     else:
-        print(_table(document))
+        print(text(document))
         print("\n".join(["written:", *(f"  {file}" for file in written)]))
     return 0
 
@@ -146,11 +143,12 @@ def _menu(args: argparse.Namespace, menu: Menu) -> Menu:
 
 def _told_apart(
     args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
-) -> tuple[dict[str, Any], dict[str, Any]]:
+) -> tuple[dict[str, Any], list[dict[str, Any]], bytes | None]:
+    from toolpath_stiff.report.plan import visit_entries
     from toolpath_stiff.updating.measurements import read_measurements
     from toolpath_stiff.updating.planning import plan_measurements
     from toolpath_stiff.updating.planning.between import unfitted_rivals
-    from toolpath_stiff.updating.planning.document import plan_csv, plan_document, plan_rows
+    from toolpath_stiff.updating.planning.document import plan_document, plan_rows
     from toolpath_stiff.updating.planning.visits import Menu
 
     taken: set[str] = set()
@@ -179,17 +177,13 @@ def _told_apart(
     if errors:
         steps = ", ".join(f"{name} {value:.2f} %" for name, value in errors.items())
         document["text"] = [f"mean error so far: {steps}", *document["text"]]
-    document["visits"] = _visits(rows, plan.kinds, plan.why)
-    contents: dict[str, Any] = {"plan.csv": plan_csv(rows)}
-    if not args.no_plots:
-        from toolpath_stiff.report.plan_picture import plan_picture
-        from toolpath_stiff.updating.planning.document import gap_map
+    document["visits"] = visit_entries(rows, plan.kinds, plan.why)
+    if args.no_plots:
+        return document, rows, None
+    from toolpath_stiff.report.plan import rivals_picture
+    from toolpath_stiff.updating.planning.document import gap_map
 
-        gap = gap_map(machine, plan, menu, args.effects)
-        title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
-        text = f"machine {machine.name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
-        contents["plan.png"] = plan_picture(plan.visits, plan.chosen, plan.kinds, gap, title, text)
-    return document, contents
+    return document, rows, rivals_picture(plan, gap_map(machine, plan, menu, args.effects), machine.name)
 
 
 def _rivals(
@@ -230,9 +224,10 @@ def _rivals(
 
 def _campaign(
     args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
-) -> tuple[dict[str, Any], dict[str, Any]]:
+) -> tuple[dict[str, Any], list[dict[str, Any]], bytes | None]:
+    from toolpath_stiff.report.plan import visit_entries
     from toolpath_stiff.updating.planning.campaign import RISER, TABLE, first_campaign
-    from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
+    from toolpath_stiff.updating.planning.document import plan_rows
     from toolpath_stiff.updating.planning.visits import Menu
 
     noise = CAMPAIGN_NOISE if args.noise is None else args.noise
@@ -250,15 +245,13 @@ def _campaign(
         "sees": [{"effect": name, "gap_sigma": gap} for name, gap in campaign.sees.items()],
         "text": _campaign_text(campaign, rows, noise),
         "notes": [f"seen or not: at a noise of {100 * noise:g} %, each effect alone at its usual size"],
-        "visits": _visits(rows, campaign.purposes, campaign.purposes),
+        "visits": visit_entries(rows, campaign.purposes, campaign.purposes),
     }
-    contents: dict[str, Any] = {"plan.csv": plan_csv(rows)}
-    if not args.no_plots:
-        from toolpath_stiff.report.plan_picture import plan_picture
+    if args.no_plots:
+        return document, rows, None
+    from toolpath_stiff.report.plan import campaign_picture
 
-        text = f"machine {machine.name}   ·   {len(chosen)} clampings, {len(rows)} readings; lines: where spindles lean"
-        contents["plan.png"] = plan_picture(campaign.visits, chosen, campaign.purposes, None, "A first campaign", text)
-    return document, contents
+    return document, rows, campaign_picture(campaign, len(rows), machine.name)
 
 
 def _campaign_text(campaign: Campaign, rows: list[dict[str, Any]], noise: float) -> list[str]:
@@ -271,56 +264,3 @@ def _campaign_text(campaign: Campaign, rows: list[dict[str, Any]], noise: float)
     if hidden:
         lines.append(f"of usual size and alone, these would not show at {100 * noise:g} % noise: {', '.join(hidden)}")
     return lines
-
-
-# -- for people --------------------------------------------------------------------------------------------------------
-
-
-def _visits(rows: list[dict[str, Any]], kinds: tuple[str, ...], why: tuple[str, ...]) -> list[dict[str, Any]]:
-    """One entry a clamping: where, how, what is read, why."""
-    from toolpath_stiff.updating.planning.document import POSE
-
-    found = []
-    for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):
-        own = [row for row in rows if row["clamp"] == clamp]
-        first = own[0]
-        found.append(
-            {
-                "clamp": clamp,
-                "point": first["point"],
-                **{name: first[name] for name in POSE},
-                "tool_extension_mm": first["tool_extension_mm"],
-                "setup": first.get("setup", ""),
-                "forces_N": sorted({row["force_N"] for row in own}),
-                "directions": list(dict.fromkeys(_direction(row) for row in own)),
-                "kind": kind,
-                "why": reason,
-            }
-        )
-    return found
-
-
-def _direction(row: dict[str, Any]) -> str:
-    if "direction" in row:
-        return str(row["direction"])
-    return "".join(axis for axis, part in zip("XYZ", (row["dx"], row["dy"], row["dz"]), strict=True) if part)
-
-
-def _table(document: dict[str, Any]) -> str:
-    """The visits in measuring order, then what is to be expected."""
-    lines = [
-        f"{'':>4} {'x':>7} {'y':>7} {'z':>7} mm {'a':>6} {'b':>6} deg {'tool':>5} mm  load N     set-up, directions"
-    ]
-    for visit in document["visits"]:
-        loads = "/".join(f"{force:g}" for force in visit["forces_N"])
-        where = ", ".join([*([visit["setup"]] if visit["setup"] else []), " ".join(visit["directions"])])
-        lines.append(
-            f"{visit['clamp']:>4} {visit['x_mm']:>7.1f} {visit['y_mm']:>7.1f} {visit['z_mm']:>7.1f}    "
-            f"{visit['a_deg']:>6.1f} {visit['b_deg']:>6.1f}     {visit['tool_extension_mm']:>5g}     {loads:<10} "
-            f"{where}"
-        )
-        if document["kind"] == "rivals":
-            lines.append(f"{'':>5}{visit['why']}")
-    lines += ["", *document["text"]]
-    lines += [f"note: {note}" for note in document["notes"]]
-    return "\n".join(lines)

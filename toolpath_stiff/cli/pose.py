@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import add_json_option, add_machine_options, finite_number, model_for
 from toolpath_stiff.errors import InputError, InputErrors
@@ -31,7 +31,6 @@ coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg
 same order, with empty cells where a pose is out of reach (exit code 1).
 """
 FARTHEST = 1e5  # mm and degrees; more is a slip of unit or key
-POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,47 +72,13 @@ def _evaluate(model: StiffnessModel, poses: FloatArray, force: float) -> PoseRep
     return evaluate_poses(model, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force)
 
 
-def _columns(poses: FloatArray, found: PoseReport) -> dict[str, Any]:
-    """Column -> values of the table, in the shop's units."""
-    import numpy as np
-
-    from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
-
-    names = np.array([limit.name for limit in found.reach.limits] or ["none"])
-    columns: dict[str, Any] = {name: poses[:, i] for i, name in enumerate(POSE_COLUMNS)}
-    for i, axis in enumerate("xyz"):
-        columns[f"k{axis}_N_per_mm"] = n_per_mm_from_n_per_m(found.along_axes[:, i])
-    for which, direction, stiffness in (
-        ("softest", found.softest, found.softest_stiffness),
-        ("stiffest", found.stiffest, found.stiffest_stiffness),
-    ):
-        columns[f"{which}_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
-        for i, axis in enumerate("xyz"):
-            columns[f"{which}_d{axis}"] = direction[:, i]
-    for i in range(6):
-        columns[f"strut{i + 1}_mm"] = mm_from_m(found.strut_lengths[:, i])
-    columns["extrapolated"] = found.extrapolated.astype(int)
-    columns["margin"] = found.reach.margin
-    columns["margin_limit"] = names[found.reach.limit]
-    return columns
-
-
-def _decimals(name: str) -> int | None:
-    """Decimals of a column; None: a whole number or a word."""
-    if name in ("extrapolated", "margin_limit"):
-        return None
-    return 4 if name.endswith("N_per_mm") else 6
-
-
 def _csv(model: StiffnessModel, args: argparse.Namespace) -> int:
-    from toolpath_stiff.column_files import csv_rows
+    from toolpath_stiff.report.machine import pose_csv
     from toolpath_stiff.stiffness.model import condition_warnings
 
     poses = _read_poses(args.csv)
     found = _evaluate(model, poses, args.force)
-    columns = _columns(poses, found)
-    sys.stdout.write(",".join(columns) + "\n")
-    sys.stdout.write(csv_rows(columns, {name: _decimals(name) for name in columns}))
+    sys.stdout.write(pose_csv(poses, found))
     for warning in condition_warnings(model):
         print(f"tps: warning: {warning}", file=sys.stderr)
     unreachable = (~found.reach.reachable).nonzero()[0]
@@ -128,6 +93,7 @@ def _read_poses(file: str) -> FloatArray:
     """(n, 6) mm and degrees from a table. Raises `InputErrors` with every bad cell named."""
     import numpy as np
 
+    from toolpath_stiff.report.machine import POSE_COLUMNS
     from toolpath_stiff.tables import Columns, read_table
 
     table = read_table(file, "poses", Columns(POSE_COLUMNS))
@@ -171,6 +137,7 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
     import numpy as np
 
     from toolpath_stiff.errors import UnreachableError
+    from toolpath_stiff.report.machine import pose_columns, pose_text
     from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
 
     poses = np.array([[*args.pose, 0.0, 0.0, 0.0][:6]])
@@ -182,7 +149,7 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
             f"the pose is out of reach on machine {model.machine.name}: {found.reach.describe(0)}",
             hint=f"`{command_line('machine', 'show', args.machine)}` lists the limits",
         )
-    values = {name: column[0] for name, column in _columns(poses, found).items()}
+    values = {name: column[0] for name, column in pose_columns(poses, found).items()}
     if args.json:
         plain = {n: v.item() if hasattr(v, "item") else v for n, v in values.items()}
         plain["extrapolated"] = bool(plain["extrapolated"])
@@ -190,26 +157,5 @@ def _single(model: StiffnessModel, args: argparse.Namespace) -> int:
         json.dump({**about, **plain}, sys.stdout, indent=2)
         sys.stdout.write("\n")
         return 0
-    _print_pose(model, values, found)
+    print(pose_text(model, values, found))
     return 0
-
-
-def _print_pose(model: StiffnessModel, values: dict[str, Any], found: PoseReport) -> None:
-    x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
-    from toolpath_stiff.report.wording import machine_text
-    from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
-
-    named = machine_text({"machine": model.machine.title, **effects_stated(model)})
-    print(f"{named}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n")
-    for axis in "xyz":
-        print(f"  stiffness along {axis.upper()}   {values[f'k{axis}_N_per_mm']:10.0f} N/mm")
-    for which in ("softest", "stiffest"):
-        dx, dy, dz = (values[f"{which}_d{axis}"] + 0.0 for axis in "xyz")
-        print(f"  {which:<10} direction{values[f'{which}_N_per_mm']:10.0f} N/mm along ({dx:.3f}, {dy:.3f}, {dz:.3f})")
-    lengths = "  ".join(f"{values[f'strut{i}_mm']:.3f}" for i in range(1, 7))
-    print(f"  struts 1 to 6        {lengths} mm")
-    print(f"  nearest limit        {found.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
-    if values["extrapolated"]:
-        print("  the strut law is extrapolated at this pose")
-    for warning in condition_warnings(model):
-        print(f"  warning              {warning}")

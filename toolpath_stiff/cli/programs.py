@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.report.batch import names
 
 # Endings of NC programs and of nothing else: `.txt` is as often a note or a tool list.
 NC_ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min")
-RESERVED = ("index.html", "summary.csv")  # what lies beside the report folders
+RESERVED = names()  # what lies beside the report folders
 
 
 @dataclass(frozen=True)

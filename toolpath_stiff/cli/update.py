@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +17,12 @@ from toolpath_stiff.cli.measurement_arguments import (
 from toolpath_stiff.cli.outputs import check_written, destination, keep
 from toolpath_stiff.cli.progress import say
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content
 from toolpath_stiff.hints import command_line, hint, options
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine.model import Machine
     from toolpath_stiff.updating.correction.ladder import Update
-    from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
+    from toolpath_stiff.updating.correction.strut_law import BarCurve, StrutLawSearch
     from toolpath_stiff.updating.measurements import Measurements
 
 EPILOG = """\
@@ -39,7 +37,6 @@ same. Files written to --out: update.json, residuals.csv, machine.toml (unless r
 ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
 """
 
-DATA, PICTURES = ("update.json", "residuals.csv"), ("ladder.png", "before_after.png", "report.html")
 MACHINE = "machine.toml"
 
 
@@ -79,15 +76,16 @@ def run(args: argparse.Namespace) -> int:
     """Fit, judge, write. Refusal is success as well."""
     _check(args)
     args.replace |= args.force
-    replaced = check_written(args, [args.output])
-    target = destination(args, "update", args.data, "-update")
-    target.check((*DATA, *(() if args.output else (MACHINE,)), *(() if args.no_plots else PICTURES)))
     limit_threads(args.jobs)
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine, machine_toml
-    from toolpath_stiff.updating.correction.document import document, residuals_csv
+    from toolpath_stiff.report.update import files, machine_heading, names, text
+    from toolpath_stiff.updating.correction.document import document
     from toolpath_stiff.updating.measurements import read_measurements
 
+    replaced = check_written(args, [args.output])
+    target = destination(args, "update", args.data, "-update")
+    target.check(names(not args.no_plots, machine=not args.output, figure3=args.objective == "mean-error"))
     machine = load_machine(args.machine)
     data = read_measurements(args.data, machine)
     update, search = _update(args, machine, data)
@@ -101,29 +99,21 @@ def run(args: argparse.Namespace) -> int:
     found["next"] = _next(args, updated, machine_file)
     if search is not None:
         found["search"] = _search(search)
-    contents: dict[str, Content] = {
-        "update.json": json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
-        "residuals.csv": residuals_csv(update),
-    }
-    if updated is not None and args.output is None:
-        contents[MACHINE] = machine_toml(updated, _preamble(found))
-    if search is not None:
-        contents |= _figure3(args, machine, data)
+    bars = None if search is None else _bars(args, machine, data)
     if not args.no_plots:
         say("drawing")
-        contents |= _pictures(found, update, contents.get("figure3.png"))
+    own = updated if args.output is None else None
+    contents = files(update, found, machine=own, bars=bars, plots=not args.no_plots)
     say("")
     keep(replaced, quiet=args.json)
     written = []
     if updated is not None and args.output is not None:  # first: update.json names it
-        written.append(write_atomically(Path(args.output), machine_toml(updated, _preamble(found))))
+        written.append(write_atomically(Path(args.output), machine_toml(updated, machine_heading(found))))
     written += target.write(contents)
     if args.json:
         print(contents["update.json"], end="")
     else:
-        from toolpath_stiff.report.update_text import terminal_text
-
-        print(terminal_text(found))
+        print(text(found))
         print("\n".join(["written:", *(f"  {file}" for file in written)]))
         print("\n".join(["", *found["next"]]) if found["next"] else "", end="\n" if found["next"] else "")
     return 0
@@ -196,20 +186,6 @@ def _command(args: argparse.Namespace) -> str:
     return asked(args).command("update", *own)
 
 
-def _preamble(found: dict[str, Any]) -> str:
-    from textwrap import fill
-
-    provenance = found["provenance"]
-    return "\n".join(
-        [
-            fill(f"Machine {found['machine']}, updated. {found['text']}", 110),
-            f"Command: {provenance['command']}",
-            f"SHA-256 of the data: {provenance['data_sha256']}",
-            "",
-        ]
-    )
-
-
 def _search(search: StrutLawSearch) -> dict[str, Any]:
     """Starts and ends of the paper's search, in N/um."""
     import numpy as np
@@ -223,51 +199,11 @@ def _search(search: StrutLawSearch) -> dict[str, Any]:
     }
 
 
-def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> dict[str, Content]:
-    """The paper's Figure 3 as data and, unless pictures are off, drawn."""
-    from toolpath_stiff.updating.correction.strut_law import bar_curve, bar_curve_csv
+def _bars(args: argparse.Namespace, machine: Machine, data: Measurements) -> BarCurve | None:
+    """The paper's Figure 3; none where the machine's platform is not of rigid bars."""
+    from toolpath_stiff.updating.correction.strut_law import bar_curve
 
     if any(entry.name == "platform_flexibility" for entry in machine.effects):
-        return {}
+        return None
     say("the platform's bars, soft to rigid")
-    curve = bar_curve(machine, data, seed=args.seed, starts=1)
-    found: dict[str, Content] = {"figure3.csv": bar_curve_csv(curve)}
-    if not args.no_plots:
-        from toolpath_stiff.report.figure3_picture import figure3_png
-
-        found["figure3.png"] = figure3_png(
-            curve.bars[:-1], 100.0 * curve.error[:-1], refitted_percent=100.0 * curve.error_refitted[:-1]
-        )
-    return found
-
-
-def _pictures(found: dict[str, Any], update: Update, figure3: Content | None) -> dict[str, Content]:
-    from toolpath_stiff.report.update_page import update_html
-    from toolpath_stiff.report.update_pictures import before_after_png, error_ladder_png
-
-    last = found["steps"][-1]
-    called = f"with {' + '.join(last['effects'])}" if last["effects"] else last["name"]
-    entry = {"effect": called, "held_out_error_percent": last["held_out_error_percent"]}
-    drawn = before_after_png(
-        {"verdict": found["verdict"], "baseline": found["strut_law_refitted"], "candidates": [entry], "best": called},
-        update.data, update.steps[0].fit.residual, update.steps[-1].fit.residual, names=("as given", called),
-    )  # fmt: skip
-    pictures = {
-        "ladder.png": error_ladder_png(
-            [_rung(step) for step in found["steps"]],
-            found["noise_floor_percent"],
-            "What does each step do to the error?",
-            [{**one, "name": one["effect"]} for one in found["turned_down"]],
-        ),
-        "before_after.png": drawn,
-    }
-    shown = {**pictures, "figure3.png": figure3} if isinstance(figure3, bytes) else pictures
-    return {**pictures, "report.html": update_html(found, shown)}
-
-
-def _rung(step: dict[str, Any]) -> dict[str, Any]:
-    """A step with what its effect acts on below the effect's name."""
-    import re
-
-    choices = re.findall(r"\(([^)]*)\)", step["name"])
-    return {**step, "name": re.sub(r" \([^)]*\)", "", step["name"]), "remark": ", ".join(choices)}
+    return bar_curve(machine, data, seed=args.seed, starts=1)

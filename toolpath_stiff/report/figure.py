@@ -1,19 +1,29 @@
-"""What the pictures share: their style, PNG bytes that depend on nothing but the figure, the heading."""
+"""Figures in the house style, the colour scale of stiffness, and how a figure becomes PNG or SVG.
+
+Pictures for pages: as PNG for a file, and as SVG whose colours are those of the page, light or dark.
+
+The colours that pictures are drawn in stand for those of `page.css`; those that show data (colour maps) stay as they
+are. Letters are outlines, so that nothing moves with the fonts of whoever reads the page.
+"""
 
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.statistics import class_figures
-from toolpath_stiff.report.wording import headline_text, plain, shortened
+from toolpath_stiff.report.words import headline_text, plain, shortened
+from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -148,3 +158,140 @@ def _label_place(
         bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
         arrowprops={"arrowstyle": "-", "color": INK, "linewidth": 0.8, "shrinkB": 5.0},
     )
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+CLASSES = 32  # colours; more cannot be told apart along a line, and each costs a drawing call
+FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
+UNREACHABLE, PLUNGE = -1, CLASSES  # without a colour of the scale; a lower class wins where segments are joined
+
+
+def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:
+    """Ends of the colour scale in N/mm: lowest and highest of the headline, values far out (`FENCE`) set aside.
+
+    A few short cuts, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
+    that values lie beyond. With `show_plunges` the plunges beside the headline are on the scale, all of them.
+    """
+    stiffness, weight = _scaled_samples(analysis)
+    order = np.argsort(stiffness, kind="stable")
+    length = np.cumsum(weight[order])
+    lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
+    reach = FENCE * (upper - lower)
+    inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
+    values = inside if np.ptp(inside) > 0.0 else stiffness
+    low, high = float(values.min()), float(values.max())
+    if show_plunges and analysis.set_aside.any():
+        plunges = n_per_mm_from_n_per_m(analysis.at.stiffness[analysis.set_aside])
+        low, high = min(low, float(plunges.min())), max(high, float(plunges.max()))
+    if high - low < 1e-6 * high:  # a constant: keep the scale from collapsing
+        low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
+    return low, high
+
+
+def _scaled_samples(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
+    """Stiffness in N/mm and length of the headline samples.
+
+    A program that only turns rotary axes has none: then every reachable cutting sample counts alike.
+    """
+    about, weight = analysis.headline, analysis.samples.weight
+    if not about.any():
+        about, weight = analysis.samples.cutting & analysis.at.reachable, np.ones(len(weight))
+    return n_per_mm_from_n_per_m(analysis.at.stiffness[about]), weight[about]
+
+
+def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntArray:
+    """(n,) class 0 to CLASSES - 1 of segments of the path.
+
+    `stiffness` and `limits` in N/mm; values beyond the limits take the end classes; UNREACHABLE where there is none.
+    """
+    low, high = limits
+    missing = np.isnan(stiffness)
+    part = (np.where(missing, low, stiffness) - low) / (high - low)
+    classes = np.clip((part * CLASSES).astype(np.int64), 0, CLASSES - 1)
+    return np.where(missing, UNREACHABLE, classes)
+
+
+def legend_extend(analysis: Analysis, limits: tuple[float, float]) -> str:
+    """Which ends of the scale headline values lie beyond: "neither", "min", "max" or "both" (matplotlib's words)."""
+    stiffness = _scaled_samples(analysis)[0]
+    below, above = bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])
+    return {(False, False): "neither", (True, False): "min", (False, True): "max"}.get((below, above), "both")
+
+
+# Colour that is drawn -> property of page.css. Behind text, a colour of data is more opaque the larger its figure: the
+# text may follow the page.
+PAGE_COLOURS = {
+    "#ffffff": "card",
+    INK: "ink",
+    MUTED: "muted",
+    GRID: "line",
+    RAPID_GREY: "grey",
+    FAINT: "grey",
+    WITHIN: "soft",
+    CHOSEN: "chosen",
+    BLUE: "blue",
+    LIGHT_BLUE: "pale-blue",
+    SECOND_ORANGE: "orange",
+    GREEN: "green",
+    PURPLE: "purple",
+    UNREACHABLE_RED: "red",
+    PALE_RED: "pale-red",
+}
+MOST_MARKS = 4000  # of a picture; beyond, the marks are put in as one image: the browser would toil
+FEW_MARKS = 50  # of one artist: lines and letters stay sharp
+SHARP = 2 * DPI  # of that image
+POINTS = 72.0  # per inch
+
+
+class Drawing(bytes):
+    """A picture as PNG, and the same as SVG to stand in a page."""
+
+    svg: str
+
+
+def drawing(figure: Figure) -> Drawing:
+    """The figure as it is written to a file and as it stands in a page. Within `house_style`."""
+    found = Drawing(png_bytes(figure))
+    found.svg = svg_text(figure)
+    return found
+
+
+def svg_text(figure: Figure) -> str:
+    """The figure as an SVG element in the page's colours; the same figure gives the same text."""
+    import matplotlib as mpl
+
+    heavy = _rasterized(figure)
+    buffer = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": "tps", "svg.fonttype": "path", "svg.image_inline": True}):
+        nothing: dict[str, Any] = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        figure.savefig(buffer, format="svg", facecolor="none", dpi=SHARP if heavy else DPI, metadata=nothing)
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>|<style .*?</style>|<!--.*?-->", "", text, flags=re.S)
+    width, height = (POINTS * inch for inch in figure.get_size_inches())
+    size = f'viewBox="0 0 {width:g} {height:g}" style="--natural:{DPI * width / POINTS:.0f}px"'
+    opening = f'<svg {size} xmlns:xlink="http://www.w3.org/1999/xlink" aria-hidden="true">'
+    text = re.sub(r"<svg [^>]*>", opening, text, count=1)
+    text = re.sub(r"#[0-9a-f]{6}\b", lambda match: _page_colour(match[0]), text)
+    return re.sub(r"\s*\n\s*", "\n", text).strip()
+
+
+def _page_colour(colour: str) -> str:
+    name = PAGE_COLOURS.get(colour)
+    return f"var(--{name})" if name else colour
+
+
+def _rasterized(figure: Figure) -> bool:
+    """Mark what has many marks to be put in as an image, where there are too many in all; whether that is so."""
+    marks: list[tuple[Artist, int]] = []
+    for axes in figure.axes:
+        marks += [(line, np.size(line.get_xdata())) for line in axes.lines]
+        marks += [(one, max(np.shape(one.get_offsets())[0], len(one.get_paths()))) for one in axes.collections]
+    if sum(count for _, count in marks) <= MOST_MARKS:
+        return False
+    for artist, count in marks:
+        if count > FEW_MARKS:
+            artist.set_rasterized(True)
+    return True

@@ -1,0 +1,426 @@
+"""`report.html`: one file with path, profile, program and tables; nothing is loaded from anywhere.
+
+The path is drawn on a 2-D canvas by our own script (assets/): it needs no graphics driver, prints, and adds 30 kB where
+a plotting library would add megabytes. Everything that comes from the program or a file name is escaped: in tables by
+`html.escape`, in the script's data as JSON without `<`, `>`, `&`; the script writes it as text, never as HTML; and a
+content security policy lets only our own script run.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
+from toolpath_stiff.nc.moves import MOTION_NAMES
+from toolpath_stiff.report.analysis import FIGURES
+from toolpath_stiff.report.figure import CLASSES, legend_extend, scale_limits
+from toolpath_stiff.report.pages import asset, filled, json_for_script, script_hash, style
+from toolpath_stiff.report.profile import extremes_by_column, profile_curve
+from toolpath_stiff.report.words import (
+    ONLY_PLUNGES,
+    READERS,
+    duration,
+    headline_text,
+    length_in_moves,
+    number,
+    only_plunges,
+    plain,
+    plunges_beside,
+    shortened,
+    span_of,
+)
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.analysis import Analysis
+
+SCRIPTS = ("path_data.js", "path_view.js", "profile_view.js", "listing.js", "operations.js")
+
+
+def page(
+    analysis: Analysis,
+    summary: Mapping[str, Any],
+    *,
+    required: float | None = None,
+    other: Analysis | None = None,
+    show_plunges: bool = False,
+) -> str:
+    """The page as text.
+
+    Parameters
+    ----------
+    analysis
+        What to show.
+    summary
+        As in `summary.json`, for the tables.
+    required
+        N/m: drawn in the profile.
+    other
+        The same program on another machine: a second curve.
+    show_plunges
+        How the switch stands that lets plunges set the axis and the colour scale.
+    """
+    data = page_data(analysis, required, other)
+    script = '\n"use strict";\n(() => {\n' + "".join(asset(name) for name in SCRIPTS) + "})();\n"
+    program = html.escape(plain(str(summary["program"])))
+    return filled(
+        asset("report.html"),
+        {
+            "title": f"{program}: stiffness along the path",
+            "program": program,
+            "heading": html.escape(_heading(summary)),
+            "style": style("report.css"),
+            "script": script,
+            "script_hash": script_hash(script),
+            "data": json_for_script(data),
+            "plunges_shown": " checked" if show_plunges else "",
+            "warnings": "\n".join(f'<p class="warning">{html.escape(plain(w))}</p>' for w in summary["warnings"]),
+            "note": _thinned_note(data["count"], len(analysis.samples)),
+            "tables": page_tables(summary, data["weakest"]),
+            "version": html.escape(str(summary["version"])),
+        },
+    )
+
+
+def _heading(summary: Mapping[str, Any]) -> str:
+    return (
+        f"machine {plain(str(summary['machine']))} · load {summary['load']}, {summary['force_N']:g} N · "
+        f"{headline_text(summary, ' · ')}"
+    )
+
+
+def _thinned_note(shown: int, samples: int) -> str:
+    if shown == samples:
+        return ""
+    return (
+        f'<p class="muted">The drawing holds {number(shown)} of the {number(samples)} samples, the highest and lowest '
+        "stiffness of every stretch among them; the tables are of all.</p>"
+    )
+
+
+TITLES = ("mean N/mm", "min N/mm", "max N/mm", "range N/mm", "mean deflection um")
+PLUNGES_TITLE = "plunges N/mm"
+MOST_ROWS = 200  # of lines below the required stiffness; all are in summary.json
+
+
+def page_tables(summary: Mapping[str, Any], weakest: Sequence[int]) -> str:
+    """Figures, weakest places, tools, operations, required level, comparison, assumptions, words not acted upon.
+
+    `weakest` holds the page's rows of the weakest places.
+    """
+    sections = [
+        ("Tools", _tools(summary["per_tool"]), True),
+        *((("Operations", _operations(summary["per_operation"]), True),) if len(summary["per_operation"]) > 1 else ()),
+        ("Figures", _figures(summary), False),
+        ("Weakest places", _places(summary["weakest_places"], weakest), False),
+    ]
+    if "required" in summary:
+        sections.append(("Required stiffness", _required(summary["required"]), False))
+    if "compare" in summary:
+        sections.append(("Comparison", _comparison(summary), False))
+    sections.append(("Assumptions", _bullets(summary["assumptions"]), False))
+    if summary["unsupported"]:
+        sections.append(("Read, but not acted upon", _unsupported(summary["unsupported"]), False))
+    return "\n".join(
+        f"<section{' class=wide' if wide else ''}><h2>{title}</h2>{body}</section>" for title, body, wide in sections
+    )
+
+
+def _text(value: object) -> str:
+    return html.escape(plain(str(value)))
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numeric: Sequence[int]) -> str:
+    """A table of cells that are HTML already; the columns `numeric` are aligned to the right."""
+
+    def cells(tag: str, row: Sequence[str]) -> str:
+        return "".join(f"<{tag}{' class=num' if i in numeric else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
+
+    heading = f"<thead><tr>{cells('th', head)}</tr></thead>" if head else ""
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    return f"<table>{heading}<tbody>{body}</tbody></table>"
+
+
+def _figures(summary: Mapping[str, Any]) -> str:
+    origin = " ".join(f"{axis}{v:.10g}" for axis, v in zip("XYZABC", summary["origin_mm_deg"], strict=True))
+    rows = [
+        (title[0].upper() + title[1:], number(summary[name], 2 if name.endswith("_um") else 0))
+        for title, name in zip(TITLES, FIGURES, strict=True)
+    ]
+    rows += _plunges(summary)
+    rows += [
+        ("Cutting length mm", number(summary["cutting_length_mm"], 1)),
+        ("Rapid length mm", number(summary["rapid_length_mm"], 1)),
+        ("Time", duration(summary["time_s"])),
+        ("Samples", f"{number(summary['samples'])}, at most {summary['step_mm']:g} mm apart"),
+        ("Program zero (G54) mm, deg", f"{origin} ({summary['origin_source']})"),
+        ("Program read by", READERS[summary["interpreter"]]),
+        *([("Posted for", f"{summary['kinematics']}; tool tip and axis recovered")] if summary["kinematics"] else []),
+        ("Effects that act", ", ".join(summary["effects"]) or "none"),
+        *([("Set-up", str(summary["setup"]))] if summary.get("setup") else []),
+        ("Outside the strut law", f"{summary['extrapolated_share']:.1%} of the cutting samples"),
+        ("Out of reach", f"{number(summary['out_of_reach_samples'])} cutting samples"),
+        ("Nearest limit", f"line {summary['min_margin_line']}: {summary['min_margin_limit']}"),
+    ]
+    return _table((), [(_text(name), _text(value)) for name, value in rows], ())
+
+
+def _plunges(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the figures are about, and those of the plunges beside them."""
+    plunges = plunges_beside(summary)
+    if plunges is None:
+        return [("These are figures of", summary["headline"])]
+    place = plunges["weakest"]
+    return [
+        ("These are figures of", f"cuts {summary['headline']}"),
+        ("Plunges along the axis", length_in_moves(plunges)),
+        ("Plunges N/mm", f"mean {number(plunges['mean_N_per_mm'])}, {span_of(plunges)}"),
+        ("Weakest plunge", f"{number(place['stiffness_N_per_mm'])} N/mm in line {place['line']}: {place['text']}"),
+    ]
+
+
+def _beside(row: Mapping[str, Any]) -> str:
+    """Mean of the plunges of a tool or an operation."""
+    if only_plunges(row):
+        return ONLY_PLUNGES
+    plunges = plunges_beside(row)
+    return number(plunges["mean_N_per_mm"] if plunges else None)
+
+
+def _places(places: Sequence[Mapping[str, Any]], weakest: Sequence[int]) -> str:
+    rows = []
+    for place, row in zip(places, weakest, strict=True):
+        where = " ".join(f"{axis.upper()}{place[f'{axis}_mm']:.2f}" for axis in "xyz")
+        if any(place[f"{axis}_deg"] for axis in "abc"):
+            where += " " + " ".join(f"{axis.upper()}{place[f'{axis}_deg']:.2f}" for axis in "abc")
+        button = (
+            f'<button type="button" class="place" data-line="{place["line"]}" data-sample="{row}">'
+            f"line {place['line']}</button>"
+        )
+        rows.append((button, number(place["stiffness_N_per_mm"]), where, f"<code>{_text(place['text'])}</code>"))
+    return _table(("", "N/mm", "position mm", "program"), rows, (1,))
+
+
+def _tools(per_tool: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        (
+            f"T{row['tool']}",
+            _text(row["remark"]),
+            "reference" if row["length_mm"] is None else number(row["length_mm"], 2),
+            number(row["cutting_length_mm"], 1),
+            duration(row["time_s"]),
+            *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
+            _beside(row),
+            _weakest(row["weakest"]),
+        )
+        for row in per_tool
+    ]
+    head = ("tool", "remark", "length mm", "cutting mm", "time", *TITLES, PLUNGES_TITLE, "weakest")
+    return _table(head, rows, range(2, 11))
+
+
+def _weakest(place: Mapping[str, Any] | None) -> str:
+    if place is None:
+        return "-"
+    return f'line {place["line"]} <code class="cut">{_text(shortened(place["text"], 26))}</code>'
+
+
+def _operations(per_operation: Sequence[Mapping[str, Any]]) -> str:
+    rows = []
+    for part, row in enumerate(per_operation[:MOST_ROWS]):
+        name = f"{row['operation']} {_text(row['name'])}"
+        rows.append(
+            (
+                f'<button type="button" class="operation" data-operation="{part}">{name}</button>',
+                f"T{row['tool']}" if row["tool"] else "-",
+                f"{row['first_line']}-{row['last_line']}",
+                number(row["cutting_length_mm"], 1),
+                duration(row["time_s"]),
+                *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
+                _beside(row),
+                _weakest(row["weakest"]),
+                "-" if row["min_margin"] is None else f"{row['min_margin']:.3f}",
+            )
+        )
+    more = len(per_operation) - len(rows)
+    head = ("operation", "tool", "lines", "cutting mm", "time", *TITLES, PLUNGES_TITLE, "weakest", "margin")
+    return _table(head, rows, (*range(2, 11), 12)) + (
+        f"<p>and {more} more operations in summary.json</p>" if more > 0 else ""
+    )
+
+
+def _required(required: Mapping[str, Any]) -> str:
+    below = required["below"]
+    level = number(required["required_N_per_mm"])
+    if not below:
+        return f"<p>Every cutting move has the required {level} N/mm.</p>"
+    more = f", the {MOST_ROWS} weakest of them here" if len(below) > MOST_ROWS else ""
+    rows = [(f"line {entry['line']}", number(entry["min_N_per_mm"])) for entry in below[:MOST_ROWS]]
+    return f"<p>{number(len(below))} lines are below the required {level} N/mm{more}:</p>" + _table(
+        ("", "lowest N/mm"), rows, (1,)
+    )
+
+
+def _comparison(summary: Mapping[str, Any]) -> str:
+    other = summary["compare"]
+    rows = []
+    for title, name, change in zip(TITLES, FIGURES, other["difference_percent"].values(), strict=True):
+        digits = 2 if name.endswith("_um") else 0
+        difference = "-" if change is None else f"{change:+.1f} %"
+        rows.append((title, number(summary[name], digits), number(other[name], digits), difference))
+    plunges = [plunges_beside(one) for one in (summary, other)]
+    if any(plunges):
+        first, second = (number(one["mean_N_per_mm"] if one else None) for one in plunges)
+        change = other["plunges_difference_percent"]
+        rows.append((f"mean of the {PLUNGES_TITLE}", first, second, "-" if change is None else f"{change:+.1f} %"))
+    return _table(("", _text(summary["machine"]), _text(other["machine"]), "difference"), rows, (1, 2, 3))
+
+
+def _bullets(sentences: Sequence[str]) -> str:
+    return "<ul>" + "".join(f"<li>{_text(sentence)}</li>" for sentence in sentences) + "</ul>"
+
+
+def _unsupported(entries: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        (f"{entry['line']}:{entry['column']}", f"<code>{_text(entry['word'])}</code>", _text(entry["reason"]))
+        for entry in entries[:MOST_ROWS]
+    ]
+    more = len(entries) - len(rows)
+    return _table(("line:column", "word", "why"), rows, ()) + (f"<p>and {more} more</p>" if more > 0 else "")
+
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MOST_SAMPLES = 200_000  # on the page: some 5 MB; the tables are always of all samples
+OTHER_COLUMNS = 4000  # columns of pixels that the other machine's curve is thinned to
+NONE = 65535  # a value that does not exist
+OUT_OF_REACH, PLUNGE = 8, 16  # flags beside the motion
+
+
+def page_data(analysis: Analysis, required: float | None, other: Analysis | None) -> dict[str, Any]:
+    """What the page's script reads: lengths in mm, angles in degrees, stiffness in N/mm.
+
+    Positions are 16-bit fractions of the path's own box (`frame`: a 1 m box gives 0.015 mm), stiffness and margin of
+    their own ranges, NONE where there is none.
+    """
+    rows = page_rows(analysis)
+    samples, at = analysis.samples.take(rows), analysis.at
+    points = mm_from_m(samples.position)
+    frame = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
+    box = mm_from_m(analysis.samples.position[analysis.samples.cutting])
+    stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(at.stiffness[rows]))
+    margin, margin_range = _fractions(at.margin[rows])
+    kind = samples.motion + OUT_OF_REACH * ~at.reachable[rows] + PLUNGE * analysis.set_aside[rows]
+    tool_starts = np.flatnonzero(np.diff(samples.tool, prepend=-1) != 0)
+    return {
+        "machine": plain(analysis.machine.name),
+        "source": list(analysis.program.source),
+        "count": len(rows),
+        "samples": len(analysis.samples),
+        "motions": MOTION_NAMES,
+        "frame": frame.tolist(),
+        "box": np.stack([box.min(axis=0), box.max(axis=0)], axis=1).tolist(),
+        "position": _base64(_quantised(points, frame[:, 0], frame[:, 1], 65535)),
+        "stiffness": stiffness,
+        "stiffness_range": stiffness_range,
+        "margin": margin,
+        "margin_range": margin_range,
+        **_angles(deg_from_rad(samples.abc)),
+        "line": _base64(samples.line.astype("<u4")),
+        "s": _base64(mm_from_m(samples.s).astype("<f4")),
+        "kind": _base64(kind.astype("u1")),
+        "tools": [[int(i), int(samples.tool[i])] for i in tool_starts],
+        "operations": _operation_starts(analysis, samples.move),
+        "weakest": [int(np.searchsorted(rows, row)) for row in weakest_places(analysis)],
+        "scale": _scale(analysis, False),
+        "scale_with_plunges": _scale(analysis, True) if analysis.set_aside.any() else None,
+        "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
+        "colours": class_colours(0.0, 0.93),  # the lightest yellow does not show on white,
+        "colours_dark": class_colours(0.22, 1.0),  # nor the darkest violet on black
+        "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
+        "required": None if required is None else n_per_mm_from_n_per_m(required),
+        "other": None if other is None else _other_curve(other),
+    }
+
+
+def _scale(analysis: Analysis, show_plunges: bool) -> dict[str, Any]:
+    """Ends of the colour scale, N/mm, and whether values lie beyond them."""
+    limits = scale_limits(analysis, show_plunges)
+    extend = legend_extend(analysis, limits)
+    return {"ends": limits, "beyond_low": extend in ("min", "both"), "beyond_high": extend in ("max", "both")}
+
+
+def page_rows(analysis: Analysis) -> IntArray:
+    """Rows of the samples that the page holds: all of them, or the extremes of equal stretches of rows."""
+    n = len(analysis.samples)
+    if n <= MOST_SAMPLES:
+        return np.arange(n)
+    change = np.flatnonzero(np.diff(analysis.samples.motion) != 0)
+    ends = np.concatenate([change, change + 1]) if 2 * len(change) < MOST_SAMPLES // 4 else change[:0]
+    stiffness = np.where(analysis.samples.cutting, analysis.at.stiffness, np.nan)
+    curves = [(stiffness, 6)]  # and the share of the page's samples that a curve gets a column of pixels for
+    if analysis.set_aside.any():  # a column's extremes may be plunges: the headline has its own
+        curves = [(np.where(analysis.set_aside, np.nan, stiffness), 8), (stiffness, 24)]
+    extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
+    even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too
+    firsts = np.searchsorted(analysis.samples.move, [row.first_move for row in analysis.operations.rows])
+    wanted = np.array([0, *weakest_places(analysis)], dtype=np.int64)
+    return np.unique(np.concatenate([*extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
+
+
+def _operation_starts(analysis: Analysis, move: IntArray) -> list[list[Any]]:
+    """First row on the page, name and first line of each operation; `move` (n,) of the page's rows."""
+    rows = analysis.operations.rows
+    firsts = np.searchsorted(move, [row.first_move for row in rows]).tolist()
+    return [[first, plain(row.name), row.first_line] for first, row in zip(firsts, rows, strict=True)]
+
+
+def _other_curve(other: Analysis) -> dict[str, str]:
+    s, stiffness = profile_curve(other)
+    keep = extremes_by_column(s, stiffness, OTHER_COLUMNS)
+    return {
+        "machine": plain(other.machine.name),
+        "s": _base64(s[keep].astype("<f4")),
+        "stiffness": _base64(stiffness[keep].astype("<f4")),
+        "plunge": _base64(other.set_aside[keep].astype("u1")),
+    }
+
+
+def _angles(degrees: FloatArray) -> dict[str, Any]:
+    """Roll, pitch and yaw, if any sample has one."""
+    if not degrees.any():
+        return {"angles": None, "angle_ranges": None}
+    packed = [_fractions(column) for column in degrees.T]
+    return {"angles": [text for text, _ in packed], "angle_ranges": [ends for _, ends in packed]}
+
+
+def _fractions(values: FloatArray) -> tuple[str, list[float]]:
+    """16-bit fractions of the range of the finite values, in base64, and that range."""
+    finite = np.isfinite(values)
+    low, high = (float(values[finite].min()), float(values[finite].max())) if finite.any() else (0.0, 0.0)
+    fractions = _quantised(np.where(finite, values, low), np.float64(low), np.float64(high), NONE - 1)
+    return _base64(np.where(finite, fractions, NONE).astype("<u2")), [low, high]
+
+
+def _quantised(values: FloatArray, low: Any, high: Any, steps: int) -> NDArray[np.uint16]:
+    span = np.where(high > low, high - low, 1.0)
+    return np.asarray(np.round((values - low) / span * steps)).astype("<u2")
+
+
+def _base64(array: NDArray[Any]) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+
+
+def class_colours(start: float, end: float) -> list[str]:
+    """CSS colours of the classes, weakest first: viridis, perceptually uniform."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(start, end, CLASSES))]

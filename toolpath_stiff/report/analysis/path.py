@@ -1,0 +1,227 @@
+"""`path.png`: the path from above, the front and the side, coloured by stiffness."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis.statistics import weakest_places
+from toolpath_stiff.report.figure import (
+    CLASSES,
+    COLOUR_MAP,
+    MUTED,
+    PLUNGE,
+    PLUNGE_SLATE,
+    RAPID_GREY,
+    UNREACHABLE,
+    UNREACHABLE_RED,
+    add_heading,
+    house_style,
+    label_places,
+    legend_extend,
+    new_figure,
+    png_bytes,
+    scale_limits,
+    segment_classes,
+)
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from toolpath_stiff.analysis import Analysis
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
+LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views
+MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
+THINNEST = 0.38  # a view's shorter side, of the longest: a flat part still gets a readable side view
+
+
+def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> bytes:
+    """Three views of the path, as PNG.
+
+    Top (XY), below it front (XZ), beside that the view from +X (YZ), all at one scale and aligned as on a drawing,
+    in machine coordinates. The views frame the cutting moves; rapids may leave them. Stiffer segments are drawn
+    first: a weak one is never hidden beneath. Plunges beside the headline are grey and end in a dot, which is all
+    that is seen of them from above; with `show_plunges` they are on the colour scale like the rest.
+    """
+    with house_style():
+        from matplotlib import colormaps
+
+        samples, limits = analysis.samples, scale_limits(analysis, show_plunges)
+        lines = _coloured_lines(analysis, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)), show_plunges)
+        middle, span = _frame(mm_from_m(samples.position[samples.cutting]))
+        figure, views, corner = _lay_out(span)
+        places = weakest_places(analysis)
+        for axes, (across, up, title) in zip(
+            views, ((0, 1, "XY  top"), (0, 2, "XZ  front"), (1, 2, "YZ  side, from +X")), strict=True
+        ):
+            _set_up(axes, across, up, title, middle, span)
+            for xyz, style in lines:
+                axes.plot(xyz[:, across], xyz[:, up], **style)
+            spots = [(float(x), float(y)) for x, y in mm_from_m(samples.position[places][:, [across, up]])]
+            label_places(axes, spots, [f"line {samples.line[row]}" for row in places])
+        add_heading(figure, analysis)
+        _legend(figure, corner, analysis, limits, show_plunges)
+        return png_bytes(figure)
+
+
+def _coloured_lines(
+    analysis: Analysis, limits: tuple[float, float], colours: FloatArray, show_plunges: bool
+) -> list[tuple[FloatArray, dict[str, Any]]]:
+    """Points and style of one line for each class of segments, in drawing order."""
+    # A corner is two samples at one point: one of them is enough, and the line through it stays one line.
+    samples, stiffness = analysis.samples, analysis.at.stiffness
+    moved = np.flatnonzero((samples.position[1:] != samples.position[:-1]).any(axis=1))
+    points = mm_from_m(samples.position[np.append(moved, moved[-1] + 1 if len(moved) else 0)])
+    rapid = ~samples.cutting[moved + 1]
+    classes = segment_classes(n_per_mm_from_n_per_m(0.5 * (stiffness[moved] + stiffness[moved + 1])), limits)
+    if not show_plunges:
+        classes[analysis.set_aside[moved + 1]] = PLUNGE
+    if len(points) > MOST_POINTS:
+        points, rapid, classes = _merged(points, rapid, classes)
+    found: list[tuple[FloatArray, dict[str, Any]]] = []
+
+    def add(rows: BoolArray, **style: object) -> None:
+        if rows.any():
+            found.append((_polyline(points, np.flatnonzero(rows)), style))
+
+    add(rapid, color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), zorder=2)
+    for which in range(CLASSES - 1, -1, -1):
+        add(~rapid & (classes == which), color=colours[which], linewidth=1.5, zorder=3, solid_capstyle="round")
+    plunge = ~rapid & (classes == PLUNGE)
+    add(plunge, color=PLUNGE_SLATE, linewidth=1.5, zorder=2.5, solid_capstyle="round")
+    if plunge.any():
+        ends = points[1:][plunge & ~np.append(plunge[1:], False)]
+        found.append(
+            (ends, {"color": PLUNGE_SLATE, "linestyle": "none", "marker": ".", "markersize": 6, "zorder": 3.5})
+        )
+    add(~rapid & (classes == UNREACHABLE), color=UNREACHABLE_RED, linewidth=2.2, zorder=4)
+    return found
+
+
+def _merged(points: FloatArray, rapid: BoolArray, classes: IntArray) -> tuple[FloatArray, BoolArray, IntArray]:
+    """Segments joined over equal stretches of the path, each in its weakest class; the shape keeps the ends.
+
+    A stretch of such a path is a pixel or two long, and matplotlib would hold three copies of every point.
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    along = np.cumsum(steps) - steps
+    stretch = np.floor(along / (along[-1] / MOST_POINTS)).astype(np.int64)
+    new = (np.diff(stretch) != 0) | (np.diff(rapid) != 0)
+    first = np.concatenate([[0], np.flatnonzero(new) + 1])
+    return np.concatenate([points[first], points[-1:]]), rapid[first], np.minimum.reduceat(classes, first)
+
+
+def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
+    """(m, 3) one line through the segments (i, i + 1), broken by nan where they do not join."""
+    breaks = np.flatnonzero(np.diff(segments) != 1) + 1
+    order = np.concatenate([[0], breaks, [len(segments)]])
+    runs = order[1:] - order[:-1]
+    # Each run of k segments takes k + 1 points and a break.
+    which = np.repeat(np.arange(len(runs)), runs + 2)
+    inside = np.arange(len(which)) - np.repeat(np.cumsum(runs + 2) - (runs + 2), runs + 2)
+    rows = segments[order[:-1]][which] + inside
+    line = points[np.minimum(rows, len(points) - 1)]
+    line[inside == runs[which] + 1] = np.nan
+    return np.asarray(line)
+
+
+def _frame(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Middle and padded span of the views in mm, axis by axis."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    span = (high - low) * 1.12
+    return (low + high) / 2.0, np.maximum(span, max(THINNEST * float(span.max()), 1.0))
+
+
+def _lay_out(span: FloatArray) -> tuple[Figure, list[Axes], tuple[float, float, float, float]]:
+    """Figure, the three views at one scale, and the free corner (x, y, width, height in inches)."""
+    x, y, z = span
+    scale = min(
+        (WIDTH - LEFT - RIGHT - BETWEEN) / (x + y),  # inches per mm
+        (MOST_HEIGHT - TOP - BOTTOM - BETWEEN) / (y + z),
+    )
+    height = TOP + BOTTOM + BETWEEN + (y + z) * scale
+    left = LEFT + (WIDTH - LEFT - RIGHT - BETWEEN - (x + y) * scale) / 2.0
+    figure = new_figure(WIDTH, height)
+
+    def view(across: float, up: float, wide: float, tall: float) -> Axes:
+        return figure.add_axes((across / WIDTH, up / height, wide / WIDTH, tall / height))
+
+    upper, second = BOTTOM + z * scale + BETWEEN, left + x * scale + BETWEEN
+    views = [
+        view(left, upper, x * scale, y * scale),
+        view(left, BOTTOM, x * scale, z * scale),
+        view(second, BOTTOM, y * scale, z * scale),
+    ]
+    return figure, views, (second, upper, y * scale, y * scale)
+
+
+def _set_up(axes: Axes, across: int, up: int, title: str, middle: FloatArray, span: FloatArray) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    names = "XYZ"
+    axes.set_title(title)
+    axes.set_xlabel(f"{names[across]} mm")
+    axes.set_ylabel(f"{names[up]} mm")
+    axes.set_xlim(middle[across] - span[across] / 2, middle[across] + span[across] / 2)
+    axes.set_ylim(middle[up] - span[up] / 2, middle[up] + span[up] / 2)
+    box = axes.get_window_extent()
+    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(box.width // 75)), steps=[1, 2, 2.5, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(max(2, int(box.height // 50)), steps=[1, 2, 2.5, 5, 10]))
+
+
+def _legend(
+    figure: Figure,
+    corner: tuple[float, float, float, float],
+    analysis: Analysis,
+    limits: tuple[float, float],
+    show_plunges: bool,
+) -> None:
+    """Colour bar, and what the other lines mean, in the free corner."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    from toolpath_stiff.report.words import number
+
+    width, height = figure.get_size_inches()
+    x, y, wide, tall = corner
+    across, middle = min(wide, 5.0), y + tall / 2.0
+    bar = figure.add_axes((x / width, (middle + 0.25) / height, across / width, 0.22 / height))
+    mappable = ScalarMappable(Normalize(*limits), colormaps[COLOUR_MAP].resampled(CLASSES))
+    extend = legend_extend(analysis, limits)
+    colour_bar = figure.colorbar(mappable, cax=bar, orientation="horizontal", extend=extend)
+    colour_bar.set_label("stiffness along the load, N/mm")
+    colour_bar.outline.set_visible(False)
+    bar.xaxis.set_major_locator(MaxNLocator(max(2, int(across / 0.75)), steps=[1, 2, 2.5, 5, 10]))
+    bar.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)))
+    bar.grid(False)
+    entries = []
+    if not analysis.samples.cutting.all():
+        entries.append(Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), label="rapid"))
+    if analysis.set_aside.any() and not show_plunges:
+        entries.append(Line2D([], [], color=PLUNGE_SLATE, linewidth=1.5, marker=".", markersize=6, label="plunge"))
+    if analysis.out_of_reach.any():
+        entries.append(Line2D([], [], color=UNREACHABLE_RED, linewidth=2.2, label="out of reach"))
+    entries.append(
+        Line2D([], [], color="none", marker="o", markersize=8, markeredgecolor="#1f2933", label="weakest places")
+    )
+    figure.legend(
+        handles=entries,
+        loc="upper left",
+        bbox_to_anchor=((x - 0.1) / width, (middle - 0.45) / height),
+        ncols=len(entries) if across > 4.0 else 1,
+        frameon=False,
+        labelcolor=MUTED,
+        borderaxespad=0.0,
+    )

@@ -1,0 +1,135 @@
+"""The results of the paper's case study: files and pictures."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolpath_stiff.files import Content
+from toolpath_stiff.placement.case_study import HIGH_MM, LOW_MM, CaseStudy, region_rows, study_text
+from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.words import number
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection
+
+
+def regions_picture(study: CaseStudy) -> bytes:
+    """PNG of the four regions, one panel a height, each path coloured by its stiffness, mean (range) beside it."""
+    stiffness = [n_per_mm_from_n_per_m(a.at.stiffness[a.counted]) for a in study.regions.values()]
+    low, high = min(float(s.min()) for s in stiffness), max(float(s.max()) for s in stiffness)
+    with house_style():
+        (left, right), (bottom, top) = _frame(study)
+        panel = 5.9  # inches wide; as high as its scale asks for
+        width, tall = 14.2, panel * (top - bottom) / (right - left)
+        above = tall + 1.65
+        figure = new_figure(width, above)
+        drawn = None
+        for column, height in enumerate((LOW_MM, HIGH_MM)):
+            place = ((0.75 + (panel + 0.35) * column) / width, 0.6 / above, panel / width, tall / above)
+            axes = figure.add_axes(place)
+            for row in study.summary["regions"]:
+                if row["z_mm"] == height:
+                    drawn = _path(axes, study, row, low, high)
+            axes.set_title(f"z = {height:g} mm")
+            axes.set_xlim(left, right)
+            axes.set_ylim(bottom, top)
+            axes.set_xlabel("X mm")
+            axes.set_ylabel("" if column else "Y mm")
+            axes.tick_params(labelleft=not column)
+            axes.plot(0, 0, "+", color=MUTED, ms=10)
+        if drawn is not None:
+            bar = figure.add_axes((1.0 - 1.0 / width, 0.6 / above, 0.18 / width, tall / above))
+            figure.colorbar(drawn, cax=bar, label="tangential stiffness, N/mm")
+            bar.yaxis.set_major_formatter(lambda value, _: number(value))
+            bar.grid(visible=False)
+        x = 0.25 / width
+        title = "One path in four regions: mean (range) of stiffness, N/mm"
+        figure.text(x, 1.0 - 0.4 / above, title, fontsize=14, weight="bold")
+        text = f"{study.summary['program']} on {study.summary['machine']}; path and regions are ours, as Figure 10"
+        figure.text(x, 1.0 - 0.68 / above, text, fontsize=10, color=MUTED)
+        return png_bytes(figure)
+
+
+def _frame(study: CaseStudy) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Limits of X and Y in mm that hold the paths of all regions and the machine's axis, with room around them."""
+    points = [mm_from_m(a.samples.position[a.counted, :2]) for a in study.regions.values()]
+    points.append(np.zeros((1, 2)))
+    low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
+    pad = 0.08 * float((high - low).max())
+    return (float(low[0]) - pad, float(high[0]) + pad), (float(low[1]) - pad, float(high[1]) + pad)
+
+
+def _path(axes: Axes, study: CaseStudy, row: dict[str, float | str], low: float, high: float) -> LineCollection:
+    from matplotlib.collections import LineCollection
+
+    analysis = study.regions[str(row["region"])]
+    rows = analysis.counted
+    points = mm_from_m(analysis.samples.position[rows, :2])
+    values = n_per_mm_from_n_per_m(analysis.at.stiffness[rows])
+    segments = np.stack([points[:-1], points[1:]], axis=1)
+    lines = LineCollection(list(segments), cmap=COLOUR_MAP, linewidths=5, capstyle="round")
+    lines.set_array(0.5 * (values[:-1] + values[1:]))
+    lines.set_clim(low, high)
+    axes.add_collection(lines)
+    text = f"region {row['region']}\n{number(float(row['mean_N_per_mm']))}\n({number(float(row['range_N_per_mm']))})"
+    axes.text(float(row["x_mm"]), float(row["y_mm"]), text, ha="center", va="center", color=INK, fontsize=11)
+    return lines
+
+
+def heights_picture(study: CaseStudy) -> bytes:
+    """PNG of mean and range of the path over its height, where they turn over marked."""
+    rows = study.summary["heights"]
+    z = [row["z_mm"] for row in rows]
+    turns = study.summary["limits_of_the_conclusions"]
+    with house_style():
+        figure = new_figure(10.0, 5.6)
+        axes = figure.add_axes((0.09, 0.12, 0.82, 0.68))
+        mean = [row["mean_N_per_mm"] for row in rows]
+        axes.fill_between(
+            z, [row["min_N_per_mm"] for row in rows], [row["max_N_per_mm"] for row in rows], color=BLUE, alpha=0.12,
+            label="from weakest to stiffest sample", lw=0,
+        )  # fmt: skip
+        axes.plot(z, mean, color=BLUE, lw=2.2, label="mean")
+        axes.set_xlabel("z of the path, mm")
+        axes.set_ylabel("stiffness, N/mm", color=BLUE)
+        axes.yaxis.set_major_formatter(lambda value, _: number(value))
+        other = axes.twinx()
+        other.grid(visible=False)
+        spread = [row["range_N_per_mm"] for row in rows]
+        other.plot(z, spread, color=SECOND_ORANGE, lw=2.2, label="range (right scale)")
+        other.set_ylabel("range, N/mm", color=SECOND_ORANGE)
+        other.set_ylim(0, 1.25 * max(spread))
+        other.yaxis.set_major_formatter(lambda value, _: number(value))
+        for panel, key, values in ((axes, "largest_mean_at_z_mm", mean), (other, "largest_range_at_z_mm", spread)):
+            panel.plot(turns[key], max(values), "o", mfc="white", mec=INK, mew=1.6, ms=9)
+            panel.annotate(
+                f"z = {turns[key]:g} mm", (turns[key], max(values)), xytext=(0, 12), textcoords="offset points",
+                ha="center", color=INK,
+            )  # fmt: skip
+        handles = [*axes.get_legend_handles_labels()[0], *other.get_legend_handles_labels()[0]]
+        figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.08, 0.89), ncol=3, frameon=False)
+        figure.text(0.09, 0.92, "Mean and range rise with z, until they turn over", fontsize=14, weight="bold")
+        return png_bytes(figure)
+
+
+def names(plots: bool = True) -> tuple[str, ...]:
+    """Names of the files that `files` makes."""
+    data = ("case_study.csv", "case_study.json", "case_study.md")
+    return (*data, "regions.png", "heights.png") if plots else data
+
+
+def files(study: CaseStudy, *, plots: bool = True) -> dict[str, Content]:
+    """Table, summary and text of the study, and with `plots` its two pictures."""
+    contents: dict[str, Content] = {
+        "case_study.csv": region_rows(study),
+        "case_study.json": json.dumps(study.summary, indent=2) + "\n",
+        "case_study.md": study_text(study),
+    }
+    if plots:
+        contents |= {"regions.png": regions_picture(study), "heights.png": heights_picture(study)}
+    return contents

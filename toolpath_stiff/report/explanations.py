@@ -1,0 +1,409 @@
+"""The words and figures of a diagnosis, the same on the terminal, in the pictures and on the page.
+
+Everything here takes entries of `diagnose.json`; whatever is absent or None is shown as "-" or left out.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from toolpath_stiff.hints import parted
+from toolpath_stiff.report.words import machine_text, number, plain, shortened
+from toolpath_stiff.updating.inference.candidates import choice_text
+
+# Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
+MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
+NONE = "none"
+LEAST = 0.005  # probability from which a row is more than "< 0.5 %"
+SETTLED = ("does not fit", "ruled out")
+
+AS_GIVEN = "as given"
+
+HEADLINES = {
+    "adequate": "Nothing is missing that these data could show",
+    "identified": "One explanation is far likelier than any other",
+    "ambiguous": "These data cannot tell several explanations apart",
+    "unexplained": "Something is missing, and nothing in the catalogue accounts for it",
+}
+
+
+def figure_of(entry: Mapping[str, Any] | None, name: str) -> float | None:
+    """A finite number of an entry, or None."""
+    value = (entry or {}).get(name)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(value)
+
+
+def entries(document: Mapping[str, Any], name: str) -> list[Any]:
+    """A list of the document, empty where it is absent."""
+    found = document.get(name)
+    return list(found) if isinstance(found, list | tuple) else []
+
+
+def significant(value: float | None, digits: int = 3) -> str:
+    """Three significant digits, in thousands as usual, with an exponent where there would be rows of zeros."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if -4 < size < 5:
+        return f"{float(f'{value:.{digits - 1}e}'):.{max(digits - 1 - size, 0)}f}"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def percent(value: float | None, digits: int = 1) -> str:
+    """A figure that is in per cent already."""
+    return "-" if value is None else f"{value:.{digits}f} %"
+
+
+def probability_text(value: float | None) -> str:
+    """A probability from 0 to 1 as per cent; what rounds to 0 or 100 without being it says so."""
+    if value is None:
+        return "-"
+    if 0.0 < value < 0.005:
+        return "< 0.5 %"
+    if 0.995 < value < 1.0:
+        return "> 99.5 %"
+    return f"{100.0 * value:.0f} %"
+
+
+def effect_names(entry: Mapping[str, Any]) -> list[str]:
+    """Effects of a candidate (`effect`) or a pair (`effects`)."""
+    several = entry.get("effects")
+    names = several if isinstance(several, list | tuple) else [entry.get("effect", "?")]
+    return [plain(str(name)) for name in names]
+
+
+def name_text(entry: Mapping[str, Any]) -> str:
+    """Name with what it acts on: "weak_strut (strut 3)"; a pair as "a + b"."""
+    parts = []
+    for name in effect_names(entry):
+        inner = (entry.get("parameters") or {}).get(name)  # of a pair: sizes and choices together
+        own: Mapping[str, Any] = inner if isinstance(inner, Mapping) else entry.get("choice") or {}
+        acts_on = [choice_text(key, value) for key, value in own.items() if _says_something(value)]
+        parts.append(plain(f"{name} ({', '.join(acts_on)})") if acts_on else name)
+    return " + ".join(parts)
+
+
+def _says_something(value: object) -> bool:
+    return value not in ("", 0, None) and not isinstance(value, Mapping)
+
+
+def parameter_texts(entry: Mapping[str, Any], intervals: bool = True) -> list[str]:
+    """Each fitted size in words: "radial 5.12 nm/N (4.40 to 5.90)"; those of a pair one effect after the other."""
+    parameters = entry.get("parameters") or {}
+    texts = []
+    for key, value in parameters.items():
+        if isinstance(value, Mapping) and "value" not in value:  # a pair: effect -> its parameters
+            texts += [f"{key} {text}" for text in parameter_texts({"parameters": value}, intervals)]
+        elif isinstance(value, Mapping):
+            texts.append(_parameter_text(str(key), value, intervals))
+    return texts
+
+
+def _parameter_text(key: str, value: Mapping[str, Any], intervals: bool) -> str:
+    unit = str(value.get("unit") or "")
+    name = parameter_name(key, unit)
+    size = value.get("value")
+    # JSON holds no infinity; a stiffness without end is null there.
+    text = f"{name} {significant(size) if isinstance(size, int | float) else '-'} {unit}".rstrip()
+    interval = value.get("interval")
+    if intervals and isinstance(interval, list | tuple) and len(interval) == 2:
+        low, high = (significant(end) if isinstance(end, int | float) else "no limit" for end in interval)
+        text += f" ({low} to {high})"
+    return plain(text)
+
+
+def parameter_name(key: str, unit: str) -> str:
+    """The name in a machine file's key, `bar_stiffness_N_per_m`, without the unit and its underscores."""
+    tail = unit.replace("/", "_per_").replace(" ", "_").replace("%", "percent")
+    return (key.removesuffix(f"_{tail}") if tail else key).replace("_", " ")
+
+
+def explanations(document: Mapping[str, Any]) -> list[str]:
+    """What is left standing: effects, `none`, pairs as "a + b"."""
+    return [plain(str(name)) for name in entries(document, "explanations")]
+
+
+def is_plausible(entry: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
+    """Whether it is one of the explanations left standing; a member of a pair alone is not."""
+    return " + ".join(effect_names(entry)) in explanations(document)
+
+
+def is_offered(entry: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
+    """False only where the diagnosis says so and does not rely on it all the same."""
+    return entry.get("offered") is not False or is_plausible(entry, document)
+
+
+def model_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The machine file as given, then with its strut law refitted: the first rows of every table and ladder."""
+    base = document.get("baseline") or {}
+    as_given = base.get("as_given")
+    first = [{**as_given, "effect": AS_GIVEN, "title": "the machine file as it stands"}] if as_given else []
+    return [*first, {**base, "effect": NONE, "title": "no further effect"}]
+
+
+def row_name(entry: Mapping[str, Any]) -> str:
+    """Name of a row: "as given", "strut law refitted (none)", or the effects with what they act on."""
+    return "strut law refitted (none)" if entry.get("effect") == NONE else name_text(entry)
+
+
+def best_explanation(document: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The entry that `best` names; else the likeliest candidate or pair that is offered, the first of equals."""
+    found = [*entries(document, "candidates"), *entries(document, "pairs")]
+    for entry in found:
+        if " + ".join(effect_names(entry)) == document.get("best"):
+            return dict(entry)
+    offered = [entry for entry in found if is_offered(entry, document)]
+    return max(offered, key=lambda e: figure_of(e, "probability") or 0.0, default=None)
+
+
+def remark_text(entry: Mapping[str, Any]) -> str:
+    """How it stands, and what is against it."""
+    own = str(entry.get("remark") or "")
+    said = str(entry.get("words") or "")
+    if entry.get("offered") is False and (figure_of(entry, "probability") or 0.0) < LEAST:
+        return plain(own or "not offered")
+    settled = entry.get("adequate") is False and said not in SETTLED
+    return plain("; ".join(part for part in (said, own or ("leaves structure" if settled else "")) if part))
+
+
+def noise_floor_percent(document: Mapping[str, Any]) -> float | None:
+    """Mean absolute error that scatter alone would leave."""
+    stated = figure_of(document.get("baseline"), "noise_floor_percent")
+    noise = figure_of(document.get("baseline"), "noise_percent")
+    if stated is not None:
+        return stated
+    return None if noise is None else MEAN_OVER_SD * noise
+
+
+def missing_text(entry: Mapping[str, Any]) -> str:
+    """An effect that cannot be tested and why: "thermal_drift (no time_min)"."""
+    columns = [str(name) for name in entry.get("missing") or []]
+    reason = f"no {', '.join(columns)}" if columns else "nothing in these data depends on it"
+    return plain(f"{entry.get('effect', '?')} ({reason})")
+
+
+def size_text(entry: Mapping[str, Any]) -> str:
+    """The smallest size of an effect that would have been seen."""
+    return plain(f"{significant(figure_of(entry, 'size'))} {entry.get('unit') or ''}".rstrip())
+
+
+def hidden_name(entry: Mapping[str, Any]) -> str:
+    """Effect and parameter of an entry of `detectable`."""
+    parameter = str(entry.get("parameter") or "").replace("_", " ")
+    return plain(f"{entry.get('effect', '?')} {parameter}".rstrip())
+
+
+def floor_text(document: Mapping[str, Any]) -> str:
+    """The noise floor in words; a guess says so."""
+    name = str((document.get("noise") or {}).get("name") or "")
+    guess = f" ({plain(name)} guess)" if name in ("low", "high") else ""
+    return percent(noise_floor_percent(document), 2) + guess
+
+
+def headline(document: Mapping[str, Any]) -> str:
+    """The verdict as one sentence: the cause where one was found."""
+    verdict = str(document.get("verdict") or "-")
+    cause = str((best_explanation(document) or {}).get("finding") or "") if verdict == "identified" else ""
+    if cause:
+        return plain(cause[0].upper() + cause[1:])
+    standing = explanations(document)
+    if verdict == "ambiguous" and len(standing) == 1:
+        return plain(f"{standing[0]} is likeliest, but something else is not ruled out")
+    found = document.get("by_noise") or {}
+    if verdict == "ambiguous" and len({str(one.get("verdict")) for one in found.values()}) > 1:
+        return "It depends on how much the readings scatter, which these data do not tell"
+    return plain(HEADLINES.get(verdict, verdict))
+
+
+def path_text(document: Mapping[str, Any]) -> str:
+    """How far apart the plausible explanations are on a tool path, in one sentence; "" where it was not tried."""
+    path = document.get("path") or {}
+    program = plain(str(path.get("program") or "the program"))
+    program += plain(f" in set-up {path['setup']}") if path.get("setup") else ""
+    if path.get("reason"):
+        return plain(f"not tried on {program}: {path['reason']}")
+    means = {name: figure_of(one, "mean_N_per_mm") for name, one in (path.get("explanations") or {}).items()}
+    known = sorted((mean, name) for name, mean in means.items() if mean is not None)
+    if len(known) < 2:
+        return ""
+    (low, softest), (high, stiffest) = known[0], known[-1]
+    apart = figure_of(path, "mean_spread_percent")
+    text = f"mean stiffness from {number(low)} ({softest}) to {number(high)} N/mm ({stiffest}) on {program}"
+    return plain(text + (f": {percent(apart)} apart" if apart is not None else ""))
+
+
+def plausible_text(names: Sequence[str]) -> str:
+    """The plausible set in words."""
+    if not names:
+        return "no effect of the catalogue"
+    return ", ".join("none (nothing is missing)" if name == NONE else plain(str(name)) for name in names)
+
+
+WIDTH = 100
+LABEL = 12  # columns of the left-hand words
+FEW_REASONS = 3  # of the poses proposed, on the terminal
+MOST_CANDIDATES = 5  # in the table; all are in diagnose.json
+MOST_PAIRS = 2
+MOST_SIZES = 6
+LONGEST_NAME = 45
+
+
+def text(document: Mapping[str, Any]) -> str:
+    """The diagnosis in some 25 lines.
+
+    Parameters
+    ----------
+    document
+        As in `diagnose.json`.
+    """
+    verdict = str(document.get("verdict") or "-")
+    lines = [
+        *_entry("data", _data(document)),
+        *_entry("verdict", f"{verdict.upper()}. {document.get('text') or ''}"),
+        *_listed("why", entries(document, "why")),
+        *_entry("error", _error(document)),
+        "",
+        *_table(document),
+        "",
+        *_entry("plausible", plausible_text(explanations(document))),
+        *_by_noise(document),
+        *_listed("cannot test", ["; ".join(missing_text(e) for e in entries(document, "cannot_test"))]),
+        *_listed("would show", [_detectable(document)]),
+        *_listed("path", [path_text(document)]),
+        *_hints("next", [*entries(document, "next"), *_next_readings(document)]),
+        *_entry("assumptions", f"{len(entries(document, 'assumptions'))}, listed in diagnose.json"),
+        *_listed("warning", entries(document, "warnings")),
+    ]
+    return "\n".join(lines)
+
+
+def _entry(label: str, text: str) -> list[str]:
+    return textwrap.wrap(
+        plain(text),
+        WIDTH,
+        initial_indent=f"{label:<{LABEL}}  ",
+        subsequent_indent=" " * (LABEL + 2),
+        break_on_hyphens=False,
+    )
+
+
+def _listed(label: str, sentences: Sequence[object]) -> list[str]:
+    """One entry a sentence, the label before the first."""
+    said = [str(sentence) for sentence in sentences if sentence]
+    return [line for place, text in enumerate(said) for line in _entry("" if place else label, text)]
+
+
+def _hints(label: str, hints: Sequence[object]) -> list[str]:
+    """As `_listed`; a command stands on a line of its own, never wrapped, so that it can be pasted."""
+    lines: list[str] = []
+    for text in filter(None, map(str, hints)):
+        sentence, line = parted(text)
+        lines += _entry("" if lines else label, sentence)
+        lines += [" " * (LABEL + 2) + plain(line)] if line else []
+    return lines
+
+
+def _data(document: Mapping[str, Any]) -> str:
+    files = ", ".join(str(name) for name in entries(document, "data")) or "-"
+    readings = figure_of(document, "readings")
+    count = f"{readings:.0f} readings of " if readings is not None else ""
+    return f"{count}{files}, machine {machine_text(document)}"
+
+
+def _error(document: Mapping[str, Any]) -> str:
+    """The fall of the error in one sentence: in sample, at left-out points, against the noise floor."""
+    base = document.get("baseline") or {}
+    parts = []
+    as_given = figure_of(base.get("as_given"), "mean_abs_error_percent")
+    if as_given is not None:
+        parts.append(f"{percent(as_given, 2)} as given")
+    parts.append(_pair_of_errors(base) + " with the strut law refitted")
+    best = best_explanation(document)
+    if best is not None and document.get("verdict") != "adequate":
+        parts.append(_pair_of_errors(best) + f" with {name_text(best)}")
+    return "mean " + ", ".join(parts) + f"; scatter alone leaves {floor_text(document)}"
+
+
+def _pair_of_errors(entry: Mapping[str, Any]) -> str:
+    inside, outside = (figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out"))
+    return f"{percent(inside, 2)} ({percent(outside, 2)} at points left out)"
+
+
+def _table(document: Mapping[str, Any]) -> list[str]:
+    """As given, strut law refitted, pairs and the best candidates; an asterisk marks what is left standing."""
+    models = model_rows(document)
+    candidates, pairs = entries(document, "candidates"), entries(document, "pairs")
+    shown = [*models, *pairs[:MOST_PAIRS], *candidates[:MOST_CANDIDATES]]
+    shown += [entry for entry in candidates[MOST_CANDIDATES:] if is_plausible(entry, document)]
+    rows = [["", "probab.", "error %", "left out %", "gain/SE", "", ""]]
+    for entry in shown:
+        mark = "* " if is_plausible(entry, document) else "  "
+        figures = [figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out")]
+        gain = figure_of(entry, "held_out_gain_in_se")
+        remark = str(entry.get("remark") or "") or ("" if is_offered(entry, document) else "not offered")
+        rows.append(
+            [
+                shortened(mark + row_name(entry), LONGEST_NAME),
+                probability_text(figure_of(entry, "probability")),
+                *("-" if value is None else f"{value:.2f}" for value in figures),
+                "-" if gain is None else f"{gain:.1f}",
+                plain(str(entry.get("words") or "")),
+                "; ".join(part for part in (", ".join(parameter_texts(entry, intervals=False)), plain(remark)) if part),
+            ]
+        )
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    lines = []
+    for row in rows:
+        figures_text = "  ".join(f"{cell:>{width}}" for cell, width in zip(row[1:5], widths[1:], strict=True))
+        left = f"{row[0]:<{widths[0]}}  {figures_text}  "
+        lines.append((left + shortened(row[5], WIDTH - len(left))).rstrip())
+        if row[6]:
+            lines.append(shortened("      " + row[6], WIDTH))
+    more = len(candidates) + len(pairs) + len(models) - len(shown)
+    if more > 0:
+        lines.append(f"  and {more} less likely, in diagnose.json")
+    return lines
+
+
+def _by_noise(document: Mapping[str, Any]) -> list[str]:
+    """Verdicts under each guess of the noise, where there are several."""
+    found = document.get("by_noise") or {}
+    if len(found) < 2:
+        return []
+    parts = [
+        f"{name} ({percent(figure_of(one, 'noise_percent'))}): {one.get('verdict', '-')}"
+        f" ({plausible_text(one.get('plausible') or [])})"
+        for name, one in found.items()
+    ]
+    return _entry("noise", "; ".join(parts))
+
+
+def _detectable(document: Mapping[str, Any]) -> str:
+    """Of an adequate model: the smallest sizes that these data would have shown, and what they never show."""
+    if document.get("verdict") != "adequate":
+        return ""
+    found = entries(document, "detectable")
+    never = [hidden_name(e) for e in found if e.get("detectable") is False]
+    seen = [e for e in found if e.get("detectable") is not False and figure_of(e, "size") is not None]
+    parts = [f"{hidden_name(e)} {size_text(e)}" for e in seen[:MOST_SIZES]]
+    text = ", ".join(parts) + (f" and {len(seen) - MOST_SIZES} more in diagnose.json" if len(seen) > MOST_SIZES else "")
+    return "; ".join(part for part in (text, f"at no size: {', '.join(never)}" if never else "") if part)
+
+
+def _next_readings(document: Mapping[str, Any]) -> list[str]:
+    """How many readings are proposed, and what they would settle."""
+    readings = [e for e in entries(document, "next_measurements") if isinstance(e, Mapping)]
+    if not readings:
+        return []
+    reasons = list(dict.fromkeys(str(e["why"]) for e in readings if e.get("why")))
+    more = len(reasons) - FEW_REASONS
+    said = "; ".join([*reasons[:FEW_REASONS], *([f"{more} more in the file"] if more > 0 else [])])
+    return [f"{len(readings)} readings are proposed in diagnose.json" + (f": {said}" if said else "")]

@@ -1,0 +1,338 @@
+"""A machine at a pose, as the paper's Figure 2: the whole machine, and the platform in detail."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis.checks import MachineCheck, neutral_words, symmetry_words
+from toolpath_stiff.column_files import csv_rows
+from toolpath_stiff.machine.kinematics import Struts
+from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.report.figure import BLUE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.words import machine_text
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness.model import acting_names, condition_warnings, effects_stated
+from toolpath_stiff.stiffness.truss import HUB, TIP, platform_bars, platform_nodes
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from toolpath_stiff.analysis.poses import PoseReport
+    from toolpath_stiff.machine.limits import Reach
+    from toolpath_stiff.stiffness.model import StiffnessModel
+
+FloatArray = NDArray[np.float64]
+
+STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
+POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+TOP = 0.84  # of the picture's height, below the headings
+BELOW = -0.1  # of the picture's height: the views' empty rims lie beyond it
+ZOOMS = np.arange(1.5, 0.5, -0.05)  # of a view, the largest at which its axes and labels stay in its half
+
+
+def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> bytes:
+    """PNG of the machine at one pose (6,) m and rad, with its struts there."""
+    joints = pose[:3] + struts.arms[0]
+    nodes = pose[:3] + platform_nodes(machine.platform_joints) @ rotation_matrices(pose[3:]).T
+    with house_style():
+        figure = new_figure(14.0, 7.2)
+        whole = figure.add_axes((0.0, BELOW, 0.5, 1.0), projection="3d")
+        _draw_whole(whole, machine, mm_from_m(joints), mm_from_m(nodes), struts)
+        detail = figure.add_axes((0.5, BELOW, 0.5, 1.0), projection="3d")
+        _draw_platform(detail, machine, mm_from_m(nodes))
+        for axes in (whole, detail):
+            _fit(figure, axes)
+        _heading(figure, machine, pose)
+        return png_bytes(figure)
+
+
+def _heading(figure: Figure, machine: Machine, pose: FloatArray) -> None:
+    x, y, z = (mm_from_m(float(v)) for v in pose[:3])
+    a, b, c = (deg_from_rad(float(v)) for v in pose[3:])
+    figure.text(0.02, 0.95, machine.title, fontsize=15, weight="bold")
+    figure.text(
+        0.02,
+        0.91,
+        f"tool tip at X{x:g} Y{y:g} Z{z:g} mm, roll {a:g}, pitch {b:g}, yaw {c:g} degrees   ·   lengths in mm",
+        fontsize=11,
+        color="#4b5563",
+    )
+
+
+def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArray, struts: Struts) -> None:
+    """Frame joints joined by the frame, struts with number, length and stiffness, platform, tool."""
+    frame = mm_from_m(machine.frame_joints)
+    order = np.argsort(np.arctan2(frame[:, 1], frame[:, 0]), kind="stable")
+    ring = frame[[*order, order[0]]]
+    axes.plot(*ring.T, color=FRAME, lw=2.0)
+    axes.scatter(*frame.T, color=FRAME, s=26, depthshade=False)
+    stiffness = n_per_mm_from_n_per_m(machine.strut_law.stiffness(struts.lengths[0]))
+    for i in range(6):
+        axes.plot(*np.array([frame[i], joints[i]]).T, color=STRUT, lw=2.2)
+        # The two struts of a vertex run close together: their labels sit at different heights.
+        at = frame[i] + (0.3 if i % 2 else 0.55) * (joints[i] - frame[i])
+        label = f"{i + 1}: {mm_from_m(struts.lengths[0, i]):.0f} mm, {stiffness[i] / 1e3:.1f} kN/mm"
+        axes.text(*at, label, fontsize=8, color="#1f2937", ha="center", va="center", bbox=_LABEL)
+    _truss(axes, machine, nodes, lw=1.2)
+    axes.scatter(*nodes[TIP], color=TOOL, s=30, depthshade=False)
+    axes.set_title("whole machine: struts with length and stiffness", fontsize=10, color="#374151", y=0.85 - BELOW)
+    _finish(axes, np.vstack([frame, nodes]))
+
+
+def _fit(figure: Figure, axes: Any) -> None:
+    """Zoom a view so that it fills its half of the picture with nothing beyond it."""
+    span = [high - low for low, high in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
+    room = axes.get_window_extent()
+    for zoom in ZOOMS:
+        axes.set_box_aspect(span, zoom=float(zoom))
+        figure.draw_without_rendering()
+        low, high = _extent(axes)
+        if room.x0 <= low[0] and high[0] <= room.x1 and low[1] >= 0.0 and high[1] <= TOP * figure.bbox.height:
+            return
+
+
+def _extent(axes: Any) -> tuple[FloatArray, FloatArray]:
+    """Lower left and upper right corner in pixels of a view: its box, its figures and what the axes are called."""
+    corners = np.array(list(product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim(), (1.0,))))
+    seen = corners @ axes.get_proj().T  # homogeneous
+    boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    ends = [box.get_points() for box in boxes if box is not None]
+    points = np.concatenate([axes.transData.transform(seen[:, :2] / seen[:, 3:]), *ends])
+    return points.min(axis=0), points.max(axis=0)
+
+
+_LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
+
+
+def _draw_platform(axes: Any, machine: Machine, nodes: FloatArray) -> None:
+    """The truss of the platform with its nodes named."""
+    _truss(axes, machine, nodes, lw=2.0)
+    names = [*(f"joint {i + 1}" for i in range(6)), "hub", "tool tip"]
+    for node, name in zip(nodes, names, strict=True):
+        axes.scatter(*node, color=TOOL if name == "tool tip" else PLATFORM, s=30, depthshade=False)
+        axes.text(*node, f"  {name}", fontsize=8.5, color="#1f2937")
+    axes.set_title("platform: 19 bars, hub and tool", fontsize=10, color="#374151", y=0.85 - BELOW)
+    _finish(axes, nodes)
+
+
+def _truss(axes: Any, machine: Machine, nodes: FloatArray, lw: float) -> None:
+    for i, j in platform_bars(machine.platform_joints):
+        tool = {i, j} == {HUB, TIP}
+        axes.plot(*nodes[[i, j]].T, color=TOOL if tool else PLATFORM, lw=2 * lw if tool else lw)
+
+
+def _finish(axes: Any, points: FloatArray) -> None:
+    """Equal scales, quiet panes, axes named with their unit."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    span = np.maximum(high - low, 0.05 * (high - low).max())
+    for axis, lo, width in zip("xyz", low, span, strict=True):
+        getattr(axes, f"set_{axis}lim")(lo - 0.05 * width, lo + 1.05 * width)
+        getattr(axes, f"set_{axis}label")(f"{axis.upper()} mm", fontsize=9, color="#4b5563")
+        getattr(axes, f"{axis}axis").pane.set_facecolor("#f8fafc")
+    axes.patch.set_visible(False)
+    axes.zaxis.labelpad = 8.0
+    axes.tick_params(labelsize=7.5, colors="#6b7280")
+    axes.locator_params(nbins=5)
+    axes.view_init(elev=18, azim=-62)
+
+
+def machine_views(
+    machine: Machine, pose: FloatArray, struts: Struts, marked: tuple[tuple[str, int], ...] = ()
+) -> bytes:
+    """PNG of the machine from above and from the side at one pose (6,) m and rad, struts numbered.
+
+    `marked` are joints that stand apart, drawn with a ring: ("frame" or "platform", index from 0).
+    """
+    joints = mm_from_m(pose[:3] + struts.arms[0])
+    frame, tip = mm_from_m(machine.frame_joints), mm_from_m(pose[:3])
+    with house_style():
+        figure = new_figure(14.0, 7.4)
+        for k, (first, second, title) in enumerate(((0, 1, "from above"), (0, 2, "from the side, along Y"))):
+            axes = figure.add_axes((0.06 + 0.49 * k, 0.09, 0.42, 0.74))
+            _draw_view(axes, frame, joints, tip, [first, second])
+            for body, i in marked:
+                at = (frame if body == "frame" else joints)[i]
+                axes.plot(at[first], at[second], "o", ms=18, mfc="none", mec=TOOL, mew=2.0)
+            axes.set_title(title, fontsize=11, color="#374151")
+            axes.set_xlabel(f"{'XYZ'[first]} mm")
+            axes.set_ylabel(f"{'XYZ'[second]} mm")
+        _heading(figure, machine, pose)
+        if marked:
+            words = "ring: does not follow the symmetry of the other joints"
+            figure.text(0.98, 0.91, words, fontsize=11, color=TOOL, ha="right")
+        return png_bytes(figure)
+
+
+def _draw_view(axes: Any, frame: FloatArray, joints: FloatArray, tip: FloatArray, seen: list[int]) -> None:
+    for body, colour in ((frame, FRAME), (joints, PLATFORM)):
+        beside = body[:, :2] - body[:, :2].mean(axis=0)
+        order = np.argsort(np.arctan2(beside[:, 1], beside[:, 0]), kind="stable")
+        axes.plot(*body[[*order, order[0]]][:, seen].T, color=colour, lw=1.6)
+        axes.plot(*body[:, seen].T, "o", color=colour, ms=6)
+    for i, (one, other) in enumerate(zip(frame[:, seen], joints[:, seen], strict=True)):
+        axes.plot(*np.array([one, other]).T, color=STRUT, lw=1.8)
+        # Struts of a vertex, and those behind each other, have their numbers at different places.
+        at = one + (0.25 + 0.1 * i) * (other - one)
+        axes.text(*at, f"{i + 1}", fontsize=10, weight="bold", color=STRUT, ha="center", va="center", bbox=_LABEL)
+    axes.plot(*tip[seen], "o", color=TOOL, ms=8)
+    axes.annotate("tool tip", tip[seen], xytext=(8, -4), textcoords="offset points", fontsize=9, color=TOOL)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.06)
+    axes.grid(True, color="#e5e7eb", lw=0.6)
+
+
+def machine_figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
+    """Quantity, value, unit, origin, remark of a machine's figures, in the shop's units."""
+    limits, law = machine.limits, machine.strut_law
+
+    def row(quantity: str, value: str, unit: str, section: str) -> tuple[str, str, str, str, str]:
+        return quantity, value, unit, machine.origins.get(section, "assumed"), machine.remarks.get(section, "")
+
+    def numbers(values: Any, decimals: int = 3) -> str:
+        return ", ".join(f"{round(float(v), decimals) + 0.0:g}" if abs(v) < 1e5 else f"{v:g}" for v in values)
+
+    rows = [
+        row(f"frame joint {i + 1}", numbers(mm_from_m(joint), 3), "mm", "frame_joints")
+        for i, joint in enumerate(machine.frame_joints)
+    ]
+    rows += [
+        row(f"platform joint {i + 1}", numbers(mm_from_m(joint), 3), "mm from the tool tip", "platform_joints")
+        for i, joint in enumerate(machine.platform_joints)
+    ]
+    pose = [*(mm_from_m(v) for v in limits.neutral_pose[:3]), *(deg_from_rad(v) for v in limits.neutral_pose[3:])]
+    origin = [
+        *(mm_from_m(v) for v in machine.default_origin[:3]),
+        *(deg_from_rad(v) for v in machine.default_origin[3:]),
+    ]
+    low, high = mm_from_m(limits.workspace)
+    return [
+        *rows,
+        row("reference tool length", f"{mm_from_m(machine.reference_tool_length):g}", "mm", "reference_tool"),
+        row(
+            "strut stiffness",
+            f"{law.stiffness_1 / 1e6:g} N/um at {mm_from_m(law.length_1):g} mm, "
+            f"{law.stiffness_2 / 1e6:g} N/um at {mm_from_m(law.length_2):g}",
+            "mm, linear",
+            "strut_law",
+        ),
+        row("platform bar stiffness", f"{machine.platform_bar_stiffness:g}", "N/m", "platform"),
+        row("strut length", numbers([mm_from_m(v) for v in limits.strut_length]), "mm", "limits.strut_length"),
+        row("frame joint angle up to", f"{deg_from_rad(limits.frame_joint_angle):g}", "deg", "limits.joint_angle"),
+        row(
+            "platform joint angle up to", f"{deg_from_rad(limits.platform_joint_angle):g}", "deg", "limits.joint_angle"
+        ),
+        row("neutral pose of the joints", numbers(pose), "mm, deg", "limits.joint_angle"),
+        row("workspace from", numbers(low), "mm", "limits.workspace"),
+        row("workspace to", numbers(high), "mm", "limits.workspace"),
+        row("singularity index at least", f"{limits.singularity:g}", "", "limits.singularity"),
+        row("default origin (program zero)", numbers(origin), "mm, deg", "setup"),
+        row("rapid feed", f"{mm_per_min_from_m_per_s(machine.rapid_feed):g}", "mm/min", "setup"),
+    ]
+
+
+def figure_entries(machine: Machine) -> list[dict[str, str]]:
+    """`machine_figures` for JSON."""
+    return [
+        dict(zip(("quantity", "value", "unit", "origin", "remark"), row, strict=True))
+        for row in machine_figures(machine)
+    ]
+
+
+def text(machine: Machine, stand: Reach) -> str:
+    """Figures with their origin, remarks, and how the pose that is drawn stands to the limits."""
+    rows = machine_figures(machine)
+    width = max(len(row[0]) for row in rows)
+    lines = [f"{machine.title}\n{machine.source}\n"]
+    lines += [
+        f"  {quantity:<{width}}  {value} {unit}".rstrip() + f"  [{origin}]" for quantity, value, unit, origin, _ in rows
+    ]
+    remarks = {row[4] for row in rows if row[4]}
+    said = "".join(f"\n  {name}: {remark}" for name, remark in machine.remarks.items() if remark in remarks)
+    return "\n".join([*lines, f"{said}\n\n  at the pose drawn: {stand.describe(0)}"])
+
+
+def check_text(file: str, model: StiffnessModel, found: MachineCheck) -> str:
+    """What is wrong or doubtful in a machine file, what acts, how stiff it is."""
+    machine = model.machine
+    verdict = "the file is good" if found.good else f"{len(found.wrong)} things cannot be right"
+    if len(found.wrong) == 1:
+        verdict = "one thing cannot be right"
+    if found.good and found.doubtful:
+        verdict = "the file can be used; look at what is doubtful"
+    lines = [f"{file}: {machine.title}: {verdict}"]
+    for word, texts in (("WRONG", found.wrong), ("doubtful", found.doubtful), ("warning", condition_warnings(model))):
+        lines += [f"  {word}: {text}" for text in texts]
+    effects = ", ".join([*acting_names(model), *(active.effect.name for active in model.instruments)]) or "none"
+    lines += [f"  effects: {effects}", f"  {symmetry_words(found.symmetry)}"]
+    if found.neutral.reach.reachable[0]:
+        lines.append(f"  {neutral_words(machine, found.neutral)}")
+    if found.origin.reach.reachable[0]:
+        kx, ky, kz = found.origin.along_axes[0] / 1e3
+        lines.append(
+            f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; "
+            f"{found.origin.reach.describe(0)}"
+        )
+    return "\n".join(lines)
+
+
+def pose_csv(poses: FloatArray, found: PoseReport) -> str:
+    """One row a pose; `poses` (n, 6) in mm and degrees."""
+    columns = pose_columns(poses, found)
+    return ",".join(columns) + "\n" + csv_rows(columns, {name: pose_decimals(name) for name in columns})
+
+
+def pose_columns(poses: FloatArray, found: PoseReport) -> dict[str, Any]:
+    """Column -> values of the table, in the shop's units."""
+    names = np.array([limit.name for limit in found.reach.limits] or ["none"])
+    columns: dict[str, Any] = {name: poses[:, i] for i, name in enumerate(POSE_COLUMNS)}
+    for i, axis in enumerate("xyz"):
+        columns[f"k{axis}_N_per_mm"] = n_per_mm_from_n_per_m(found.along_axes[:, i])
+    for which, direction, stiffness in (
+        ("softest", found.softest, found.softest_stiffness),
+        ("stiffest", found.stiffest, found.stiffest_stiffness),
+    ):
+        columns[f"{which}_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
+        for i, axis in enumerate("xyz"):
+            columns[f"{which}_d{axis}"] = direction[:, i]
+    for i in range(6):
+        columns[f"strut{i + 1}_mm"] = mm_from_m(found.strut_lengths[:, i])
+    columns["extrapolated"] = found.extrapolated.astype(int)
+    columns["margin"] = found.reach.margin
+    columns["margin_limit"] = names[found.reach.limit]
+    return columns
+
+
+def pose_decimals(name: str) -> int | None:
+    """Decimals of a column; None: a whole number or a word."""
+    if name in ("extrapolated", "margin_limit"):
+        return None
+    return 4 if name.endswith("N_per_mm") else 6
+
+
+def pose_text(model: StiffnessModel, values: Mapping[str, Any], found: PoseReport) -> str:
+    """One pose: `values` are those of its row of `pose_columns`."""
+    x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
+
+    named = machine_text({"machine": model.machine.title, **effects_stated(model)})
+    lines = [f"{named}\ntool tip X{x:g} Y{y:g} Z{z:g} mm, A{a:g} B{b:g} C{c:g} deg\n"]
+    for axis in "xyz":
+        lines.append(f"  stiffness along {axis.upper()}   {values[f'k{axis}_N_per_mm']:10.0f} N/mm")
+    for which in ("softest", "stiffest"):
+        dx, dy, dz = (values[f"{which}_d{axis}"] + 0.0 for axis in "xyz")
+        lines.append(
+            f"  {which:<10} direction{values[f'{which}_N_per_mm']:10.0f} N/mm along ({dx:.3f}, {dy:.3f}, {dz:.3f})"
+        )
+    lengths = "  ".join(f"{values[f'strut{i}_mm']:.3f}" for i in range(1, 7))
+    lines.append(f"  struts 1 to 6        {lengths} mm")
+    lines.append(f"  nearest limit        {found.reach.describe(0)} (margin {values['margin']:.3f} of its span)")
+    if values["extrapolated"]:
+        lines.append("  the strut law is extrapolated at this pose")
+    for warning in condition_warnings(model):
+        lines.append(f"  warning              {warning}")
+    return "\n".join(lines)

@@ -1,0 +1,340 @@
+"""`profile.png`: stiffness along the path."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.analysis.statistics import NORMAL_95, stiffness_figures, weakest_places
+from toolpath_stiff.report.figure import (
+    DPI,
+    INK,
+    MUTED,
+    PLUNGE_SLATE,
+    SECOND_ORANGE,
+    UNREACHABLE_RED,
+    add_heading,
+    house_style,
+    label_places,
+    new_figure,
+    png_bytes,
+)
+from toolpath_stiff.report.words import number, plain, shortened
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from toolpath_stiff.analysis import Analysis
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+WIDTH, HEIGHT = 14.0, 6.2  # inches
+LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
+STRIP = 0.22  # height of the operations above the frame
+OPERATION_COLOURS = ("#ebeff4", "#d9e0e8")  # in turn
+NAME_SIZE, DIGIT = 8.5, 5.0  # points; pixels that the narrowest number needs
+CURVE_BLUE = "#2b59c3"
+BAND_LABEL = "95 % of the fitted parameters"
+MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
+MOST_ARROWS = 200  # of plunges beyond the axis; more would be a row of arrowheads
+MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seven pixels
+
+
+def profile_picture(
+    analysis: Analysis, *, other: Analysis | None = None, required: float | None = None, show_plunges: bool = False
+) -> bytes:
+    """Stiffness against path length, as PNG.
+
+    Parameters
+    ----------
+    analysis
+        What to draw.
+    other
+        The same program on another machine: a second curve.
+    required
+        N/m: a line, and red below it.
+    show_plunges
+        The axis holds the plunges beside the headline, and they belong to the curve; else they are grey, and arrows
+        say where they leave the axis.
+    """
+    with house_style():
+        strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
+        figure = new_figure(WIDTH, HEIGHT)
+        frame = HEIGHT - TOP - BOTTOM - strip
+        axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
+        s, k = profile_curve(analysis, show_plunges)
+        band = profile_band(analysis, show_plunges)
+        _set_limits(axes, analysis, other, required, band, show_plunges)
+        _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
+        _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
+        columns = int(axes.get_window_extent().width)
+        if other is not None:
+            s2, k2 = profile_curve(other, show_plunges)
+            keep = extremes_by_column(s2, k2, columns)
+            name = shortened(plain(other.machine.name), 30)
+            axes.plot(s2[keep], k2[keep], color=SECOND_ORANGE, linewidth=1.3, label=name, zorder=3)
+            _draw_plunges(axes, other, columns, SECOND_ORANGE, show_plunges, "_")
+        if band is not None:
+            _draw_band(axes, s, band, columns)
+        keep = extremes_by_column(s, k, columns)
+        name = shortened(plain(analysis.machine.name), 30)
+        axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
+        _draw_plunges(axes, analysis, columns, PLUNGE_SLATE, show_plunges, "plunges")
+        _levels(axes, analysis, required)
+        _tool_changes(axes, analysis)
+        if strip:
+            _operations(axes, analysis, strip / frame)
+        _line_numbers(axes, analysis, 1.0 + strip / frame)
+        places = weakest_places(analysis)
+        spots = [(float(s[row]), float(k[row])) for row in places]
+        label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
+        _legend(axes)
+        add_heading(figure, analysis)
+        return png_bytes(figure)
+
+
+def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray]:
+    """Path length in mm and stiffness in N/mm of every sample; nan on rapids and out of reach.
+
+    Without `with_plunges` also nan on the plunges beside the headline.
+    """
+    stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness)
+    drawn = analysis.samples.cutting & (with_plunges | ~analysis.set_aside)
+    return mm_from_m(analysis.samples.s), np.where(drawn, stiffness, np.nan)
+
+
+def _draw_plunges(axes: Axes, analysis: Analysis, columns: int, colour: str, show_plunges: bool, label: str) -> None:
+    """The plunges that the curve leaves out: thin lines, and arrows at the edge of the axes that they leave.
+
+    A `label` that begins with "_" does not enter the legend (matplotlib's rule).
+    """
+    if show_plunges or not analysis.set_aside.any():
+        return
+    s = mm_from_m(analysis.samples.s)
+    k = np.where(analysis.set_aside, n_per_mm_from_n_per_m(analysis.at.stiffness), np.nan)
+    keep = extremes_by_column(s, k, columns)
+    low, high = axes.get_ylim()
+    above, below = k > high, k < low
+    marker = "^" if above.any() else "v" if below.any() else "none"  # in the legend: of what is seen of them
+    axes.plot(s[keep], k[keep], color=colour, linewidth=1.3, linestyle=(0, (2, 1)), zorder=3.5)
+    axes.plot([], [], color=colour, linewidth=1.3, linestyle=(0, (2, 1)), marker=marker, markersize=5, label=label)
+    for beyond, edge, tail in ((above, 1.0, -20.0), (below, 0.0, 20.0)):
+        start, stop = _runs(beyond)
+        for x in ((s[start] + s[stop]) / 2.0)[:MOST_ARROWS].tolist():
+            axes.annotate(
+                "",
+                (x, edge),
+                xycoords=axes.get_xaxis_transform(),
+                xytext=(0.0, tail),
+                textcoords="offset points",
+                arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.1, "shrinkA": 0.0, "shrinkB": 0.0},
+                zorder=6,
+            )
+
+
+def _runs(rows: BoolArray) -> tuple[IntArray, IntArray]:
+    """First and last row of every run in which `rows` holds."""
+    edges = np.diff(np.concatenate([[0], rows.astype(np.int8), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+
+
+def profile_band(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray] | None:
+    """Lower and upper end of the 95 % band of every sample in N/mm, nan as in `profile_curve`; None without a band."""
+    band = analysis.parameter_band
+    if band is None:
+        return None
+    _, k = profile_curve(analysis, with_plunges)
+    reach = NORMAL_95 * n_per_mm_from_n_per_m(band.deviation)
+    return k - reach, k + reach
+
+
+def _draw_band(axes: Axes, s: FloatArray, band: tuple[FloatArray, FloatArray], columns: int) -> None:
+    low, high = band
+    # Rows that keep the extremes of both edges: a band drawn on either's rows alone would cut the other's.
+    keep = np.union1d(extremes_by_column(s, low, columns), extremes_by_column(s, high, columns))
+    axes.fill_between(
+        s[keep], low[keep], high[keep], color=CURVE_BLUE, alpha=0.18, linewidth=0, zorder=3, label=BAND_LABEL
+    )
+
+
+def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
+    """Rows that draw the same picture as all of them on `columns` pixels, in order.
+
+    Of every run of rows in one column of pixels the first, the last, the lowest and the highest are kept, so no
+    extreme is lost; of a run of nan the first, which keeps the gap. x ascends.
+    """
+    if len(x) <= 4 * columns:
+        return np.arange(len(x))
+    span = float(x[-1] - x[0])
+    column = np.zeros(len(x), dtype=np.int64) if span == 0.0 else ((x - x[0]) / span * columns).astype(np.int64)
+    missing = np.isnan(y)
+    fresh = np.concatenate([[True], (np.diff(column) != 0) | (missing[1:] != missing[:-1])])
+    first = np.flatnonzero(fresh)
+    last = np.append(first[1:], len(x)) - 1
+    run = np.cumsum(fresh) - 1
+    lowest = np.flatnonzero(y == np.minimum.reduceat(y, first)[run])
+    highest = np.flatnonzero(y == np.maximum.reduceat(y, first)[run])
+    lowest = lowest[np.diff(run[lowest], prepend=-1) != 0]  # the first of equals
+    highest = highest[np.diff(run[highest], append=-1) != 0]  # the last of equals
+    kept = np.concatenate([first, last, lowest, highest])
+    rows = np.unique(kept)
+    return np.asarray(rows[~missing[rows] | fresh[rows]])
+
+
+def _set_limits(
+    axes: Axes,
+    analysis: Analysis,
+    other: Analysis | None,
+    required: float | None,
+    band: tuple[FloatArray, FloatArray] | None,
+    show_plunges: bool,
+) -> None:
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    curves = [*(profile_curve(a, show_plunges)[1] for a in (analysis, other) if a is not None), *(band or ())]
+    low, high = float(min(np.nanmin(k) for k in curves)), float(max(np.nanmax(k) for k in curves))
+    if required is not None:
+        level = n_per_mm_from_n_per_m(required)
+        low, high = min(low, level), max(high, level)
+    pad = max(0.12 * (high - low), 0.005 * high)
+    axes.set_ylim(max(low - pad, 0.0), high + pad)
+    end = mm_from_m(float(analysis.samples.s[-1]))
+    axes.set_xlim(0.0, end or 1.0)
+    axes.set_xlabel("path length, mm (rapids included)")
+    axes.set_ylabel("stiffness along the load, N/mm")
+    axes.xaxis.set_major_locator(MaxNLocator(12, steps=[1, 2, 2.5, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if end > 20 else 2)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if high - low > 5 else 2)))
+    axes.grid(axis="x", visible=False)
+
+
+def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) -> None:
+    """Shade the spans of path in which `rows` holds."""
+    start, stop = _runs(rows)
+    if not len(start):
+        return
+    low, high = axes.get_ylim()
+    spans = [(float(s[i]), float(s[j] - s[i])) for i, j in zip(start, stop, strict=True)]
+    axes.broken_barh(spans, (low, high - low), facecolor=colour, edgecolor="none", label=label, zorder=1)
+
+
+def _levels(axes: Axes, analysis: Analysis, required: float | None) -> None:
+    mean = stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"]
+    if mean is not None:
+        axes.axhline(mean, color=INK, linewidth=1.0, linestyle=(0, (6, 3)), zorder=5, label=f"mean {number(mean)} N/mm")
+    if required is None:
+        return
+    level = n_per_mm_from_n_per_m(required)
+    axes.axhline(level, color=UNREACHABLE_RED, linewidth=1.3, zorder=5, label=f"required {number(level)} N/mm")
+
+
+def _tool_changes(axes: Axes, analysis: Analysis) -> None:
+    """A dotted line where another tool takes over, while they can be told apart; labels while they are few."""
+    samples = analysis.samples
+    changes = np.flatnonzero(np.diff(samples.tool) != 0) + 1
+    if not 0 < len(changes) <= MOST_TOOL_LINES:
+        return
+    s = mm_from_m(samples.s[changes])
+    axes.vlines(s, 0, 1, transform=axes.get_xaxis_transform(), color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
+    if len(changes) > MOST_TOOL_LABELS:
+        return
+    for where, row in zip(s, changes, strict=True):
+        axes.annotate(
+            f"T{samples.tool[row]}",
+            (float(where), 0.0),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=(4, 5),
+            textcoords="offset points",
+            fontsize=9,
+            color=MUTED,
+        )
+
+
+def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
+    """Named boxes above the frame, `height` of its height; lines where they begin, while these can be told apart."""
+    rows = analysis.operations.rows
+    first = np.searchsorted(analysis.samples.move, [row.first_move for row in rows])
+    edges = mm_from_m(np.append(analysis.samples.s[first], analysis.samples.s[-1]))
+    spans = list(zip(edges[:-1].tolist(), np.diff(edges).tolist(), strict=True))
+    across = axes.get_xaxis_transform()
+    if len(rows) <= MOST_TOOL_LINES:
+        axes.vlines(edges[1:-1], 0, 1, transform=across, color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
+    for which, colour in enumerate(OPERATION_COLOURS):
+        axes.broken_barh(
+            spans[which::2],
+            (1.0, height),
+            facecolor=colour,
+            edgecolor="none",
+            transform=across,
+            clip_on=False,
+            zorder=2,
+        )
+    pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
+    for row, (start, length) in zip(rows, spans, strict=True):
+        name = _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 8.0)
+        if name:
+            axes.text(
+                start + 4.0 / pixels, 1.0 + height / 2.0, name,
+                transform=across, fontsize=NAME_SIZE, va="center_baseline", zorder=6,
+            )  # fmt: skip
+
+
+def _fitting(text: str, least: str, room: float) -> str:
+    """The text cut to `room` pixels; `least` if next to nothing of it would be left, or nothing at all."""
+    from matplotlib.font_manager import FontProperties
+
+    agg: Any = importlib.import_module("matplotlib.backends.backend_agg")  # its own types are wanting
+
+    # Typesetting a long name is slow; what is beyond one character a pixel never fits.
+    text = shortened(text, max(int(room), len(least)))
+    renderer, font = agg.RendererAgg(1, 1, DPI), FontProperties(size=NAME_SIZE)
+
+    def fits(words: str) -> bool:
+        return float(renderer.get_text_width_height_descent(words, font, ismath=False)[0]) <= room
+
+    if room < DIGIT or not fits(least):
+        return ""
+    if fits(text):
+        return text
+    low, high = len(least) + 4, len(text)  # a name of four letters and less tells nothing
+    if high <= low or not fits(shortened(text, low)):
+        return least
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if fits(shortened(text, middle)) else (low, middle)
+    return shortened(text, low)
+
+
+def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
+    """Program lines above the frame, at `height` of its height, where the ticks below fall."""
+    end = float(analysis.samples.s[-1])
+    where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
+    rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
+    upper = axes.secondary_xaxis(height)
+    upper.set_xticks(mm_from_m(where), [str(line) for line in analysis.samples.line[rows]])
+    upper.tick_params(length=3, labelsize=9)
+    upper.spines["top"].set_visible(False)
+    upper.set_xlabel("program line", fontsize=9, color=MUTED)
+
+
+def _legend(axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    axes.figure.legend(
+        handles,
+        labels,
+        loc="upper right",
+        bbox_to_anchor=(1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT),
+        ncols=len(labels),
+        frameon=False,
+        fontsize=9.5,
+        borderaxespad=0.0,
+        columnspacing=1.4,
+        handlelength=1.8,
+    )

@@ -1,0 +1,100 @@
+"""The results of a reduction of raw records: figures, table and the picture of the loops."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from toolpath_stiff.files import Content
+from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.updating.raw import measurement_csv, shop_figures
+
+if TYPE_CHECKING:
+    from toolpath_stiff.updating.raw import Loop, LoopFigures
+
+COLUMNS = 4
+MOST = 60  # loops in one picture; further ones are counted in its heading
+
+
+def loops_png(loops: list[Loop], figures: list[LoopFigures], title: str) -> bytes:
+    """One small diagram a loop, in the order of the file, as PNG."""
+    shown = min(len(loops), MOST)
+    columns = min(COLUMNS, shown)
+    rows = math.ceil(shown / columns)
+    with house_style():
+        figure = new_figure(max(6.0, 3.4 * columns), 2.9 * rows + 0.9)
+        more = f"; the first {MOST} of {len(loops)} loops" if len(loops) > MOST else ""
+        figure.suptitle(f"{title}: force over deflection{more}", x=0.02, ha="left", weight="bold", color=INK)
+        axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        for ax, loop, one in zip(axes, loops, figures, strict=False):
+            deflection = um_from_m(loop.deflection)
+            ends = [int(np.argmin(loop.jog)), int(np.argmax(loop.jog))]
+            ax.plot(deflection[ends], loop.force[ends], color=SECOND_ORANGE, linewidth=1.6, label="secant")
+            ax.plot(deflection, loop.force, color=MUTED, linewidth=1.0, marker="o", markersize=3.5)
+            ax.set_title(loop.title, fontsize=8.5)
+            ax.text(
+                0.04,
+                0.95,
+                f"{n_per_mm_from_n_per_m(one.stiffness):,.0f} N/mm",
+                transform=ax.transAxes,
+                va="top",
+                fontsize=9,
+                color=SECOND_ORANGE,
+            )
+            ax.set_xlabel("deflection in \u00b5m", fontsize=8)
+            ax.set_ylabel("force in N", fontsize=8)
+            ax.tick_params(labelsize=8)
+        for ax in axes[shown:]:
+            ax.set_axis_off()
+        height = figure.get_size_inches()[1]
+        figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.35 / height))
+        return png_bytes(figure)
+
+
+def names(out: Path, *, plots: bool = True) -> tuple[Path, ...]:
+    """The files that `files` makes: `out` itself, and the picture of the loops beside it."""
+    return (out, out.with_name(f"{out.stem}_loops.png")) if plots else (out,)
+
+
+def files(
+    loops: list[Loop], figures: list[LoopFigures], out: Path, title: str, *, plots: bool = True
+) -> dict[Path, Content]:
+    """The measurement file, and with `plots` the loops drawn under `title`."""
+    contents: list[Content] = [measurement_csv(loops, figures)]
+    contents += [loops_png(loops, figures, title)] if plots else []
+    return dict(zip(names(out, plots=plots), contents, strict=True))
+
+
+def describe(loops: list[Loop], figures: list[LoopFigures]) -> list[dict[str, Any]]:
+    """One dictionary a loop in the shop's units; what a loop cannot say is null."""
+    found = []
+    for loop, one in zip(loops, figures, strict=True):
+        numbers = {
+            "stiffness_N_per_mm": n_per_mm_from_n_per_m(one.stiffness),
+            "force_N": one.force,
+            "deflection_um": um_from_m(one.deflection),
+            **shop_figures(one),
+        }
+        shown = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
+        found.append({"loop": loop.title, "line": loop.line, **shown})
+    return found
+
+
+def text(loops: list[Loop], figures: list[LoopFigures]) -> str:
+    """The figures for people."""
+    heading = ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
+    rows = [heading]
+    for one in describe(loops, figures):
+        cells = [one["loop"], f"{one['stiffness_N_per_mm']:.0f}", f"{one['force_N']:.0f}"]
+        for name in ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um"):
+            cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")
+        rows.append(tuple(cells))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    )
