@@ -1,10 +1,16 @@
-"""Stiffness of a hexapod (Stewart-platform) mill along a real NC program.
+r"""Stiffness of a hexapod (Stewart-platform) mill along a real NC program.
 
->>> import toolpath_stiff as ts
->>> machine = ts.load_machine("nist")
->>> program = ts.read_program("programs/pocket.nc")  # doctest: +SKIP
->>> analysis = ts.analyse(machine, program)  # doctest: +SKIP
->>> analysis.to_frame()[["line", "x_mm", "y_mm", "stiffness_N_per_mm"]]  # doctest: +SKIP
+Everything that the commands of `tps` do is one function here, which returns one result. Lengths are in mm, angles in
+degrees, forces in N, stiffnesses in N/mm; the names of arguments and columns say so.
+
+Examples
+--------
+>>> import toolpath_stiff as tps
+>>> machine = tps.Machine.load("nist")
+>>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+>>> analysis = tps.analyze(machine, slot, origin_mm_deg=(0, 0, 800))
+>>> round(analysis.mean_N_per_mm)
+54353
 """
 
 from __future__ import annotations
@@ -12,44 +18,58 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis import Analysis, analyse
-    from toolpath_stiff.machine import Machine, load_machine
-    from toolpath_stiff.nc import Program, parse_program, read_program
-    from toolpath_stiff.stiffness.model import StiffnessModel, build_model
+    from toolpath_stiff.api.inputs import Machine as Machine
+    from toolpath_stiff.api.inputs import Program as Program
+    from toolpath_stiff.api.machines import MachineCheck as MachineCheck
+    from toolpath_stiff.api.machines import PoseStiffness as PoseStiffness
+    from toolpath_stiff.api.machines import StiffnessMap as StiffnessMap
+    from toolpath_stiff.api.machines import map_stiffness as map_stiffness
+    from toolpath_stiff.api.machines import pose as pose
+    from toolpath_stiff.api.placements import CaseStudy as CaseStudy
+    from toolpath_stiff.api.placements import KeepOut as KeepOut
+    from toolpath_stiff.api.placements import Placement as Placement
+    from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
+    from toolpath_stiff.api.placements import case_study as case_study
+    from toolpath_stiff.api.placements import place as place
+    from toolpath_stiff.api.placements import rewrite as rewrite
+    from toolpath_stiff.api.programs import Analysis as Analysis
+    from toolpath_stiff.api.programs import ProgramCheck as ProgramCheck
+    from toolpath_stiff.api.programs import SampledPath as SampledPath
+    from toolpath_stiff.api.programs import analyze as analyze
+    from toolpath_stiff.api.programs import check as check
+    from toolpath_stiff.api.programs import sample_path as sample_path
+    from toolpath_stiff.errors import InputError as InputError
+    from toolpath_stiff.errors import InputErrors as InputErrors
+    from toolpath_stiff.errors import TpsError as TpsError
+    from toolpath_stiff.errors import UnreachableError as UnreachableError
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
-# Name -> module; imported when first asked for, so that the command line starts without numpy.
-_LAZY = {
-    "Analysis": "toolpath_stiff.analysis",
-    "Machine": "toolpath_stiff.machine",
-    "Program": "toolpath_stiff.nc",
-    "StiffnessModel": "toolpath_stiff.stiffness.model",
-    "analyse": "toolpath_stiff.analysis",
-    "build_model": "toolpath_stiff.stiffness.model",
-    "load_machine": "toolpath_stiff.machine",
-    "parse_program": "toolpath_stiff.nc",
-    "read_program": "toolpath_stiff.nc",
-}
+# Module -> its public names; imported when first asked for: the command line starts without numpy.
+_PUBLIC = {
+    "api.inputs": ("Machine", "Program"),
+    "api.machines": ("MachineCheck", "PoseStiffness", "StiffnessMap", "map_stiffness", "pose"),
+    "api.placements": (
+        "CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite",
+    ),
+    "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
+    "errors": ("InputError", "InputErrors", "TpsError", "UnreachableError"),
+}  # fmt: skip
+_HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 
-__all__ = [
-    "Analysis",
-    "Machine",
-    "Program",
-    "StiffnessModel",
-    "__version__",
-    "analyse",
-    "build_model",
-    "load_machine",
-    "parse_program",
-    "read_program",
-]
+__all__ = sorted([*_HOME, "__version__"])  # noqa: PLE0605  (the table above is the list)
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name on first use."""
-    if name not in _LAZY:
+    if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(_LAZY[name]), name)
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -7,7 +7,7 @@ others.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -19,10 +19,12 @@ from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
-from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding
+from toolpath_stiff.nc.checking import ERROR, WARNING, Checked, Finding, check_by
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches
 from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.operations import find_operations
+from toolpath_stiff.nc.reader import ZERO
 from toolpath_stiff.path import BLOCK, RAPID_FEED, Samples, move_durations, place, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -230,6 +232,65 @@ def _rest(code: str, count: int) -> list[Finding]:
     if count <= MOST_NAMED:
         return []
     return [Finding(0, 0, code, f"and {count - MOST_NAMED} more of the kind {code!r}", WARNING)]
+
+
+def check_program(
+    lines: tuple[str, ...],
+    name: str,
+    *,
+    machine: Machine | None,
+    origin: Pose | None = None,
+    step: float = 1e-3,
+    strut_speed: float | None = None,
+    controller: Controller = UNKNOWN_CONTROL,
+    block_delete: Switches = False,
+    interpreter: str = "builtin",
+    rs274: str | None = None,
+) -> dict[str, Any]:
+    """Everything that is to be said of a program, in the shop's units.
+
+    Parameters
+    ----------
+    lines, name
+        The program.
+    machine
+        Whose reach and strut speeds are checked; None: the program alone.
+    origin, step, strut_speed
+        Where program zero sits (m, rad); distance of the samples, m; largest speed of a strut, m/s.
+    controller, block_delete, interpreter, rs274
+        As of `read_program`.
+    """
+    default = machine.default_origin if machine else ZERO
+    reading: dict[str, Any] = {"block_delete": block_delete, "controller": controller, "rs274": rs274}
+    checked, reader = check_by(interpreter, lines, name, origin=origin, default_origin=default, **reading)
+    findings: list[Finding] = list(checked.findings)
+    found = Figures({}, {}, {}, {})
+    speed: dict[str, float] = {}
+    rapid_feed = [machine.rapid_feed] if machine else []
+    tools, operations = check_parts(checked, lines, name, *rapid_feed)
+    if checked.moves is not None:
+        found = figures(checked.moves, *rapid_feed)
+        findings += radii_findings(checked.moves)
+        if machine is not None:
+            more, speed = machine_findings(checked, machine, checked.origin, step, strut_speed)
+            findings += more
+    posted = controller.kinematics if checked.dialect in ("", "linuxcnc") else None
+    return {
+        "program": name,
+        "interpreter": reader,
+        "dialect": checked.dialect or controller.label,
+        "kinematics": posted.label if posted else "",
+        "complete": checked.complete,
+        "used": [asdict(code) for code in checked.used],
+        "unsupported": [asdict(word) for word in checked.unsupported],
+        "findings": [asdict(finding) for finding in sorted(findings, key=lambda one: (one.line, one.column))],
+        **figure_rows(found),
+        "tools": tools,
+        "operations": operations,
+        "fastest_strut": speed,
+        "modal_start": checked.start,
+        "modal_end": checked.end,
+    }
 
 
 def check_parts(

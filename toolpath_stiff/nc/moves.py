@@ -9,7 +9,15 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from toolpath_stiff.units import Pose, m_from_mm, m_per_s_from_mm_per_min, rad_from_deg
+from toolpath_stiff.units import (
+    Pose,
+    deg_from_rad,
+    m_from_mm,
+    m_per_s_from_mm_per_min,
+    mm_from_m,
+    mm_per_min_from_m_per_s,
+    rad_from_deg,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -80,6 +88,27 @@ class Moves:
     def take(self, index: IntArray | BoolArray | slice) -> Moves:
         """The moves at `index` (integers, a mask or a slice)."""
         return Moves(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+
+def move_columns(moves: Moves) -> dict[str, NDArray[Any]]:
+    """Column -> values of a table of moves in the shop's units; arcs have their signed angle, else it is 0."""
+    import numpy as np
+
+    columns: dict[str, NDArray[Any]] = {
+        "line": moves.line,
+        "motion": np.array(MOTION_NAMES)[moves.motion],
+        "tool": moves.tool,
+    }
+    for end, at in (("start", moves.start), ("end", moves.end)):
+        shown = np.concatenate([mm_from_m(at[:, :3]), deg_from_rad(at[:, 3:])], axis=1)
+        units = ("mm", "mm", "mm", "deg", "deg", "deg")
+        columns |= {f"{end}_{a}_{unit}": shown[:, i] for i, (a, unit) in enumerate(zip("xyzabc", units, strict=True))}
+    return {
+        **columns,
+        "arc_deg": deg_from_rad(moves.arc_sweep),
+        "feed_mm_per_min": mm_per_min_from_m_per_s(moves.feed),
+        "dwell_s": moves.dwell,
+    }
 
 
 class Jump(NamedTuple):

@@ -9,16 +9,27 @@ import numpy as np
 
 from toolpath_stiff.files import Content
 from toolpath_stiff.placement.case_study import HIGH_MM, LOW_MM, CaseStudy, region_rows, study_text
-from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import (
+    BLUE,
+    COLOUR_MAP,
+    INK,
+    MUTED,
+    SECOND_ORANGE,
+    house_style,
+    new_figure,
+    picture,
+)
 from toolpath_stiff.report.words import number
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
 
 
-def regions_picture(study: CaseStudy) -> bytes:
+@picture
+def regions_picture(study: CaseStudy) -> Figure:
     """PNG of the four regions, one panel a height, each path coloured by its stiffness, mean (range) beside it."""
     stiffness = [n_per_mm_from_n_per_m(a.at.stiffness[a.counted]) for a in study.regions.values()]
     low, high = min(float(s.min()) for s in stiffness), max(float(s.max()) for s in stiffness)
@@ -52,7 +63,7 @@ def regions_picture(study: CaseStudy) -> bytes:
         figure.text(x, 1.0 - 0.4 / above, title, fontsize=14, weight="bold")
         text = f"{study.summary['program']} on {study.summary['machine']}; path and regions are ours, as Figure 10"
         figure.text(x, 1.0 - 0.68 / above, text, fontsize=10, color=MUTED)
-        return png_bytes(figure)
+        return figure
 
 
 def _frame(study: CaseStudy) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -81,7 +92,8 @@ def _path(axes: Axes, study: CaseStudy, row: dict[str, float | str], low: float,
     return lines
 
 
-def heights_picture(study: CaseStudy) -> bytes:
+@picture
+def heights_picture(study: CaseStudy) -> Figure:
     """PNG of mean and range of the path over its height, where they turn over marked."""
     rows = study.summary["heights"]
     z = [row["z_mm"] for row in rows]
@@ -114,7 +126,7 @@ def heights_picture(study: CaseStudy) -> bytes:
         handles = [*axes.get_legend_handles_labels()[0], *other.get_legend_handles_labels()[0]]
         figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.08, 0.89), ncol=3, frameon=False)
         figure.text(0.09, 0.92, "Mean and range rise with z, until they turn over", fontsize=14, weight="bold")
-        return png_bytes(figure)
+        return figure
 
 
 def names(plots: bool = True) -> tuple[str, ...]:

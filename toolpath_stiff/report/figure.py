@@ -11,9 +11,10 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from functools import update_wrapper
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.analysis import Analysis
+
+P = ParamSpec("P")
+Made = TypeVar("Made", bound=bytes)
 
 DPI = 100
 INK, MUTED, GRID = "#1f2933", "#616e7c", "#e4e7eb"
@@ -83,6 +87,34 @@ def png_bytes(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
+
+
+class Picture(Generic[P, Made]):
+    """A picture: called it is the bytes of a file, `figure` gives it as a matplotlib figure."""
+
+    def __init__(self, draw: Callable[P, Figure], make: Callable[[Figure], Made]) -> None:
+        self._draw, self._make = draw, make
+        update_wrapper(self, draw)
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> Made:
+        """The picture as a file."""
+        with house_style():
+            return self._make(self._draw(*args, **kwargs))
+
+    def figure(self, *args: P.args, **kwargs: P.kwargs) -> Figure:
+        """The picture as a figure."""
+        with house_style():
+            return self._draw(*args, **kwargs)
+
+
+def picture(draw: Callable[P, Figure]) -> Picture[P, bytes]:
+    """Decorate a function that draws a figure: it makes a PNG."""
+    return Picture(draw, png_bytes)
+
+
+def drawn(draw: Callable[P, Figure]) -> Picture[P, Drawing]:
+    """Decorate a function that draws a figure: it makes a PNG and, for pages, an SVG."""
+    return Picture(draw, drawing)
 
 
 def add_heading(figure: Figure, analysis: Analysis) -> None:

@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.checks import MachineCheck, neutral_words, symmetry
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.report.figure import BLUE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import BLUE, house_style, new_figure, picture
 from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import acting_names, condition_warnings, effects_stated
@@ -36,7 +36,8 @@ BELOW = -0.1  # of the picture's height: the views' empty rims lie beyond it
 ZOOMS = np.arange(1.5, 0.5, -0.05)  # of a view, the largest at which its axes and labels stay in its half
 
 
-def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> bytes:
+@picture
+def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> Figure:
     """PNG of the machine at one pose (6,) m and rad, with its struts there."""
     joints = pose[:3] + struts.arms[0]
     nodes = pose[:3] + platform_nodes(machine.platform_joints) @ rotation_matrices(pose[3:]).T
@@ -49,7 +50,7 @@ def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> bytes
         for axes in (whole, detail):
             _fit(figure, axes)
         _heading(figure, machine, pose)
-        return png_bytes(figure)
+        return figure
 
 
 def _heading(figure: Figure, machine: Machine, pose: FloatArray) -> None:
@@ -142,9 +143,10 @@ def _finish(axes: Any, points: FloatArray) -> None:
     axes.view_init(elev=18, azim=-62)
 
 
+@picture
 def machine_views(
     machine: Machine, pose: FloatArray, struts: Struts, marked: tuple[tuple[str, int], ...] = ()
-) -> bytes:
+) -> Figure:
     """PNG of the machine from above and from the side at one pose (6,) m and rad, struts numbered.
 
     `marked` are joints that stand apart, drawn with a ring: ("frame" or "platform", index from 0).
@@ -166,7 +168,7 @@ def machine_views(
         if marked:
             words = "ring: does not follow the symmetry of the other joints"
             figure.text(0.98, 0.91, words, fontsize=11, color=TOOL, ha="right")
-        return png_bytes(figure)
+        return figure
 
 
 def _draw_view(axes: Any, frame: FloatArray, joints: FloatArray, tip: FloatArray, seen: list[int]) -> None:

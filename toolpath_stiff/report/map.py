@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.poses import StiffnessMap, turning_points
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, picture
 from toolpath_stiff.report.pages import asset, escaped, filled, json_for_script, script_hash, style
 from toolpath_stiff.report.words import machine_text, number, plain
 from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
@@ -21,6 +21,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.text import Text
 
     from toolpath_stiff.stiffness.model import StiffnessModel
@@ -60,12 +61,14 @@ def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()
 
 
 FloatArray = NDArray[np.float64]
+DECIMALS: dict[str, int | None] = {"x_mm": 6, "y_mm": 6, "z_mm": 6, "stiffness_N_per_mm": 4, "reachable": None}
 
 CONTOURS = 9
 ACROSS = 3  # panels in a row
 
 
-def map_picture(machine: Machine, found: StiffnessMap) -> bytes:
+@picture
+def map_picture(machine: Machine, found: StiffnessMap) -> Figure:
     """PNG of every slice, one colour scale for all."""
     slices = len(found.z)
     rows = -(-slices // ACROSS)
@@ -106,7 +109,7 @@ def map_picture(machine: Machine, found: StiffnessMap) -> bytes:
         tilt = f"   ·   roll {a:g}, pitch {b:g}, yaw {c:g} degrees" if any(found.abc) else ""
         text = f"{machine.title}{tilt}   ·   {number(low)} to {number(high)} N/mm"
         figure.text(0.75 / width, 1 - 0.68 / height, text, fontsize=10, color=MUTED)
-        return png_bytes(figure)
+        return figure
 
 
 def _slice(
@@ -225,18 +228,22 @@ def map_summary(model: StiffnessModel, found: StiffnessMap) -> dict[str, Any]:
 
 def map_csv(found: StiffnessMap) -> Iterator[str]:
     """`map.csv`, a slice at a time."""
-    decimals: dict[str, int | None] = {"x_mm": 6, "y_mm": 6, "z_mm": 6, "stiffness_N_per_mm": 4, "reachable": None}
-    yield ",".join(decimals) + "\n"
+    yield ",".join(DECIMALS) + "\n"
+    for columns in map_columns(found):
+        yield csv_rows({**columns, "reachable": columns["reachable"].astype(int)}, DECIMALS)
+
+
+def map_columns(found: StiffnessMap) -> Iterator[dict[str, NDArray[Any]]]:
+    """Column -> values of each slice."""
     ys, xs = np.meshgrid(mm_from_m(found.y), mm_from_m(found.x), indexing="ij")
     for i, height in enumerate(found.z):
-        columns = {
+        yield {
             "x_mm": xs.ravel(),
             "y_mm": ys.ravel(),
             "z_mm": np.full(xs.size, mm_from_m(float(height))),
             "stiffness_N_per_mm": n_per_mm_from_n_per_m(found.stiffness[i].ravel()),
-            "reachable": found.reachable[i].ravel().astype(int),
+            "reachable": found.reachable[i].ravel(),
         }
-        yield csv_rows(columns, decimals)
 
 
 def text(summary: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.files import Content
-from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, picture
 from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 from toolpath_stiff.updating.planning.document import POSE, GapMap, group_of, height_groups, plan_csv
@@ -18,6 +18,7 @@ from toolpath_stiff.updating.planning.visits import Visits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from toolpath_stiff.updating.planning import Plan
     from toolpath_stiff.updating.planning.campaign import Campaign
@@ -43,6 +44,7 @@ SHORT = 6  # letters of a label that has room on either side
 ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
 
 
+@picture
 def plan_picture(
     visits: Visits,
     chosen: Sequence[int],
@@ -50,7 +52,7 @@ def plan_picture(
     gap: GapMap | None,
     title: str,
     subtitle: str,
-) -> bytes:
+) -> Figure:
     """PNG: a column a height; with a map one row for vertical and one for tilted poses.
 
     Parameters
@@ -102,7 +104,7 @@ def plan_picture(
         _legend(figure, kinds)
         figure.text(0.75 / width, 1 - 0.42 / height, shortened(plain(title), 90), fontsize=14, weight="bold")
         figure.text(0.75 / width, 1 - 0.72 / height, shortened(plain(subtitle), 130), fontsize=10, color=MUTED)
-        return png_bytes(figure)
+        return figure
 
 
 def _across(panels: int) -> int:

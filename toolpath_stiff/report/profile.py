@@ -20,13 +20,14 @@ from toolpath_stiff.report.figure import (
     house_style,
     label_places,
     new_figure,
-    png_bytes,
+    picture,
 )
 from toolpath_stiff.report.words import number, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from toolpath_stiff.analysis import Analysis
 
@@ -46,9 +47,10 @@ MOST_ARROWS = 200  # of plunges beyond the axis; more would be a row of arrowhea
 MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seven pixels
 
 
+@picture
 def profile_picture(
     analysis: Analysis, *, other: Analysis | None = None, required: float | None = None, show_plunges: bool = False
-) -> bytes:
+) -> Figure:
     """Stiffness against path length, as PNG.
 
     Parameters
@@ -96,7 +98,7 @@ def profile_picture(
         label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
         _legend(axes)
         add_heading(figure, analysis)
-        return png_bytes(figure)
+        return figure
 
 
 def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray]:

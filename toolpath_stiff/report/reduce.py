@@ -9,18 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff.files import Content
-from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.raw import measurement_csv, shop_figures
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from toolpath_stiff.updating.raw import Loop, LoopFigures
 
 COLUMNS = 4
 MOST = 60  # loops in one picture; further ones are counted in its heading
 
 
-def loops_png(loops: list[Loop], figures: list[LoopFigures], title: str) -> bytes:
+@picture
+def loops_png(loops: list[Loop], figures: list[LoopFigures], title: str) -> Figure:
     """One small diagram a loop, in the order of the file, as PNG."""
     shown = min(len(loops), MOST)
     columns = min(COLUMNS, shown)
@@ -52,7 +55,7 @@ def loops_png(loops: list[Loop], figures: list[LoopFigures], title: str) -> byte
             ax.set_axis_off()
         height = figure.get_size_inches()[1]
         figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.35 / height))
-        return png_bytes(figure)
+        return figure
 
 
 def names(out: Path, *, plots: bool = True) -> tuple[Path, ...]:

@@ -17,8 +17,7 @@ from toolpath_stiff.report.figure import (
     PURPLE,
     SECOND_ORANGE,
     WITHIN,
-    Drawing,
-    drawing,
+    drawn,
     house_style,
     new_figure,
 )
@@ -43,6 +42,7 @@ BAND = 0.10  # drawn about measured = modelled
 MAP = 2.05  # inch
 
 
+@drawn
 def before_after_png(
     document: Mapping[str, Any],
     data: Measurements,
@@ -50,7 +50,7 @@ def before_after_png(
     after: FloatArray | None,
     *,
     names: tuple[str, str] | None = None,
-) -> Drawing:
+) -> Figure:
     """PNG: where model and measurements differ, seen from above, before and after, and measured against modelled.
 
     Parameters
@@ -123,7 +123,7 @@ def before_after_png(
         beside = 0.95 + block + 1.85
         places = [(beside, 0.55, width - beside - 0.3, height - 1.85)] if alone else _below(width, len(halves))
         _scatter_pair(figure, data, halves, directions, places)
-        return drawing(figure)
+        return figure
 
 
 def last_model(document: Mapping[str, Any]) -> Mapping[str, Any]:

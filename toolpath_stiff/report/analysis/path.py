@@ -22,7 +22,7 @@ from toolpath_stiff.report.figure import (
     label_places,
     legend_extend,
     new_figure,
-    png_bytes,
+    picture,
     scale_limits,
     segment_classes,
 )
@@ -44,7 +44,8 @@ MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
 THINNEST = 0.38  # a view's shorter side, of the longest: a flat part still gets a readable side view
 
 
-def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> bytes:
+@picture
+def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     """Three views of the path, as PNG.
 
     Top (XY), below it front (XZ), beside that the view from +X (YZ), all at one scale and aligned as on a drawing,
@@ -70,7 +71,7 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> bytes:
             label_places(axes, spots, [f"line {samples.line[row]}" for row in places])
         add_heading(figure, analysis)
         _legend(figure, corner, analysis, limits, show_plunges)
-        return png_bytes(figure)
+        return figure
 
 
 def _coloured_lines(

@@ -16,8 +16,7 @@ from toolpath_stiff.report.figure import (
     MUTED,
     PALE_RED,
     UNREACHABLE_RED,
-    Drawing,
-    drawing,
+    drawn,
     house_style,
     new_figure,
 )
@@ -29,6 +28,7 @@ from toolpath_stiff.updating.inference.fits import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from toolpath_stiff.updating.comparison import Comparison
 
@@ -41,7 +41,8 @@ MERGED = 0.03  # of the picture's width: poses closer than this in the view shar
 LEFT, PANEL, WIDEST, NARROWEST = 0.8, 3.65, 15.0, 8.6  # inches: margin, a square panel, the picture
 
 
-def machine_png(found: Comparison) -> Drawing:
+@drawn
+def machine_png(found: Comparison) -> Figure:
     """PNG: glyphs on the machine from above, plane by plane, and from the front and the right."""
     data = found.data
     where = planes(data)
@@ -86,7 +87,7 @@ def machine_png(found: Comparison) -> Drawing:
             "poses that fall together in a view: their mean",
         )
         _key(figure, axes_shown, width, height)
-        return drawing(figure)
+        return figure
 
 
 def _relative(place: Place, width: float, height: float) -> Place:

@@ -13,8 +13,7 @@ from toolpath_stiff.report.figure import (
     MUTED,
     UNREACHABLE_RED,
     WITHIN,
-    Drawing,
-    drawing,
+    drawn,
     house_style,
     new_figure,
 )
@@ -65,7 +64,8 @@ def markers(setup: NDArray[np.str_]) -> dict[str, str]:
     return {name: MARKERS[i % len(MARKERS)] for i, name in enumerate(dict.fromkeys(setup.tolist()))}
 
 
-def measured_modelled_png(found: Comparison) -> Drawing:
+@drawn
+def measured_modelled_png(found: Comparison) -> Figure:
     """PNG: measured against modelled stiffness, log-log, colour a direction, marker a set-up, with the 10 % band."""
     data = found.data
     along, shapes = directions(data), markers(data.setup)
@@ -104,7 +104,7 @@ def measured_modelled_png(found: Comparison) -> Drawing:
             f"as given; below the line: softer than modelled; bars: {SIDES:g} standard deviations of scatter "
             f"({'the high guess' if name == 'high' else f'noise {name}'})",
         )
-        return drawing(figure)
+        return figure
 
 
 def _log_axes(axes: Axes, low: float, high: float) -> None:
@@ -180,7 +180,8 @@ def _legend(axes: Axes, found: Comparison, along: NDArray[np.str_], shapes: dict
     axes.legend(handles=keys, loc="upper left", frameon=True, framealpha=0.9, edgecolor="none", fontsize=9)
 
 
-def strips_png(found: Comparison) -> Drawing:
+@drawn
+def strips_png(found: Comparison) -> Figure:
     """PNG: residuals in measuring order, one strip a direction, changes of set-up and file marked."""
     data, residual = found.data, deviation_percent(found.residual)
     along, shapes = directions(data), markers(data.setup)
@@ -229,7 +230,7 @@ def strips_png(found: Comparison) -> Drawing:
             f"{RESIDUAL_AXIS}, in measuring order; grey: {SIDES:g} standard deviations of scatter; "
             "dashed: another set-up or file",
         )
-        return drawing(figure)
+        return figure
 
 
 def _changes(axes: Axes, setup: NDArray[np.str_], file: NDArray[np.str_], named: bool) -> None:
@@ -260,7 +261,8 @@ def _name_far_off(axes: Axes, found: Comparison, axis: str, residual: FloatArray
         )  # fmt: skip
 
 
-def planes_png(found: Comparison) -> Drawing:
+@drawn
+def planes_png(found: Comparison) -> Figure:
     """PNG: mean residual by plane and direction, a signed percentage a cell with its standard error."""
     data = found.data
     along, where = directions(data), planes(data)
@@ -313,4 +315,4 @@ def planes_png(found: Comparison) -> Drawing:
             f"{RESIDUAL_AXIS} (red), blue: stiffer; bold: beyond {SIDES:g} standard errors"
             + ("" if near.all() else f"; without {count_of(int((~near).sum()), 'reading')} far off"),
         )
-        return drawing(figure)
+        return figure

@@ -16,8 +16,7 @@ from toolpath_stiff.report.figure import (
     MUTED,
     SECOND_ORANGE,
     UNREACHABLE_RED,
-    Drawing,
-    drawing,
+    drawn,
     house_style,
     new_figure,
 )
@@ -29,6 +28,7 @@ from toolpath_stiff.updating.inference.fits import deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from toolpath_stiff.updating.comparison import Comparison
     from toolpath_stiff.updating.comparison.residuals import Label, Variable
@@ -45,7 +45,8 @@ LINKS = (BLUE, LIGHT_BLUE)  # struts, alternating
 EFFECT = SECOND_ORANGE
 
 
-def variables_png(found: Comparison) -> Drawing:
+@drawn
+def variables_png(found: Comparison) -> Figure:
     """PNG: residual against each variable, the strongest first; readings far off stand at the edge."""
     limits = _limits(found)
     panels: list[tuple[float, str, Variable | Label]] = []
@@ -84,7 +85,7 @@ def variables_png(found: Comparison) -> Drawing:
             f"{RESIDUAL_AXIS}; lines: a direction's own trend; p: of the strongest pattern, corrected for all "
             "that were looked for; triangles: beyond the frame",
         )
-        return drawing(figure)
+        return figure
 
 
 def _about(test: Mapping[str, Any], name: str) -> bool:
@@ -175,7 +176,8 @@ def _brief(name: str) -> str:
     return name
 
 
-def load_path_png(found: Comparison) -> Drawing:
+@drawn
+def load_path_png(found: Comparison) -> Figure:
     """PNG: compliance of the tip along X, Y, Z, link by link, and what the measurements add or take."""
     shares = found.shares
     compliance = shares.compliance * NM_PER_N
@@ -203,7 +205,7 @@ def load_path_png(found: Comparison) -> Drawing:
             f"mean over {poses}; last bars: the model's sum and what was measured along that direction, with "
             f"{DEVIATION} of its stiffness, {MINUS_IS_SOFTER}",
         )
-        return drawing(figure)
+        return figure
 
 
 def _measured_over_modelled(found: Comparison, rows: NDArray[np.bool_]) -> float:

@@ -41,6 +41,7 @@ from toolpath_stiff.report.figure import (
     UNREACHABLE_RED,
     Drawing,
     drawing,
+    drawn,
     house_style,
     new_figure,
 )
@@ -57,7 +58,8 @@ MOST_PAIRS = 5  # of the ladder; all are in diagnose.json
 BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and arrows stand for more
 
 
-def ladder_png(document: Mapping[str, Any]) -> Drawing:
+@drawn
+def ladder_png(document: Mapping[str, Any]) -> Figure:
     """PNG: every explanation with its error at left-out points and its probability, best first."""
     rows = ladder_rows(document)
     height = 1.75 + ROW * len(rows)
@@ -87,7 +89,7 @@ def ladder_png(document: Mapping[str, Any]) -> Drawing:
         for y, row in enumerate(rows):
             if is_plausible(row, document):
                 shade.axhspan(y - 0.5, y + 0.5, color=CHOSEN, lw=0)
-        return drawing(figure)
+        return figure
 
 
 def ladder_rows(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -196,7 +198,8 @@ def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[s
         axes.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if is_offered(row, document) else MUTED)
 
 
-def confounding_png(document: Mapping[str, Any]) -> Drawing:
+@drawn
+def confounding_png(document: Mapping[str, Any]) -> Figure:
     """PNG: how alike the effects' signatures are on this design; effects that cannot be told apart stand in boxes."""
     from matplotlib.colors import to_rgb
 
@@ -214,7 +217,7 @@ def confounding_png(document: Mapping[str, Any]) -> Drawing:
         axes = figure.add_axes((left / width, 0.3 / height, wide / width, tall / height))
         if not names:
             _nothing(axes, "nothing to compare")
-            return drawing(figure)
+            return figure
         # Blue, the more opaque the more alike: on a dark page the cells of what is unlike are dark.
         cells = np.zeros((*matrix.shape, 4))
         cells[..., :3], cells[..., 3] = to_rgb(BLUE), np.clip(np.nan_to_num(matrix), 0.0, 1.0) ** 1.5
@@ -237,7 +240,7 @@ def confounding_png(document: Mapping[str, Any]) -> Drawing:
                 )  # fmt: skip
         for start, count in sets:
             axes.add_patch(_box(start - 0.5, count))
-        return drawing(figure)
+        return figure
 
 
 def _box(corner: float, count: int) -> Any:
@@ -286,7 +289,8 @@ def _chain(places: list[int], matrix: np.ndarray[Any, np.dtype[np.float64]]) -> 
     return chain
 
 
-def detectable_png(document: Mapping[str, Any]) -> Drawing:
+@drawn
+def detectable_png(document: Mapping[str, Any]) -> Figure:
     """PNG: the smallest size of each effect that these data would show, as the change of stiffness that it makes."""
     from matplotlib.ticker import LogLocator, NullLocator
 
@@ -308,7 +312,7 @@ def detectable_png(document: Mapping[str, Any]) -> Drawing:
         axes = figure.add_axes((3.6 / 14.0, 0.58 / height, 9.9 / 14.0, 1.0 - 1.55 / height))
         if not rows:
             _nothing(axes, "not computed")
-            return drawing(figure)
+            return figure
         sizes = [value for e in seen if (value := figure_of(e, "rms_percent") or 0.0) > 0.0] or [1.0]
         # From a tenth of a per cent to far beyond the readings: equal steps of the logarithm.
         start, reach = 0.7 * min(sizes), 4.0 * max(sizes)
@@ -337,7 +341,7 @@ def detectable_png(document: Mapping[str, Any]) -> Drawing:
         axes.grid(visible=False, axis="y")
         axes.spines[["top", "right"]].set_visible(False)
         axes.set_xlabel("change of stiffness that this size makes, rms over the readings, %")
-        return drawing(figure)
+        return figure
 
 
 def envelope_png(document: Mapping[str, Any]) -> Drawing | None:

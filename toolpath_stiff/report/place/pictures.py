@@ -12,7 +12,16 @@ from toolpath_stiff.analysis import Analysis
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.placement.document import FIGURES
-from toolpath_stiff.report.figure import BLUE, COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, png_bytes
+from toolpath_stiff.report.figure import (
+    BLUE,
+    COLOUR_MAP,
+    INK,
+    MUTED,
+    SECOND_ORANGE,
+    house_style,
+    new_figure,
+    picture,
+)
 from toolpath_stiff.report.profile import profile_curve
 from toolpath_stiff.report.words import machine_text, number, plain
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
@@ -24,7 +33,8 @@ if TYPE_CHECKING:
 AROUND = 0.06  # m of the workspace shown about the paths
 
 
-def front_picture(summary: dict[str, Any]) -> bytes:
+@picture
+def front_picture(summary: dict[str, Any]) -> Figure:
     """PNG of range against mean, coloured by the weakest place: the front, the chosen placement, the present one."""
     front, best, before = summary["front"], summary["chosen"], summary["before"]
     with house_style():
@@ -64,10 +74,11 @@ def front_picture(summary: dict[str, Any]) -> bytes:
         figure.text(0.12, 0.94, title, fontsize=14, weight="bold")
         text = f"machine {machine_text(summary)}   ·   load {summary['load']}   ·   objective {summary['objective']}"
         figure.text(0.12, 0.895, text, fontsize=10, color=MUTED)
-        return png_bytes(figure)
+        return figure
 
 
-def profiles_picture(best: Analysis, before: Analysis | None) -> bytes:
+@picture
+def profiles_picture(best: Analysis, before: Analysis | None) -> Figure:
     """PNG of stiffness along the path, before and after, on one axis, which plunges do not set."""
     with house_style():
         figure = new_figure(12.0, 5.0)
@@ -92,10 +103,11 @@ def profiles_picture(best: Analysis, before: Analysis | None) -> bytes:
         if plunges:
             text = f"plunges along the tool axis are left out: {number(min(plunges))} to {number(max(plunges))} N/mm"
             figure.text(0.08, 0.86, text, fontsize=10, color=MUTED)
-        return png_bytes(figure)
+        return figure
 
 
-def workspace_picture(best: Analysis, before: Analysis | None) -> bytes:
+@picture
+def workspace_picture(best: Analysis, before: Analysis | None) -> Figure:
     """PNG of the radial stiffness at the chosen height, with the path before and after."""
     paths = [a for a in (before, best) if a is not None]
     points = np.concatenate([a.samples.position[a.samples.cutting, :2] for a in paths])
@@ -125,7 +137,7 @@ def workspace_picture(best: Analysis, before: Analysis | None) -> bytes:
         bar.grid(visible=False)
         title = f"Workspace at z = {mm_from_m(height):.0f} mm, path before and after"
         figure.text(0.1, 0.93, title, fontsize=14, weight="bold")
-        return png_bytes(figure)
+        return figure
 
 
 RED = "#b3261e"

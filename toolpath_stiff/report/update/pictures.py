@@ -15,25 +15,25 @@ from toolpath_stiff.report.figure import (
     MUTED,
     SECOND_ORANGE,
     WITHIN,
-    Drawing,
-    drawing,
+    drawn,
     house_style,
     new_figure,
 )
 from toolpath_stiff.report.words import plain, shortened
 
 if TYPE_CHECKING:
-    pass
+    from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
 
 
+@drawn
 def error_ladder_png(
     steps: Sequence[Mapping[str, Any]],
     noise_floor_percent: float | None = None,
     title: str = "How the error falls",
     turned_down: Sequence[Mapping[str, Any]] = (),
-) -> Drawing:
+) -> Figure:
     """PNG: mean error from the first model to the last, in sample and at left-out points, with the noise floor.
 
     Parameters
@@ -103,7 +103,7 @@ def error_ladder_png(
         axes.grid(visible=False, axis="x")
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(frameon=False, ncol=3, loc="lower left", bbox_to_anchor=(-0.01, 1.0))
-        return drawing(figure)
+        return figure
 
 
 def _step_text(step: Mapping[str, Any]) -> str:
@@ -113,12 +113,13 @@ def _step_text(step: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+@drawn
 def figure3_png(
     bars_N_per_m: Sequence[float] | FloatArray,
     error_percent: Sequence[float] | FloatArray,
     printed_points: Sequence[tuple[float, float]] = (),
     refitted_percent: Sequence[float] | FloatArray = (),
-) -> Drawing:
+) -> Figure:
     """PNG of the paper's Figure 3: mean error against the stiffness of the platform's bars.
 
     Parameters
@@ -153,4 +154,4 @@ def figure3_png(
         axes.set_xlabel("stiffness of each platform bar, N/m")
         axes.set_ylabel("mean |modelled - measured| / measured, %")
         axes.legend(frameon=False)
-        return drawing(figure)
+        return figure

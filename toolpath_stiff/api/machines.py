@@ -1,0 +1,377 @@
+"""A machine by itself: stiffness at single poses and over planes of the workspace; slips in its file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from toolpath_stiff.api.inputs import FARTHEST_MM, STRONGEST_N, Machine, machine_from, positive, whole
+from toolpath_stiff.api.results import FolderResult, Progress, Result, counter
+from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.files import Content
+from toolpath_stiff.hints import command_line
+from toolpath_stiff.units import m_from_mm, rad_from_deg
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+
+    from toolpath_stiff.analysis.checks import MachineCheck as Findings
+    from toolpath_stiff.analysis.poses import PoseReport
+    from toolpath_stiff.analysis.poses import StiffnessMap as StiffnessGrid
+    from toolpath_stiff.stiffness.model import StiffnessModel
+
+FARTHEST = FARTHEST_MM  # mm and degrees of a pose
+MOST_POINTS = 2001  # along a side of a map
+
+
+class PoseStiffness(Result):
+    """Stiffness at poses: along X, Y, Z, in the softest and the stiffest direction, with strut lengths and margins."""
+
+    command: ClassVar[str] = "pose"
+
+    def __init__(self, model: StiffnessModel, poses: Any, found: PoseReport, *, single: bool) -> None:
+        from toolpath_stiff.report.machine import pose_columns
+
+        self.model, self.poses, self.found, self._single = model, poses, found, single
+        self.columns = pose_columns(poses, found)
+
+    @property
+    def reachable(self) -> Any:
+        """(n,) whether the machine can take the pose."""
+        return self.found.reach.reachable
+
+    @property
+    def warnings(self) -> list[str]:
+        """Effects that do not act here, for want of a set-up, a temperature or a tool."""
+        from toolpath_stiff.stiffness.model import condition_warnings
+
+        return condition_warnings(self.model)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a pose, the columns of `tps pose --csv`."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Of a single pose its figures; of several, a list of them under "poses", null where out of reach."""
+        from toolpath_stiff.stiffness.model import effects_stated
+
+        about = {"machine": self.model.machine.name, **effects_stated(self.model), "warnings": self.warnings}
+        rows = [_plain(row) for row in self.to_frame().to_dict("records")]
+        return {**about, **rows[0]} if self._single else {**about, "poses": rows}
+
+    def csv(self) -> str:
+        """The table as the command writes it."""
+        from toolpath_stiff.report.machine import pose_csv
+
+        return pose_csv(self.poses, self.found)
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.machine import pose_text
+
+        if not self._single:
+            return self.csv().rstrip("\n")
+        return pose_text(self.model, {name: column[0] for name, column in self.columns.items()}, self.found)
+
+    def _short(self) -> str:
+        name = self.model.machine.name
+        if not self._single:
+            return f"{len(self.reachable)} poses of {name}, {int(self.reachable.sum())} within reach"
+        soft, stiff = (f"{self.columns[f'{which}_N_per_mm'][0]:.0f}" for which in ("softest", "stiffest"))
+        return f"{name}, {soft} N/mm along the softest direction, {stiff} along the stiffest"
+
+
+def _plain(row: dict[Any, Any]) -> dict[str, Any]:
+    """A row for JSON: None for nan, Python's own numbers."""
+    plain = {name: value.item() if hasattr(value, "item") else value for name, value in row.items()}
+    found = {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in plain.items()}
+    return {**found, "extrapolated": bool(found["extrapolated"])}
+
+
+def pose(
+    machine: Machine | str | Path,
+    pose_mm_deg: ArrayLike,
+    *,
+    force_N: float = 1000.0,
+) -> PoseStiffness:
+    """Stiffness at a pose, or at many.
+
+    Parameters
+    ----------
+    machine
+        A machine, its name or its file.
+    pose_mm_deg
+        (3,) or (6,): X, Y, Z of the tool tip in mm, roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); or
+        (n, 3) or (n, 6) of these.
+    force_N
+        Size of the load, for effects that depend on it.
+
+    Raises
+    ------
+    UnreachableError
+        A single pose that the machine cannot take; of several, these have nan.
+    InputError
+        A pose of another shape or beyond reason.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.pose("nist", (-300, 300, 300, -30, 0, 0))
+    >>> round(found.to_dict()["kz_N_per_mm"])
+    18919
+    >>> tps.pose("nist", [(0, 0, 800), (0, 0, 5000)]).reachable.tolist()
+    [True, False]
+    """
+    import numpy as np
+
+    from toolpath_stiff.analysis.poses import evaluate_poses
+
+    on = machine_from(machine)
+    given = np.asarray(pose_mm_deg, dtype=float)
+    if given.ndim not in (1, 2) or given.shape[-1] not in (3, 6):
+        count = f"of {given.shape[0]} numbers" if given.ndim == 1 else f"of shape {given.shape}"
+        raise InputError(f"a pose {count}", expected="X Y Z or X Y Z A B C")
+    single = given.ndim == 1
+    rows = np.atleast_2d(given)
+    poses = np.concatenate([rows, np.zeros((len(rows), 6 - rows.shape[1]))], axis=1)
+    if not np.abs(poses).max(initial=0.0) <= FARTHEST:
+        raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected=f"numbers within +-{FARTHEST:g}")
+    model = on.running()
+    force = positive("force", force_N, "N", STRONGEST_N)
+    found = evaluate_poses(model, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force)
+    if single and not found.reach.reachable[0]:
+        raise UnreachableError(
+            f"the pose is out of reach on machine {on.name}: {found.reach.describe(0)}",
+            hint=f"`{command_line('machine', 'show', on.asked)}` lists the limits",
+        )
+    return PoseStiffness(model, poses, found, single=single)
+
+
+class StiffnessMap(FolderResult):
+    """Stiffness over planes of the workspace.
+
+    Attributes
+    ----------
+    grid
+        The grid and the stiffness on it, arrays in SI.
+    """
+
+    command: ClassVar[str] = "map"
+
+    def __init__(self, machine: Machine, model: StiffnessModel, grid: StiffnessGrid) -> None:
+        from toolpath_stiff.report.map import map_summary
+
+        self.model, self.grid, self.inputs = model, grid, machine.inputs
+        self._document = map_summary(model, grid)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return self._document
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
+        import pandas as pd
+
+        from toolpath_stiff.report.map import map_columns
+
+        return pd.concat([pd.DataFrame(columns) for columns in map_columns(self.grid)], ignore_index=True)
+
+    def plot(self) -> Figure:
+        """Contours over each plane."""
+        from toolpath_stiff.report.map import map_picture
+
+        return map_picture.figure(self.model.machine, self.grid)
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.map import text
+
+        return text(self._document)
+
+    def _short(self) -> str:
+        return f"{self.model.machine.name}, load {self.grid.load}, {self.grid.stiffness.size} points"
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """Name -> content of each file that `save` writes."""
+        from toolpath_stiff.report.map import files
+
+        return files(self.model, self.grid, self._document, plots=plots)
+
+
+def map_stiffness(
+    machine: Machine | str | Path,
+    *,
+    x_mm: tuple[float, float] = (-150.0, 150.0),
+    y_mm: tuple[float, float] = (-150.0, 150.0),
+    z_mm: float | Sequence[float] = 1200.0,
+    load: str = "radial",
+    tilt_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    points: int = 61,
+    force_N: float = 1000.0,
+    progress: Progress | None = None,
+) -> StiffnessMap:
+    """Stiffness over one or several horizontal planes.
+
+    Parameters
+    ----------
+    machine
+        A machine, its name or its file.
+    x_mm, y_mm
+        (low, high) of the planes.
+    z_mm
+        Height, or heights.
+    load
+        Direction of the load: radial, axial, softest, x, y, z or "DX,DY,DZ".
+    tilt_deg
+        Roll, pitch, yaw of the platform.
+    points
+        Grid points along the longer side.
+    force_N
+        Size of the load, for effects that depend on it.
+    progress
+        Called with what is being done, poses done, poses in all.
+
+    Raises
+    ------
+    InputError
+        The load needs a path, or a plane has no extent.
+    UnreachableError
+        Nothing of the planes can be reached.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.map_stiffness("nist", z_mm=1200, points=21)
+    >>> found
+    <StiffnessMap: nist, load radial, 441 points>
+    >>> found.to_dict()["slices"][0]["circle"]["maxima_deg"]
+    [60.27, 180.27, 300.27]
+    """
+    from toolpath_stiff.analysis.loads import parse_load
+    from toolpath_stiff.analysis.poses import map_stiffness as evaluate_grid
+
+    on = machine_from(machine)
+    heights = sorted([float(z_mm)] if isinstance(z_mm, int | float) else [float(z) for z in z_mm])
+    if len(set(heights)) < len(heights):
+        raise InputError(f"heights {heights}: one appears twice", expected="each height once")
+    if not max(abs(v) for v in (*x_mm, *y_mm, *heights)) <= FARTHEST_MM:
+        raise InputError("a map beyond 100 m", expected="mm")
+    model = on.running()
+    a, b, c = (rad_from_deg(float(v)) for v in tilt_deg)
+    x, y = ((m_from_mm(float(low)), m_from_mm(float(high))) for low, high in (x_mm, y_mm))
+    grid = evaluate_grid(
+        model,
+        x,
+        y,
+        [m_from_mm(z) for z in heights],
+        parse_load(load),
+        whole("points", points, 2, MOST_POINTS),
+        (a, b, c),
+        positive("force", force_N, "N", STRONGEST_N),
+        counter(progress, "map: poses"),
+    )
+    return StiffnessMap(on, model, grid)
+
+
+class MachineCheck(Result):
+    """Whether a machine file is plausible.
+
+    Attributes
+    ----------
+    found
+        What cannot be right, what is doubtful, the machine at its neutral pose and default origin.
+    """
+
+    command: ClassVar[str] = "machine"
+
+    def __init__(self, machine: Machine, model: StiffnessModel, found: Findings) -> None:
+        self.machine, self.model, self.found = machine, model, found
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing is wrong."""
+        return self.found.good
+
+    @property
+    def warnings(self) -> list[str]:
+        """Effects that do not act on a program as the file stands."""
+        from toolpath_stiff.stiffness.model import condition_warnings
+
+        return condition_warnings(self.model)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        from toolpath_stiff.stiffness.model import effects_stated
+
+        return {
+            "file": self.machine.asked,
+            "machine": self.machine.name,
+            "good": self.good,
+            "wrong": list(self.found.wrong),
+            "doubtful": list(self.found.doubtful),
+            **effects_stated(self.model),
+            "warnings": self.warnings,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a finding: severity (wrong, doubtful, warning), text."""
+        import pandas as pd
+
+        kinds = (("wrong", self.found.wrong), ("doubtful", self.found.doubtful), ("warning", self.warnings))
+        rows = [(severity, text) for severity, texts in kinds for text in texts]
+        return pd.DataFrame(rows, columns=["severity", "text"])
+
+    def plot(self) -> Figure:
+        """The machine at its neutral pose from three sides, doubtful joints marked."""
+        from toolpath_stiff.report.machine import machine_views
+
+        return machine_views.figure(*self._views())
+
+    def picture(self) -> bytes:
+        """The same as a PNG."""
+        from toolpath_stiff.report.machine import machine_views
+
+        return machine_views(*self._views())
+
+    def _views(self) -> tuple[Any, ...]:
+        import numpy as np
+
+        from toolpath_stiff.machine.kinematics import solve_struts_at
+
+        machine = self.model.machine
+        pose = np.array(machine.limits.neutral_pose)
+        marked = tuple((stray.body, stray.joint) for stray in self.found.symmetry.strays)
+        return machine, pose, solve_struts_at(machine, pose), marked
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.machine import check_text
+
+        return check_text(self.machine.asked, self.model, self.found)
+
+    def _short(self) -> str:
+        return f"{self.machine.name}, {len(self.found.wrong)} wrong, {len(self.found.doubtful)} doubtful"
+
+
+def check_machine(machine: Machine | str | Path) -> MachineCheck:
+    """Look for slips in a machine's figures: units, signs, mirrored joints; what its effects wait for.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read as a machine at all.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.Machine.load("nist").check().good
+    True
+    """
+    from toolpath_stiff.analysis.checks import check_machine as look
+
+    on = machine_from(machine)
+    model = on.running()
+    return MachineCheck(on, model, look(model))

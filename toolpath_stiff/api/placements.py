@@ -1,0 +1,472 @@
+"""Where the work should sit: the search, the program written for a placement, the paper's four regions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from toolpath_stiff.api.inputs import (
+    FARTHEST_MM,
+    LONGEST_STEP_MM,
+    STRONGEST_N,
+    Machine,
+    Program,
+    machine_from,
+    pose_si,
+    positive,
+    program_from,
+    whole,
+)
+from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import Content
+from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from toolpath_stiff.machine.model import Machine as MachineModel
+    from toolpath_stiff.placement.case_study import CaseStudy as Study
+    from toolpath_stiff.placement.climb import Bounds
+    from toolpath_stiff.placement.placing import Placed, Rewriting
+
+FARTHEST_TURN_DEG = 720.0
+LONGEST_CHORD_MM = 10.0
+MOST_FRONT_POINTS = 1000
+LARGEST_MARGIN_PERCENT = 50.0
+Range = tuple[float, float] | float
+
+
+@dataclass(frozen=True)
+class KeepOut:
+    """A box that the tool tip stays out of, rapids included: its name, two corners in machine coordinates, mm."""
+
+    name: str
+    low_mm: tuple[float, float, float]
+    high_mm: tuple[float, float, float]
+
+
+class Placement(FolderResult):
+    """A program at the placement that was chosen for it, and the others of the front.
+
+    Attributes
+    ----------
+    placed
+        The search, the analyses before and at the chosen placement, in SI.
+    """
+
+    command: ClassVar[str] = "place"
+
+    def __init__(self, placed: Placed, inputs: tuple[str, ...]) -> None:
+        self.placed, self.inputs = placed, inputs
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return self.placed.summary
+
+    @property
+    def origin_mm_deg(self) -> tuple[float, ...]:
+        """The chosen placement: what `analyze` takes as `origin_mm_deg`."""
+        return self._at(self.placed.summary["chosen"])
+
+    @property
+    def worse(self) -> list[dict[str, Any]]:
+        """What is worse there than at the present placement, and by how much."""
+        return list(self.placed.summary["worse"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What deserves a look, what gets worse first."""
+        return list(self.placed.summary["warnings"])
+
+    @property
+    def program_bytes(self) -> bytes:
+        """The program written for the placement; it was asked for with `write`."""
+        if self.placed.rewritten is None:
+            raise InputError("the program was not written for the placement", hint="ask for it with write=FILE")
+        return self.placed.rewritten
+
+    @staticmethod
+    def _at(row: Mapping[str, Any]) -> tuple[float, ...]:
+        from toolpath_stiff.placement.document import PLACEMENT
+
+        return tuple(float(row[name]) for name in PLACEMENT)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The front, one placement a row, as in `placements.csv`."""
+        import pandas as pd
+
+        return pd.DataFrame(self.placed.summary["front"])
+
+    def plot(self) -> Figure:
+        """The front: mean against range, the chosen and the present placement marked."""
+        from toolpath_stiff.report.place.pictures import front_picture
+
+        return front_picture.figure(self.placed.summary)
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.place import text
+
+        return text(self.placed.summary)
+
+    def _short(self) -> str:
+        words = [f"{axis}{value:.6g}" for axis, value in zip("XYZABC", self.origin_mm_deg, strict=True)]
+        return f"{self.placed.program.name}, {' '.join(words)} of {len(self.placed.summary['front'])} placements"
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """Name -> content of each file that `save` writes."""
+        from toolpath_stiff.report.place import files
+
+        return files(self.placed, plots=plots)
+
+
+def place(
+    machine: Machine | str | Path,
+    program: Program | str | Path,
+    *,
+    x_mm: Range | None = None,
+    y_mm: Range | None = None,
+    z_mm: Range | None = None,
+    z_values_mm: Sequence[float] = (),
+    rotate_deg: Range = (0.0, 360.0),
+    tilt_a_deg: Range = 0.0,
+    tilt_b_deg: Range = 0.0,
+    keep_out: Iterable[KeepOut] = (),
+    margin_percent: float = 1.0,
+    allow_extrapolation: bool = False,
+    objective: str = "balanced",
+    points: int = 60,
+    seed: int = 1,
+    pick: int | None = None,
+    earlier: Placement | str | Path | Mapping[str, Any] | None = None,
+    origin_mm_deg: Sequence[float] | None = None,
+    load: str = "tangential",
+    step_mm: float = 1.0,
+    force_N: float = 1000.0,
+    write: str | Path | None = None,
+    decimals: int | None = None,
+    linearise_mm: float | None = None,
+    progress: Progress | None = None,
+) -> Placement:
+    r"""Search where the work should sit, or take another point of an earlier search.
+
+    Parameters
+    ----------
+    machine, program
+        What it runs on, what runs.
+    x_mm, y_mm, z_mm, rotate_deg, tilt_a_deg, tilt_b_deg
+        (low, high) of what may vary of program zero's position and the set-up's turn, or a number to fix it; None: as
+        far as the machine reaches.
+    z_values_mm
+        The only heights that there are; instead of `z_mm`.
+    keep_out
+        Boxes that the tool tip stays out of.
+    margin_percent
+        Share of each limit's span that cuts and rapids keep from it.
+    allow_extrapolation
+        Whether struts may leave the lengths of their law at more samples than now.
+    objective
+        "balanced" (mean - range), "mean", "range" or "weakest"; whatever it is, none of mean, range and weakest gets
+        worse where that can be avoided.
+    points, seed
+        Most points of the front; seed of the search.
+    pick, earlier
+        Take this point (its `number`) of the front of an earlier search, without searching again; that search as its
+        result, its document or the file `placement.json`. Everything else has to be as it was.
+    origin_mm_deg
+        The present placement; unless given, as `analyze` takes it.
+    load, step_mm, force_N
+        As of `analyze`.
+    write, decimals, linearise_mm
+        Write the program itself for the placement, under this file's name, with so many decimals, arcs that the turn
+        takes out of the planes as straight moves within so much; `program_bytes` has it.
+    progress
+        Called with what is being done, how much of it is done, how much there is.
+
+    Raises
+    ------
+    InputError
+        The program cannot be placed, or not be written there.
+    UnreachableError
+        No placement keeps the limits.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> found = tps.place("nist", slot, x_mm=(-50, 50), y_mm=0, z_mm=(700, 800), rotate_deg=0, step_mm=10)
+    >>> found.worse
+    []
+    """
+    from toolpath_stiff.analysis.loads import parse_load
+    from toolpath_stiff.placement.evaluator import Keepout
+    from toolpath_stiff.placement.placing import Task, place_again, place_program
+    from toolpath_stiff.placement.search import SearchRules
+
+    on, part = machine_from(machine), program_from(program)
+    if write is None and (decimals is not None or linearise_mm is not None):
+        option = "decimals" if decimals is not None else "linearise"
+        raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
+    if not 0.0 <= margin_percent < LARGEST_MARGIN_PERCENT:
+        raise InputError(f"margin {margin_percent:g} %", expected=f"0 to less than {LARGEST_MARGIN_PERCENT:g} per cent")
+    whole("points", points, 2, MOST_FRONT_POINTS)
+    whole("seed", seed, 0)
+    model = on.running(part.controller)
+    default = model.machine.default_origin
+    asked: Pose | None = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
+    read = part.moves(asked, default)
+    task = Task(
+        model=model,
+        program=read,
+        present=asked or (read.origin if read.origin_source == "program" else default),
+        read=lambda origin: part.moves(origin, default),
+        bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
+        rules=SearchRules(
+            objective=one_of("objective", objective, OBJECTIVES),
+            margin=margin_percent / 100.0,
+            allow_extrapolation=allow_extrapolation,
+            keepouts=tuple(
+                Keepout(box.name, _corner(box.low_mm), _corner(box.high_mm)) for box in map(_checked_box, keep_out)
+            ),
+            seed=seed,
+            points=points,
+        ),
+        load=parse_load(load),
+        step=m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
+        force=positive("force", force_N, "N", STRONGEST_N),
+        rewriting=None if write is None else _rewriting(part, str(write), decimals, linearise_mm),
+    )
+    if pick is None:
+        placed = place_program(task, counter(progress, f"{part.name}: search"))
+    else:
+        placed = place_again(task, _earlier(earlier), pick)
+    return Placement(placed, (*part.inputs, *on.inputs))
+
+
+OBJECTIVES = ("balanced", "mean", "range", "weakest")
+
+
+def _corner(corner_mm: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (m_from_mm(float(v)) for v in corner_mm)
+    return x, y, z
+
+
+def _checked_box(box: KeepOut) -> KeepOut:
+    for low, high, axis in zip(box.low_mm, box.high_mm, "XYZ", strict=True):
+        if low >= high:
+            raise InputError(f"keep-out {box.name}: {axis}1 = {high:g} is not above {axis}0 = {low:g}")
+    return box
+
+
+def _rewriting(part: Program, file: str, decimals: int | None, linearise_mm: float | None) -> Rewriting:
+    from toolpath_stiff.placement.placing import Rewriting
+
+    chord = None
+    if linearise_mm is not None:
+        chord = m_from_mm(positive("linearise", linearise_mm, "mm", LONGEST_CHORD_MM))
+    return Rewriting(file, decimals, chord, part.read_as)
+
+
+def _earlier(earlier: Placement | str | Path | Mapping[str, Any] | None) -> dict[str, Any]:
+    """The document of an earlier search."""
+    from toolpath_stiff.files import read_text
+
+    if isinstance(earlier, Placement):
+        return earlier.to_dict()
+    if isinstance(earlier, Mapping):
+        return dict(earlier)
+    if earlier is None:
+        raise InputError("--pick without an earlier search", hint="search first, without --pick")
+    file = Path(earlier)
+    if not file.exists():
+        raise InputError(
+            f"--pick: there is no earlier search in {file.parent} (no {file.name})",
+            hint="search first, without --pick, or name the search's folder with --out",
+        )
+    try:
+        found = json.loads(read_text(file, "the earlier search"))
+    except ValueError as error:
+        raise InputError(f"--pick: {file} is no JSON: {error}", hint="search again, without --pick") from None
+    if not isinstance(found, dict):
+        raise InputError(f"--pick: {file} is no result of a search", hint="search again, without --pick")
+    return found
+
+
+def _bounds(
+    machine: MachineModel, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
+) -> Bounds:
+    """What may vary, in SI; where nothing is said, the machine's workspace."""
+    import numpy as np
+
+    from toolpath_stiff.placement.climb import Bounds
+
+    heights = sorted(set(map(float, heights_mm)))
+    asked = [None if one is None else _pair(one) for one in box]
+    if heights:
+        asked[2] = (heights[0], heights[-1])
+    low, high = (mm_from_m(corner) for corner in machine.limits.workspace)
+    sides = []
+    for name, side, lo, hi in zip("xyz", asked, low, high, strict=True):
+        if side is None and not np.isfinite(hi - lo):
+            raise InputError(f"the machine file bounds no workspace in {name}", hint=f"give --{name} LO:HI")
+        sides.append(side if side is not None else (float(lo), float(hi)))
+    if not max(abs(v) for side in sides for v in side) <= FARTHEST_MM:
+        raise InputError("bounds beyond 100 m", expected="mm")
+    angles = [_pair(turn) for turn in turns]
+    if not max(abs(v) for pair in angles for v in pair) <= FARTHEST_TURN_DEG:
+        raise InputError(f"a turn or tilt beyond {FARTHEST_TURN_DEG:g} degrees", expected="at most two whole turns")
+    ends = [[*(m_from_mm(s[end]) for s in sides), *(rad_from_deg(t[end]) for t in angles)] for end in (0, 1)]
+    return Bounds(np.array(ends[0]), np.array(ends[1]), tuple(m_from_mm(z) for z in heights))
+
+
+def _pair(given: Range) -> tuple[float, float]:
+    low, high = (given, given) if isinstance(given, int | float) else given
+    if low > high:
+        raise InputError(f"bounds {low:g} to {high:g}", expected="the lower bound first")
+    return float(low), float(high)
+
+
+class RewrittenProgram(Result):
+    """A program written for another placement.
+
+    Attributes
+    ----------
+    name, content, notes
+        The program's name, the new file's bytes, what the user should hear of.
+    """
+
+    command: ClassVar[str] = "place"
+
+    def __init__(self, name: str, content: bytes, encoding: str, notes: Sequence[str]) -> None:
+        self.name, self.content, self.encoding, self.notes = name, content, encoding, list(notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return {"program": self.name, "text": self.content.decode(self.encoding), "notes": self.notes}
+
+    def __str__(self) -> str:
+        return self.content.decode(self.encoding)
+
+    def _short(self) -> str:
+        return f"{self.name}, {len(str(self).splitlines())} lines"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the program, whole or not at all."""
+        from toolpath_stiff.files import write_atomically
+
+        return write_atomically(file, self.content)
+
+
+def rewrite(
+    program: Program | str | Path,
+    *,
+    to_mm_deg: Sequence[float],
+    from_mm_deg: Sequence[float] = (0.0, 0.0, 0.0),
+    decimals: int | None = None,
+    linearise_mm: float | None = None,
+) -> RewrittenProgram:
+    r"""Write a program so that, run where its zero sits now, it does what it would do untouched at another placement.
+
+    Parameters
+    ----------
+    program
+        A program, or its file.
+    to_mm_deg, from_mm_deg
+        Where program zero is to sit in effect, and where it sits: X, Y, Z or X, Y, Z, A, B, C.
+    decimals
+        Of the numbers written; unless given, 4 in mm and degrees, 5 in inch.
+    linearise_mm
+        Write arcs that the turn takes out of the planes as straight moves within this; unless given they are refused.
+
+    Raises
+    ------
+    InputError
+        A block cannot be expressed there, with its line and the reason.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> print(tps.rewrite(slot, to_mm_deg=(10, 0, 0)), end="")
+    G21 G90
+    G0 X10 Y0 Z5
+    G1 Z0 F300
+    G1 X50
+    M2
+    """
+    from toolpath_stiff.rewriting import rewrite_program
+
+    part = program_from(program)
+    new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
+    chord = None if linearise_mm is None else m_from_mm(positive("linearise", linearise_mm, "mm", LONGEST_CHORD_MM))
+    written = rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
+    return RewrittenProgram(part.name, written.content, written.encoding, written.notes)
+
+
+class CaseStudy(FolderResult):
+    """One tool path in the paper's four regions: its conclusions checked one by one, and where they stop holding."""
+
+    command: ClassVar[str] = "case-study"
+
+    def __init__(self, study: Study, inputs: tuple[str, ...]) -> None:
+        self.study, self.inputs = study, inputs
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return self.study.summary
+
+    def to_frame(self) -> pd.DataFrame:
+        """The regions, one a row."""
+        import pandas as pd
+
+        return pd.DataFrame(self.study.summary["regions"])
+
+    def plot(self) -> Figure:
+        """The path in its regions, coloured by stiffness."""
+        from toolpath_stiff.report.case_study import regions_picture
+
+        return regions_picture.figure(self.study)
+
+    def __str__(self) -> str:
+        from toolpath_stiff.placement.case_study import study_text
+
+        return study_text(self.study)
+
+    def _short(self) -> str:
+        held = [one["holds"] for one in self.study.summary["conclusions"]]
+        return f"{self.study.summary['machine']}, {sum(held)} of {len(held)} conclusions of the paper hold"
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """Name -> content of each file that `save` writes."""
+        from toolpath_stiff.report.case_study import files
+
+        return files(self.study, plots=plots)
+
+
+def case_study(machine: Machine | str | Path = "nist") -> CaseStudy:
+    """The paper's four regions: one tool path at two heights, displaced and turned (its Figure 10).
+
+    Parameters
+    ----------
+    machine
+        A machine, its name or its file.
+
+    Raises
+    ------
+    UnreachableError
+        The machine cannot reach a region; these are the reference machine's.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.case_study("nist")
+    <CaseStudy: nist, 3 of 3 conclusions of the paper hold>
+    """
+    from toolpath_stiff.placement.case_study import run_case_study
+
+    on = machine_from(machine)
+    return CaseStudy(run_case_study(on.running()), on.inputs)

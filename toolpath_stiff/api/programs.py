@@ -1,0 +1,437 @@
+"""A program on a machine: its stiffness along the path, what it uses and leaves out, its sampled path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from toolpath_stiff.api.inputs import (
+    LONGEST_STEP_MM,
+    STRONGEST_N,
+    Machine,
+    Program,
+    machine_from,
+    pose_si,
+    positive,
+    program_from,
+)
+from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import Content
+from toolpath_stiff.units import (
+    Pose,
+    m_from_mm,
+    m_per_s_from_mm_per_min,
+    n_per_m_from_n_per_mm,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from toolpath_stiff.analysis import Analysis as PathAnalysis
+    from toolpath_stiff.path import Samples
+
+FASTEST_STRUT_MM_PER_MIN = 1e6
+STIFFEST_N_PER_MM = 1e7
+TABLES = ("csv", "parquet")
+
+
+class Analysis(FolderResult):
+    """Stiffness along the path of a program, under a load at every sample of a cut.
+
+    Attributes
+    ----------
+    path
+        The samples and what was found at each, as arrays in SI.
+    on_other
+        The same on the machine compared with; None without one.
+    """
+
+    command: ClassVar[str] = "analyze"
+
+    def __init__(
+        self,
+        path: PathAnalysis,
+        *,
+        on_other: PathAnalysis | None = None,
+        required: float | None = None,
+        inputs: tuple[str, ...] = (),
+    ) -> None:
+        self.path, self.on_other, self._required, self.inputs = path, on_other, required, inputs
+
+    @cached_property
+    def _document(self) -> dict[str, Any]:
+        from toolpath_stiff.report.analysis import summary_with_options
+
+        return summary_with_options(self.path, self._required, self.on_other)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return self._document
+
+    @property
+    def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
+        """Mean stiffness over the length of the cuts, plunges along the tool axis left out."""
+        return float(self._document["mean_N_per_mm"])
+
+    @property
+    def min_N_per_mm(self) -> float:  # noqa: N802
+        """The smallest stiffness of these cuts."""
+        return float(self._document["min_N_per_mm"])
+
+    @property
+    def range_N_per_mm(self) -> float:  # noqa: N802
+        """The largest less the smallest."""
+        return float(self._document["range_N_per_mm"])
+
+    @property
+    def weakest(self) -> dict[str, Any]:
+        """Where the smallest stiffness is: line, position, direction."""
+        return dict(self._document["weakest"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What deserves a look."""
+        return list(self._document["warnings"])
+
+    @property
+    def assumptions(self) -> list[str]:
+        """What was assumed or recovered rather than published or given."""
+        return list(self._document["assumptions"])
+
+    @property
+    def complete(self) -> bool:
+        """Whether every sample of a cut is within reach."""
+        return not self._document["out_of_reach_samples"]
+
+    @property
+    def below_required(self) -> list[tuple[int, float]]:
+        """(line, smallest stiffness in N/mm) of cuts below what was required, weakest first."""
+        from toolpath_stiff.analysis.results import required_stiffness_missed
+
+        return [] if self._required is None else required_stiffness_missed(self.path, self._required)
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.analysis import text
+
+        other = None if self.on_other is None else self.on_other.summary()
+        return text(self._document, self.path.program.source, other)
+
+    def _short(self) -> str:
+        found = self._document
+        mean, low = (f"{found[name]:,.0f}".replace(",", " ") for name in ("mean_N_per_mm", "min_N_per_mm"))
+        return f"{found['program']} on {found['machine']}, mean {mean} N/mm, min {low} N/mm"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The samples, columns as in `samples.csv`."""
+        return self.path.to_frame()
+
+    def plot(self, *, show_plunges: bool = False) -> Figure:
+        """The path in three views, coloured by stiffness; with `show_plunges` these set axes and colours too."""
+        from toolpath_stiff.report.analysis.path import path_picture
+
+        return path_picture.figure(self.path, show_plunges=show_plunges)
+
+    def plot_profile(self, *, show_plunges: bool = False) -> Figure:
+        """Stiffness along the path."""
+        from toolpath_stiff.report.profile import profile_picture
+
+        return profile_picture.figure(
+            self.path, other=self.on_other, required=self._required, show_plunges=show_plunges
+        )
+
+    def files(
+        self, *, plots: bool = True, table: str = "csv", show_plunges: bool = False
+    ) -> Mapping[str, Content | Callable[[], Content]]:
+        """The files of `tps analyze`; samples as "csv" or "parquet"."""
+        from toolpath_stiff.report.analysis import files
+
+        return files(
+            self.path,
+            plots=plots,
+            table=one_of("table", table, TABLES),  # type: ignore[arg-type]
+            required=self._required,
+            other=self.on_other,
+            show_plunges=show_plunges,
+        )
+
+
+def analyze(
+    machine: Machine | str | Path,
+    program: Program | str | Path,
+    *,
+    origin_mm_deg: Sequence[float] | None = None,
+    load: str = "tangential",
+    step_mm: float = 1.0,
+    force_N: float = 1000.0,
+    partial: bool = False,
+    require_N_per_mm: float | None = None,
+    compare_with: Machine | str | Path | None = None,
+    progress: Progress | None = None,
+) -> Analysis:
+    r"""Stiffness along the path of a program.
+
+    Parameters
+    ----------
+    machine, program
+        What it runs on, what runs; names and files are loaded.
+    origin_mm_deg
+        Where program zero (G54) sits in machine coordinates: X, Y, Z or X, Y, Z, A, B, C. Unless given, where the
+        program's G10 says, else the machine's default.
+    load
+        Direction of the load: tangential, axial, normal, softest, radial, x, y, z or "DX,DY,DZ".
+    step_mm
+        Largest distance of two samples.
+    force_N
+        Size of the load: for deflections, and for effects that depend on it.
+    partial
+        Keep the reachable samples of a program that leaves the workspace.
+    require_N_per_mm
+        Stiffness that every cut must have; `below_required` lists those that have not.
+    compare_with
+        Another machine to analyse the program on.
+    progress
+        Called with what is being done, samples done, samples in all.
+
+    Raises
+    ------
+    InputError
+        Something in a file or an argument is wrong: where, what was found, what was expected.
+    UnreachableError
+        A sample of a cut is out of reach, and `partial` is not set.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> found = tps.analyze("nist", slot, origin_mm_deg=(0, 0, 800))
+    >>> found
+    <Analysis: slot.nc on nist, mean 54 353 N/mm, min 53 875 N/mm>
+    >>> found.to_frame()[["line", "x_mm", "stiffness_N_per_mm"]].tail(1).round(0).values.tolist()
+    [[4.0, 40.0, 53875.0]]
+    """
+    from toolpath_stiff.analysis import analyse
+
+    first, part = machine_from(machine), program_from(program)
+    second = None
+    if compare_with is not None:
+        second = compare_with if isinstance(compare_with, Machine) else first.like(compare_with)
+    options: dict[str, Any] = {
+        "origin": None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
+        "load": load,
+        "step": m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
+        "force": positive("force", force_N, "N", STRONGEST_N),
+        "partial": partial,
+    }
+    required = None
+    if require_N_per_mm is not None:
+        required = n_per_m_from_n_per_mm(positive("required", require_N_per_mm, "N/mm", STIFFEST_N_PER_MM))
+
+    def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> PathAnalysis:
+        model = one.running(part.controller, [other] if other else [])
+        read = part.moves(options["origin"], model.machine.default_origin)
+        return analyse(model, read, progress=told, **options)
+
+    path = on(first, second, counter(progress, f"{part.name}: samples"))
+    return Analysis(
+        path,
+        on_other=None if second is None else on(second, first, None),
+        required=required,
+        inputs=(*part.inputs, *first.inputs, *(second.inputs if second else ())),
+    )
+
+
+class SampledPath(Result):
+    """The sampled path of a program, without a machine.
+
+    Attributes
+    ----------
+    samples
+        Arrays in SI.
+    name, warnings, unsupported
+        The program's; what deserves a look; "line:column: word: reason" of what was not acted upon.
+    """
+
+    command: ClassVar[str] = "path"
+
+    def __init__(self, name: str, samples: Samples, warnings: Sequence[str], unsupported: Sequence[str]) -> None:
+        self.name, self.samples = name, samples
+        self.warnings, self.unsupported = list(warnings), list(unsupported)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        columns = self.to_frame()
+        return {
+            "program": self.name,
+            "warnings": self.warnings,
+            "unsupported": self.unsupported,
+            **{str(name): columns[name].astype(object).where(columns[name].notna(), None).tolist() for name in columns},
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """The samples, one a row."""
+        import pandas as pd
+
+        from toolpath_stiff.path import path_columns
+
+        return pd.DataFrame(path_columns(self.samples))
+
+    def csv(self) -> Any:
+        """The table as the command writes it, in pieces of bytes."""
+        from toolpath_stiff.column_files import csv_pieces
+        from toolpath_stiff.path import PATH_COLUMNS, path_columns
+
+        return csv_pieces(partial(path_columns, self.samples), len(self.samples), PATH_COLUMNS)
+
+    def __str__(self) -> str:
+        return b"".join(self.csv()).decode()
+
+    def _short(self) -> str:
+        return f"{self.name}, {len(self.samples)} samples"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the table as CSV, whole or not at all."""
+        from toolpath_stiff.files import write_atomically
+
+        return write_atomically(file, self.csv())
+
+
+def sample_path(
+    program: Program | str | Path, *, origin_mm_deg: Sequence[float] | None = None, step_mm: float = 1.0
+) -> SampledPath:
+    r"""The tool's path, sampled along its true shape.
+
+    Parameters
+    ----------
+    program
+        A program, or its file.
+    origin_mm_deg
+        Where program zero sits; unless given, where the program's G10 says, else 0.
+    step_mm
+        Largest distance of two samples; every move has samples at both of its ends.
+
+    Raises
+    ------
+    InputError
+        The program cannot be read.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> tps.sample_path(slot, step_mm=10).to_frame()[["motion", "x_mm", "z_mm"]].tail(2).values.tolist()
+    [['feed', 30.0, 0.0], ['feed', 40.0, 0.0]]
+    """
+    from toolpath_stiff.path import place, sample_moves
+
+    part = program_from(program)
+    asked: Pose | None = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
+    step = m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM))
+    read = part.moves(asked)
+    origin = asked or read.origin
+    samples = sample_moves(place(read.moves, origin), step=step, origin=origin)
+    left = [f"{read.name}:{word.line}:{word.column}: {word.word}: {word.reason}" for word in read.unsupported]
+    return SampledPath(read.name, samples, read.warnings, left)
+
+
+class ProgramCheck(Result):
+    """What a program uses, what is not understood, extents, times, and what a machine says to it."""
+
+    command: ClassVar[str] = "check"
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self._document = document
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        return self._document
+
+    @property
+    def findings(self) -> list[dict[str, Any]]:
+        """What was found: line, column, subject, text, severity."""
+        return list(self._document["findings"])
+
+    @property
+    def errors(self) -> list[dict[str, Any]]:
+        """The findings that keep the program from running as it stands."""
+        from toolpath_stiff.nc.checking import ERROR
+
+        return [one for one in self.findings if one["severity"] == ERROR]
+
+    def to_frame(self) -> pd.DataFrame:
+        """The findings, one a row."""
+        import pandas as pd
+
+        return pd.DataFrame(self.findings, columns=["line", "column", "code", "text", "severity", "count"])
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.check import text
+
+        return text(self._document)
+
+    def _short(self) -> str:
+        count = len(self.errors)
+        return f"{self._document['program']}, {count or 'no'} error{'' if count == 1 else 's'}"
+
+
+def check(
+    program: Program | str | Path,
+    machine: Machine | str | Path | None = "nist",
+    *,
+    origin_mm_deg: Sequence[float] | None = None,
+    step_mm: float = 1.0,
+    strut_speed_mm_per_min: float | None = None,
+) -> ProgramCheck:
+    r"""What a program uses, what is not understood, extents and times; with a machine its reach and strut speeds.
+
+    Where the reader would refuse the program the check says so and goes on with the next block.
+
+    Parameters
+    ----------
+    program, machine
+        The program, or its file; the machine, None for none.
+    origin_mm_deg
+        Where program zero sits.
+    step_mm
+        Largest distance of the samples at which the machine is asked.
+    strut_speed_mm_per_min
+        Speed of a strut above which a cut is a finding.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read at all, or a speed is given without a machine.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
+    >>> [(one["line"], one["severity"]) for one in found.errors]
+    [(3, 'error')]
+    """
+    from toolpath_stiff.analysis.checks import check_program
+
+    part = program_from(program)
+    on = None if machine is None else machine_from(machine)
+    if on is None and strut_speed_mm_per_min is not None:
+        raise InputError("--strut-speed without a machine", hint="name one with --machine")
+    speed = None
+    if strut_speed_mm_per_min is not None:
+        speed = m_per_s_from_mm_per_min(
+            positive("strut speed", strut_speed_mm_per_min, "mm/min", FASTEST_STRUT_MM_PER_MIN)
+        )
+    return ProgramCheck(
+        check_program(
+            part.lines,
+            part.name,
+            machine=None if on is None else on.model.machine,
+            origin=None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
+            step=m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
+            strut_speed=speed,
+            controller=part.controller,
+            **part.options,
+        )
+    )
