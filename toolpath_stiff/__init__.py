@@ -21,10 +21,15 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.inputs import Machine as Machine
     from toolpath_stiff.api.inputs import Program as Program
     from toolpath_stiff.api.machines import MachineCheck as MachineCheck
+    from toolpath_stiff.api.machines import MachineFile as MachineFile
     from toolpath_stiff.api.machines import PoseStiffness as PoseStiffness
     from toolpath_stiff.api.machines import StiffnessMap as StiffnessMap
+    from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
+    from toolpath_stiff.api.machines import machine_template as machine_template
     from toolpath_stiff.api.machines import map_stiffness as map_stiffness
     from toolpath_stiff.api.machines import pose as pose
+    from toolpath_stiff.api.machines import read_poses as read_poses
+    from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.placements import CaseStudy as CaseStudy
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
@@ -48,7 +53,10 @@ __version__ = "0.2.0"
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
     "api.inputs": ("Machine", "Program"),
-    "api.machines": ("MachineCheck", "PoseStiffness", "StiffnessMap", "map_stiffness", "pose"),
+    "api.machines": (
+        "MachineCheck", "MachineFile", "PoseStiffness", "StiffnessMap", "machine_from_linuxcnc", "machine_template",
+        "map_stiffness", "pose", "read_poses", "recover_geometry",
+    ),
     "api.placements": (
         "CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite",
     ),

@@ -126,14 +126,21 @@ class Machine:
         from toolpath_stiff.machine import load_machine
         from toolpath_stiff.stiffness.model import build_model
 
+        files = tuple(map(str, effects))
+        model = build_model(load_machine(machine), files)
+        found = cls(model, str(machine), files).under(setup, temperature_C)
+        found.running()
+        return found
+
+    def under(self, setup: str | None = None, temperature_C: float | None = None) -> Machine:
+        """The same machine under a set-up and a temperature, as of `load`; None: as the files say.
+
+        Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
+        """
         low, high = TEMPERATURES_C
         if temperature_C is not None and not low <= temperature_C <= high:
             raise InputError(f"{temperature_C:g} degrees C", expected=f"{low:g} to {high:g}")
-        files = tuple(map(str, effects))
-        model = build_model(load_machine(str(machine)), files)
-        found = cls(model, str(machine), files, setup, temperature_C)
-        found.running()
-        return found
+        return replace(self, setup=setup, temperature_C=temperature_C)
 
     @staticmethod
     def names() -> list[str]:
@@ -185,8 +192,8 @@ class Machine:
         """Where program zero sits unless a program or an argument says: X, Y, Z, A, B, C in machine coordinates."""
         return pose_in_mm(self.model.machine.default_origin)
 
-    def running(self, controller: Controller | None = None, beside: Sequence[Machine] = ()) -> StiffnessModel:
-        """The model under what it runs under: what `load` was told, then the controller file, then the machine file.
+    def running(self, program: Program | None = None, beside: Sequence[Machine] = ()) -> StiffnessModel:
+        """The model under what it runs under: what `load` was told, then a program's controller file, then its own.
 
         `beside` are machines that the same is said of. Raises `InputError` for a set-up that none of them knows.
         """
@@ -194,8 +201,8 @@ class Machine:
         from toolpath_stiff.stiffness.model import NO_SETUP, check_setup
 
         model, setup, said_by = self.model, self.setup, f"--setup {self.setup}"
-        if setup is None and controller is not None:
-            setup, said_by = controller.setup, "controller file"
+        if setup is None and program is not None:
+            setup, said_by = program.controller.setup, program.controller_file
         check_setup(model.conditions.setup or "", f"machine {self.name}, [setup] name", model)
         check_setup(setup or "", said_by, model, *(other.model for other in beside))
         asked = "" if setup == NO_SETUP else setup
@@ -256,10 +263,20 @@ class Machine:
     def _shown_pose(self) -> Pose:
         return pose_in_si(FIGURE_2_MM_DEG) if self.name == "nist" else self.model.machine.default_origin
 
-    def __str__(self) -> str:
+    def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
+        """What `plot` draws as a PNG."""
+        from toolpath_stiff.report.machine import machine_picture
+
+        return machine_picture(self.model.machine, *self.standing(pose_mm_deg)[:2])
+
+    def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
+        """Its figures with their origin, and how far the limits are at a pose."""
         from toolpath_stiff.report.machine import text
 
-        return text(self.model.machine, self.standing()[2])
+        return text(self.model.machine, self.standing(pose_mm_deg)[2])
+
+    def __str__(self) -> str:
+        return self.text()
 
     def check(self) -> MachineCheck:
         """Look for slips in the figures: units, signs, mirrored joints; what its effects lack."""
@@ -302,6 +319,7 @@ class Program:
     controller: Controller = field(repr=False)
     options: dict[str, Any] = field(repr=False)
     text: str | None = field(default=None, repr=False)
+    controller_file: str = ""
     read_with: tuple[str, ...] = ()
     _last: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -349,7 +367,9 @@ class Program:
             read_lines(file)  # says what is wrong with it
         control, options = _control(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
         beside = tuple(str(one) for one in (controller, offsets, tools) if one)
-        return cls(Path(file).name, str(file), control, options, read_with=beside)
+        return cls(
+            Path(file).name, str(file), control, options, controller_file=str(controller or ""), read_with=beside
+        )
 
     @classmethod
     def from_text(
@@ -367,7 +387,7 @@ class Program:
     ) -> Program:
         """A program given as text; arguments as of `read`."""
         control, options = _control(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
-        return cls(name, None, control, options, text)
+        return cls(name, None, control, options, text, controller_file=str(controller or ""))
 
     def __repr__(self) -> str:
         count = "" if self.text is None else f": {len(self.text.splitlines())} lines"

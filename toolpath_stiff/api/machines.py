@@ -8,21 +8,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.api.inputs import FARTHEST_MM, STRONGEST_N, Machine, machine_from, positive, whole
-from toolpath_stiff.api.results import FolderResult, Progress, Result, counter
-from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.api.results import FolderResult, Progress, Result, TextResult, counter, one_of
+from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
     from toolpath_stiff.analysis.checks import MachineCheck as Findings
     from toolpath_stiff.analysis.poses import PoseReport
     from toolpath_stiff.analysis.poses import StiffnessMap as StiffnessGrid
     from toolpath_stiff.stiffness.model import StiffnessModel
+
+    FloatArray = NDArray[np.float64]
 
 FARTHEST = FARTHEST_MM  # mm and degrees of a pose
 MOST_POINTS = 2001  # along a side of a map
@@ -50,6 +53,12 @@ class PoseStiffness(Result):
         from toolpath_stiff.stiffness.model import condition_warnings
 
         return condition_warnings(self.model)
+
+    def out_of_reach(self, most: int) -> list[str]:
+        """Which poses the machine cannot take and why: so many by name, how many more."""
+        rows = (~self.reachable).nonzero()[0]
+        said = [f"row {i + 1}: out of reach: {self.found.reach.describe(i)}" for i in rows[:most]]
+        return said + ([f"{len(rows) - most} more rows are out of reach"] if len(rows) > most else [])
 
     def to_frame(self) -> pd.DataFrame:
         """One row a pose, the columns of `tps pose --csv`."""
@@ -84,6 +93,56 @@ class PoseStiffness(Result):
             return f"{len(self.reachable)} poses of {name}, {int(self.reachable.sum())} within reach"
         soft, stiff = (f"{self.columns[f'{which}_N_per_mm'][0]:.0f}" for which in ("softest", "stiffest"))
         return f"{name}, {soft} N/mm along the softest direction, {stiff} along the stiffest"
+
+
+def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
+    """Poses (n, 6) in mm and degrees from a table (CSV, or FILE.xlsx[#SHEET]), and what is to be said of the reading.
+
+    Columns x_mm, y_mm, z_mm and, if there, a_deg, b_deg, c_deg.
+
+    Raises
+    ------
+    InputError, InputErrors
+        A column is missing, there is no row; every cell that is no number within reason.
+    """
+    import numpy as np
+
+    from toolpath_stiff.report.machine import POSE_COLUMNS
+    from toolpath_stiff.tables import Columns, read_table
+
+    name = str(file)
+    table = read_table(name, "poses", Columns(POSE_COLUMNS))
+    missing = [column for column in POSE_COLUMNS[:3] if column not in table.heading]
+    if missing:
+        raise InputError(
+            f"column {missing[0]} is missing (found {', '.join(table.heading)})",
+            expected=", ".join(POSE_COLUMNS[:3]),
+            file=name,
+            line=table.heading_line,
+        )
+    if not table.rows:
+        raise InputError("no poses", expected=f"rows below the heading ({','.join(POSE_COLUMNS)})", file=name)
+    columns = [(i, table.heading.index(c), c) for i, c in enumerate(POSE_COLUMNS) if c in table.heading]
+    poses, errors = np.zeros((len(table.rows), 6)), []
+    for row, (line, cells) in enumerate(table.rows):
+        for i, at, column in columns:
+            text = cells[at] if at < len(cells) else ""
+            try:
+                poses[row, i] = _coordinate(text)
+            except ValueError:
+                expected = f"a number within +-{FARTHEST:g}"
+                errors.append(InputError(f"row {row + 1}, {column}: {text!r}", expected=expected, file=name, line=line))
+    if errors:
+        raise InputErrors(errors)
+    return poses, tuple(table.notes)
+
+
+def _coordinate(text: str) -> float:
+    """A finite number within reason. Raises `ValueError`."""
+    value = float(text)
+    if not abs(value) <= FARTHEST:
+        raise ValueError(text)
+    return value
 
 
 def _plain(row: dict[Any, Any]) -> dict[str, Any]:
@@ -375,3 +434,117 @@ def check_machine(machine: Machine | str | Path) -> MachineCheck:
     on = machine_from(machine)
     model = on.running()
     return MachineCheck(on, model, look(model))
+
+
+class MachineFile(Result):
+    """The text of a machine file.
+
+    Attributes
+    ----------
+    name, text, notes
+        The machine's name; the file; what was assumed in making it.
+    """
+
+    command: ClassVar[str] = "machine"
+
+    def __init__(self, name: str, text: str, notes: Sequence[str] = ()) -> None:
+        self.name, self.text, self.notes = name, text, list(notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The text and the notes."""
+        return {"machine": self.name, "text": self.text, "notes": self.notes}
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _short(self) -> str:
+        return f"{self.name}, {len(self.text.splitlines())} lines"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the file, whole or not at all."""
+        from toolpath_stiff.files import write_atomically
+
+        return write_atomically(file, self.text)
+
+
+def machine_template(file: str | Path = "mine.toml") -> MachineFile:
+    """A commented machine file to edit, named after its file; nothing is written before `save`.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.machine_template("mill.toml").name
+    'mill'
+    """
+    from importlib import resources
+
+    from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
+
+    target = Path(file)
+    text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
+    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
+    return MachineFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
+
+
+def machine_from_linuxcnc(file: str | Path, units: str | None = None) -> MachineFile:
+    """The machine of the genhexkins pins in a LinuxCNC HAL file.
+
+    Parameters
+    ----------
+    file
+        The HAL file.
+    units
+        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, lacks pins, or nobody says the unit.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.machine_from_linuxcnc("nowhere.hal")
+    Traceback (most recent call last):
+    toolpath_stiff.errors.InputError: cannot read 'nowhere.hal': No such file or directory
+    """
+    from toolpath_stiff.machine import machine_toml
+    from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
+
+    path = Path(file)
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise InputError(f"cannot read {str(file)!r}: {error.strerror}") from None
+    unit = units or units_of(path)
+    if unit is None:
+        raise InputError(
+            "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)",
+            hint="give it with --units mm or --units inch",
+            file=str(file),
+        )
+    machine, notes = machine_from_hal(text, one_of("units", unit, ("mm", "inch")), path.name)
+    heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
+    return MachineFile(machine.name, machine_toml(machine, heading), notes)
+
+
+def recover_geometry(*, starts: int = 20, seed: int = 1) -> TextResult:
+    """Fit the NIST geometry to the paper's Table 1 anew, from scattered starting points.
+
+    Parameters
+    ----------
+    starts, seed
+        How many starting points, 1 to 1000; seed of where they lie.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.recover_geometry(starts=1)
+    >>> found.to_dict()["starts"]
+    1
+    """
+    from toolpath_stiff.updating.correction.machines import recover_geometry as recover
+    from toolpath_stiff.updating.correction.machines import recovery_text
+
+    found = recover(starts=whole("starts", starts, 1, 1000), seed=whole("seed", seed, 0))
+    return TextResult(recovery_text(found), found, f"the NIST geometry from {starts} starts")

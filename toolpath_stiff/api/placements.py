@@ -215,7 +215,7 @@ def place(
         raise InputError(f"margin {margin_percent:g} %", expected=f"0 to less than {LARGEST_MARGIN_PERCENT:g} per cent")
     whole("points", points, 2, MOST_FRONT_POINTS)
     whole("seed", seed, 0)
-    model = on.running(part.controller)
+    model = on.running(part)
     default = model.machine.default_origin
     asked: Pose | None = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
     read = part.moves(asked, default)

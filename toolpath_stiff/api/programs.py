@@ -231,7 +231,7 @@ def analyze(
         required = n_per_m_from_n_per_mm(positive("required", require_N_per_mm, "N/mm", STIFFEST_N_PER_MM))
 
     def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> PathAnalysis:
-        model = one.running(part.controller, [other] if other else [])
+        model = one.running(part, [other] if other else [])
         read = part.moves(options["origin"], model.machine.default_origin)
         return analyse(model, read, progress=told, **options)
 

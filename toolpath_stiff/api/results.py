@@ -74,7 +74,13 @@ class FolderResult(Result):
         """Name -> content, or what makes it, of every file that `save` writes; pictures and pages with `plots`."""
 
     def save(
-        self, folder: str | Path, *, plots: bool = True, replace: bool = False, rules: Rules | None = None
+        self,
+        folder: str | Path,
+        *,
+        plots: bool = True,
+        replace: bool = False,
+        rules: Rules | None = None,
+        **options: Any,
     ) -> list[Path]:
         """Write the files of the command to a folder, all or none; what an earlier run left there is cleared.
 
@@ -89,6 +95,8 @@ class FolderResult(Result):
             this is said, nothing is written then.
         rules
             What must not be replaced, in full; wins over `replace`.
+        **options
+            Further ones of `files`.
 
         Returns
         -------
@@ -102,7 +110,7 @@ class FolderResult(Result):
         """
         return write_folder(
             folder,
-            self.files(plots=plots),
+            self.files(plots=plots, **options),
             command=self.command,
             rules=rules or Rules(inputs=self.inputs, replace=replace),
         )

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_load_options,
     add_machine_options,
     add_program_options,
-    models_for,
+    machine_for,
     positive_number,
-    read_program_for,
+    program_for,
 )
-from toolpath_stiff.cli.outputs import Destination, add_replace_option, destination
+from toolpath_stiff.cli.outputs import add_replace_option, destination, show
+from toolpath_stiff.cli.progress import Progress, progress_line
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis import Analysis
-    from toolpath_stiff.analysis.poses import Progress
-    from toolpath_stiff.nc import Program
-    from toolpath_stiff.stiffness.model import StiffnessModel
+    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.programs import Analysis
 
 BELOW_REQUIRED, PARTIAL = 3, 1  # exit codes
 
@@ -122,95 +117,34 @@ def run(args: argparse.Namespace) -> int:
     return _run_single(args, found[0].file)
 
 
-@dataclass(frozen=True)
-class Models:
-    """What the programs are analysed on: the machine and, with --compare, another one."""
+def analysis_of(
+    args: argparse.Namespace, file: str, machine: Machine | None = None, progress: Progress | None = None
+) -> Analysis:
+    """The analysis of a program as the options say; `machine` if it is loaded already."""
+    from toolpath_stiff.api.programs import analyze
 
-    first: StiffnessModel
-    second: StiffnessModel | None
-
-
-@dataclass(frozen=True)
-class Report:
-    """What the analysis of a program left: its summary as written, the one on the other machine, what is too weak."""
-
-    program: Program
-    summary: dict[str, Any]
-    second: Analysis | None
-    missed: list[tuple[int, float]]
-    files: list[Path]
-
-
-def load_models(args: argparse.Namespace) -> Models:
-    """Load the machines. Raises as `arguments.models_for`."""
-    found = models_for(args, *(name for name in (args.machine, args.compare) if name))
-    return Models(found[0], found[1] if args.compare else None)
-
-
-def analyse_and_write(
-    args: argparse.Namespace,
-    file: str,
-    target: Destination,
-    models: Models,
-    progress: Progress | None = None,
-) -> Report:
-    """Analyse a program and write its report folder. Raises `TpsError`, with nothing written."""
-    from toolpath_stiff.analysis.results import analyse, required_stiffness_missed
-    from toolpath_stiff.report.analysis import files
-    from toolpath_stiff.units import n_per_m_from_n_per_mm
-
-    program = read_program_for(args, file, models.first.machine)
-    options = {
-        "origin": args.origin,
-        "load": args.load,
-        "step": args.step,
-        "force": args.force,
-        "partial": args.partial,
-    }
-    analysis = analyse(models.first, program, progress=progress, **options)
-    second: Analysis | None = None
-    if models.second is not None:
-        second = analyse(models.second, read_program_for(args, file, models.second.machine), **options)
-    required = None if args.require is None else n_per_m_from_n_per_mm(args.require)
-    contents = files(
-        analysis,
-        plots=not args.no_plots,
-        table=args.format,
-        required=required,
-        other=second,
-        show_plunges=args.show_plunges,
-    )
-    written = target.write(contents)
-    return Report(
-        program=program,
-        summary=json.loads((target.folder / "summary.json").read_text(encoding="utf-8")),
-        second=second,
-        missed=required_stiffness_missed(analysis, required) if required is not None else [],
-        files=written,
+    return analyze(
+        machine or machine_for(args),
+        program_for(args, file),
+        origin_mm_deg=args.origin,
+        load=args.load,
+        step_mm=args.step,
+        force_N=args.force,
+        partial=args.partial,
+        require_N_per_mm=args.require,
+        compare_with=args.compare,
+        progress=progress,
     )
 
 
 def _run_single(args: argparse.Namespace, file: str) -> int:
     """Analyse, write, print; the exit code."""
-    from toolpath_stiff.cli.progress import progress_bar
     from toolpath_stiff.report.analysis import names
 
     target = destination(args, "analyze", [file]).check(names(not args.no_plots, args.format))
-    with progress_bar(f"{Path(file).name}: samples", quiet=args.json) as progress:
-        report = analyse_and_write(args, file, target, load_models(args), progress)
-    if args.json:
-        json.dump(report.summary, sys.stdout, indent=2)
-        sys.stdout.write("\n")
-    else:
-        _print(report)
-    if report.missed:
+    with progress_line(quiet=args.json) as progress:
+        found = analysis_of(args, file, progress=progress)
+    show(args, found, target, table=args.format, show_plunges=args.show_plunges)
+    if found.below_required:
         return BELOW_REQUIRED
-    return PARTIAL if report.summary["out_of_reach_samples"] else 0
-
-
-def _print(report: Report) -> None:
-    from toolpath_stiff.report.analysis import text
-    from toolpath_stiff.report.words import plain
-
-    print(text(report.summary, report.program.source, report.second.summary() if report.second else None))
-    print("\n".join(["written:", *(f"  {plain(str(path))}" for path in report.files)]))
+    return 0 if found.complete else PARTIAL

@@ -1,4 +1,4 @@
-"""Arguments that several commands share, and the types that read them: shop units in, SI out."""
+"""Arguments that several commands share, the types that read them, and the inputs that they name."""
 
 from __future__ import annotations
 
@@ -11,14 +11,10 @@ from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import MACHINE
-from toolpath_stiff.units import Pose, m_from_mm, rad_from_deg
+from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
-    from toolpath_stiff.machine import Machine
-    from toolpath_stiff.nc import Program
-    from toolpath_stiff.nc.controller import Controller
-    from toolpath_stiff.stiffness.effects.contract import Conditions
-    from toolpath_stiff.stiffness.model import StiffnessModel
+    from toolpath_stiff.api.inputs import Machine, Program
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
@@ -60,18 +56,8 @@ def positive_number(unit: str, highest: float) -> Callable[[str], float]:
     return read
 
 
-def length_m(highest_mm: float) -> Callable[[str], float]:
-    """A type for positive lengths in mm, to m."""
-    read_mm = positive_number("mm", highest_mm)
-
-    def read(text: str) -> float:
-        return m_from_mm(read_mm(text))
-
-    return read
-
-
-def pose_argument(text: str) -> Pose:
-    """`X,Y,Z` or `X,Y,Z,A,B,C` in mm and degrees, to SI."""
+def pose_argument(text: str) -> ShopPose:
+    """`X,Y,Z` or `X,Y,Z,A,B,C` in mm and degrees."""
     parts = text.split(",")
     if len(parts) not in (3, 6):
         raise argparse.ArgumentTypeError(f"{text!r}: expected X,Y,Z or X,Y,Z,A,B,C in mm and degrees")
@@ -81,7 +67,7 @@ def pose_argument(text: str) -> Pose:
         raise argparse.ArgumentTypeError(
             f"{text!r}: expected positions within +-{FARTHEST_MM:g} mm and angles within +-360 degrees"
         )
-    return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))
+    return (x, y, z, a, b, c)
 
 
 def range_argument(text: str) -> tuple[float, float]:
@@ -135,7 +121,11 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
     )
     if sampled:
         group.add_argument(
-            "--step", type=length_m(1000.0), default=1e-3, metavar="MM", help="distance of the samples (default: 1)"
+            "--step",
+            type=positive_number("mm", 1000.0),
+            default=1.0,
+            metavar="MM",
+            help="distance of the samples (default: 1)",
         )
     group.add_argument("--offsets", metavar="FILE", help="work offsets G54 to G59.3")
     group.add_argument("--tools", metavar="FILE", help="tool table: LinuxCNC .tbl, or CSV tool,length_mm,diameter_mm")
@@ -219,48 +209,11 @@ def _temperature(text: str) -> float:
     return value
 
 
-def models_for(args: argparse.Namespace, *machines: str) -> list[StiffnessModel]:
-    """The models of machines (names or files), as the options of `add_machine_options` describe them.
+def machine_for(args: argparse.Namespace) -> Machine:
+    """The machine that the options of `add_machine_options` describe. Raises `InputError`."""
+    from toolpath_stiff.api.inputs import Machine
 
-    Raises `InputError` for a machine or an effect that does not exist, and for a set-up that none of them knows.
-    """
-    from dataclasses import replace
-
-    from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.stiffness.model import build_model, check_setup
-
-    models = [build_model(load_machine(name), args.effects) for name in machines or (args.machine,)]
-    for model in models:
-        check_setup(model.conditions.setup or "", f"machine {model.machine.name}, [setup] name", model)
-    asked, said_by = _asked_setup(args)
-    check_setup(asked or "", said_by, *models)
-    return [replace(model, conditions=conditions_for(args, model)) for model in models]
-
-
-def conditions_for(args: argparse.Namespace, model: StiffnessModel) -> Conditions:
-    """Under what programs run: what the options say, then the controller file, then the machine file."""
-    from toolpath_stiff.stiffness.effects.contract import Conditions
-
-    machine, asked = model.conditions, _asked_setup(args)[0]
-    return Conditions(
-        machine.setup if asked is None else asked,
-        machine.temperature if args.temperature is None else args.temperature,
-    )
-
-
-def _asked_setup(args: argparse.Namespace) -> tuple[str | None, str]:
-    """The set-up that an option or the controller file names ("" for none of them), and who says so."""
-    from toolpath_stiff.stiffness.model import NO_SETUP
-
-    asked, said_by = args.setup, f"--setup {args.setup}"
-    if asked is None and getattr(args, "controller", None):
-        asked, said_by = controller_for(args).setup, str(args.controller)
-    return ("" if asked == NO_SETUP else asked), said_by
-
-
-def model_for(args: argparse.Namespace) -> StiffnessModel:
-    """The model of --machine; raises as `models_for`."""
-    return models_for(args)[0]
+    return Machine.load(args.machine, effects=args.effects).under(args.setup, args.temperature)
 
 
 def add_load_options(parser: argparse.ArgumentParser) -> None:
@@ -279,39 +232,17 @@ def add_json_option(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--json", action="store_true", help=text)
 
 
-def controller_for(args: argparse.Namespace) -> Controller:
-    """The control that the options of `add_program_options` describe, tables included."""
-    from dataclasses import replace
+def program_for(args: argparse.Namespace, file: str) -> Program:
+    """A program with the options of `add_program_options`. Raises `InputError`."""
+    from toolpath_stiff.api.inputs import Program
 
-    from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
-    from toolpath_stiff.nc.tables import read_offsets, read_tool_table
-
-    if args.controller:
-        controller = read_controller(args.controller, args.dialect)
-    else:
-        controller = Controller(dialect_named(args.dialect or "generic"))
-    if args.offsets:
-        controller = replace(controller, offsets=read_offsets(args.offsets))
-    if args.tools:
-        controller = replace(controller, tools=read_tool_table(args.tools))
-    return controller
-
-
-def read_program_for(
-    args: argparse.Namespace, file: str, machine: Machine | None, origin: Pose | None = None
-) -> Program:
-    """Read a program with the options of `add_program_options`, for another `origin` if one is given.
-
-    Without a machine the default origin is 0.
-    """
-    from toolpath_stiff.nc import read_program
-
-    return read_program(
+    return Program.read(
         file,
-        origin=origin or args.origin,
-        default_origin=machine.default_origin if machine else (0.0,) * 6,
+        dialect=args.dialect,
+        controller=args.controller,
+        offsets=args.offsets,
+        tools=args.tools,
         block_delete=args.block_delete,
         interpreter=args.interpreter,
         rs274=args.rs274,
-        controller=controller_for(args),
     )

@@ -12,9 +12,10 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from toolpath_stiff.cli.analyze import BELOW_REQUIRED, Models, analyse_and_write, load_models
-from toolpath_stiff.cli.arguments import controller_for
+from toolpath_stiff.cli.analyze import BELOW_REQUIRED, analysis_of
+from toolpath_stiff.cli.arguments import machine_for, program_for
 from toolpath_stiff.cli.outputs import Destination, inputs_of
 from toolpath_stiff.cli.programs import FolderCount, Found, Listed, report_folders
 from toolpath_stiff.cli.progress import say
@@ -24,6 +25,9 @@ from toolpath_stiff.report.batch import files, names, text
 from toolpath_stiff.report.batch.outcome import Outcome, figures_of
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.results_folder import STAGE, Rules
+
+if TYPE_CHECKING:
+    from toolpath_stiff.api.inputs import Machine
 
 INCOMPLETE = 1  # exit code: a program failed, or samples were left out
 
@@ -53,7 +57,7 @@ def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
     inputs = (*(one.file for one in found), *inputs_of(args))
     setting = Setting(args, Path(args.out or "reports"), Rules(inputs=inputs, replace=args.replace))
     programs = report_folders(found)
-    _check(setting)
+    _check(setting, found[0].file)
     if not args.json:
         for count in counts:
             print(plain(str(count)), flush=True)
@@ -70,12 +74,13 @@ def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
     return BELOW_REQUIRED if any((one.figures or {}).get("lines_below_required") for one in outcomes) else 0
 
 
-def _check(setting: Setting) -> None:
+def _check(setting: Setting, first: str) -> None:
     """Read everything that all programs share once, so that a mistake in it is one error. Raises `InputError`."""
     from toolpath_stiff.nc.linuxcnc.runner import find_rs274
 
-    load_models(setting.args)
-    controller_for(setting.args)
+    machine = machine_for(setting.args)
+    other = [machine.like(setting.args.compare)] if setting.args.compare else []
+    machine.running(program_for(setting.args, first), other)
     if setting.args.interpreter == "linuxcnc":
         find_rs274(setting.args.rs274)
     setting.target().check(names())
@@ -142,17 +147,25 @@ def _sweep(folder: Path, process: int) -> None:
 
 def start_worker(setting: Setting) -> Callable[[Listed], Outcome]:
     """What a process does with each program; the machines are loaded once."""
-    models = load_models(setting.args)
+    machine = machine_for(setting.args)
 
     def work(program: Listed) -> Outcome:
-        return _analyse(setting, program, models)
+        return _analyse(setting, program, machine)
 
     return work
 
 
-def _analyse(setting: Setting, program: Listed, models: Models) -> Outcome:
+def _analyse(setting: Setting, program: Listed, machine: Machine) -> Outcome:
+    args, target = setting.args, setting.target(program.folder)
     try:
-        report = analyse_and_write(setting.args, program.file, setting.target(program.folder), models)
+        found = analysis_of(args, program.file, machine)
+        found.save(
+            target.folder,
+            plots=not args.no_plots,
+            rules=target.rules,
+            table=args.format,
+            show_plunges=args.show_plunges,
+        )
     except TpsError as error:
         return Outcome(program.name, program.file, _reason(program, str(error)))
     except MemoryError:
@@ -161,7 +174,7 @@ def _analyse(setting: Setting, program: Listed, models: Models) -> Outcome:
         told = " ".join(f"{type(error).__name__}: {error}".split())
         return Outcome(program.name, program.file, f"{program.file}: {told} (a defect; analyse it alone to see where)")
     opens = "summary.json" if setting.args.no_plots else "report.html"
-    return Outcome(program.name, program.file, "", (program.folder / opens).as_posix(), figures_of(report.summary))
+    return Outcome(program.name, program.file, "", (program.folder / opens).as_posix(), figures_of(found.to_dict()))
 
 
 def _reason(program: Listed, message: str) -> str:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
-from toolpath_stiff.cli.arguments import add_json_option, add_machine_options, model_for
-from toolpath_stiff.cli.outputs import add_replace_option, destination
+from toolpath_stiff.cli.arguments import add_json_option, add_machine_options, machine_for
+from toolpath_stiff.cli.outputs import add_replace_option, destination, show
 
 EPILOG = """\
 Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
@@ -27,16 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Analyse the regions and write the files."""
-    from toolpath_stiff.placement.case_study import run_case_study, study_text
-    from toolpath_stiff.report.case_study import files, names
+    from toolpath_stiff.api.placements import case_study
+    from toolpath_stiff.report.case_study import names
 
     target = destination(args, "case-study", [args.machine], "-case-study").check(names(not args.no_plots))
-    study = run_case_study(model_for(args))
-    contents = files(study, plots=not args.no_plots)
-    written = target.write(contents)
-    if args.json:
-        sys.stdout.write(str(contents["case_study.json"]))
-        return 0
-    print(study_text(study))
-    print("\n".join(["written:", *(f"  {file}" for file in written)]))
-    return 0
+    return show(args, case_study(machine_for(args)), target)

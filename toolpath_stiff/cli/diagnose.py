@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.cli.arguments import (
     add_condition_options,
     add_program_options,
-    conditions_for,
     limit_threads,
-    read_program_for,
+    machine_for,
+    program_for,
 )
 from toolpath_stiff.cli.measurement_arguments import (
     add_data_arguments,
@@ -87,6 +87,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namespace) -> None:
     """Add what needs other rooms: the next measurements, and the choice's weight on a tool path."""
+    from toolpath_stiff.units import pose_in_si
     from toolpath_stiff.updating.diagnosis import choice_on_path, next_measurements
 
     if diagnosis.verdict != "ambiguous":
@@ -97,8 +98,11 @@ def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namesp
     if args.program is None:
         from toolpath_stiff.placement.case_study import case_study_program
 
-        program = case_study_program()
+        part, program = None, case_study_program()
     else:
-        program = read_program_for(args, args.program, diagnosis.machine)
-    conditions = conditions_for(args, diagnosis.predictor.base)
-    found["path"] = choice_on_path(diagnosis, program, args.origin, conditions)
+        part = program_for(args, args.program)
+        program = part.moves(None if args.origin is None else pose_in_si(args.origin), diagnosis.machine.default_origin)
+    conditions = machine_for(args).running(part).conditions
+    found["path"] = choice_on_path(
+        diagnosis, program, None if args.origin is None else pose_in_si(args.origin), conditions
+    )

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import pose_argument
-from toolpath_stiff.cli.outputs import add_replace_option, check_new, check_written, keep
+from toolpath_stiff.cli.outputs import add_replace_option, check_new, check_written, keep, written_text
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint
-
-if TYPE_CHECKING:
-    pass
 
 EPILOG = """\
 examples:
@@ -24,8 +19,6 @@ examples:
   tps machine from-linuxcnc kinematics.hal -o mine.toml
   tps machine recover                               the NIST geometry from the paper's Table 1, fitted anew
 """
-# The pose of the paper's Figure 2 is the one to show the paper's machine in.
-FIGURE_2 = (-0.3, 0.3, 0.3, -0.5235987755982988, 0.0, 0.0)
 OUT_OF_REACH = NOT_GOOD = 1
 
 
@@ -81,130 +74,81 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _list(args: argparse.Namespace) -> int:
-    from toolpath_stiff.machine import load_machine, packaged_machines
+    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.results import json_text
 
-    rows = [(name, load_machine(name)) for name in packaged_machines()]
+    machines = [Machine.load(name) for name in Machine.names()]
     if args.json:
-        found = [{"name": name, "title": machine.title, "source": machine.source} for name, machine in rows]
-        json.dump(found, sys.stdout, indent=2)
-        print()
-        return 0
-    for name, machine in rows:
-        print(f"{name:<16} {machine.title}\n{'':<16} {machine.source}")
+        sys.stdout.write(json_text([{"name": m.asked, "title": m.title, "source": m.source} for m in machines]))
+    else:
+        print("\n".join(f"{m.asked:<16} {m.title}\n{'':<16} {m.source}" for m in machines))
     return 0
 
 
 def _show(args: argparse.Namespace) -> int:
-    import numpy as np
-
+    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.machine import load_machine, reach, solve_struts
-    from toolpath_stiff.report.machine import figure_entries, machine_picture, text
-    from toolpath_stiff.rotations import rotation_matrices
 
-    machine = load_machine(args.machine)
-    paper = FIGURE_2 if machine.name == "nist" else machine.default_origin
-    pose = np.array(args.pose if args.pose is not None else paper)
-    turn = rotation_matrices(pose[3:])
-    struts = solve_struts(machine, pose[:3], turn)
-    stand = reach(machine, pose[:3], struts, turn[None])
+    machine = Machine.load(args.machine)
     if args.json:
-        json.dump(figure_entries(machine), sys.stdout, indent=2)
-        print()
+        sys.stdout.write(json_text(machine.to_frame().to_dict("records")))
     else:
-        print(text(machine, stand))
+        print(machine.text(args.pose))
     if args.out or not args.json:
         target = args.out or f"reports/{machine.name}.png"
         keep(check_written(args, [target]), quiet=args.json)
-        write_atomically(target, machine_picture(machine, pose, struts))
+        written = write_atomically(target, machine.picture(args.pose))
         if not args.json:
-            print(f"written:\n  {target}")
-    return 0 if stand.reachable[0] else OUT_OF_REACH
+            print(written_text([written]))
+    return 0 if machine.standing(args.pose)[2].reachable[0] else OUT_OF_REACH
 
 
 def _check(args: argparse.Namespace) -> int:
     """Load the file, say what is wrong or doubtful, draw the machine at its neutral pose."""
-    import numpy as np
-
-    from toolpath_stiff.analysis.checks import check_machine
+    from toolpath_stiff.api.inputs import Machine
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.machine.kinematics import solve_struts_at
-    from toolpath_stiff.report.machine import check_text, machine_views
-    from toolpath_stiff.stiffness.model import build_model
 
     if not Path(args.file).is_file():
         new = command_line("machine", "new", args.file)
         raise InputError(f"cannot read machine file {args.file!r}", hint=f"`{new}` writes a template")
-    machine = load_machine(Path(args.file))
     target = args.out or f"reports/{Path(args.file).stem}_machine.png"
     replaced = check_written(args, [target])
-    model = build_model(machine, args.effects)
-    found = check_machine(model)
-    pose = np.array(machine.limits.neutral_pose)
-    marked = tuple((stray.body, stray.joint) for stray in found.symmetry.strays)
+    found = Machine.load(Path(args.file), effects=args.effects).check()
     keep(replaced)
-    write_atomically(target, machine_views(machine, pose, solve_struts_at(machine, pose), marked))
-    print(check_text(args.file, model, found))
-    print(f"written:\n  {target}")
+    print(f"{found}\n{written_text([write_atomically(target, found.picture())])}")
     return 0 if found.good else NOT_GOOD
 
 
 def _new(args: argparse.Namespace) -> int:
-    from importlib import resources
-
-    from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
+    from toolpath_stiff.api.machines import machine_template
 
     target, replaced = Path(args.file), check_new(args, args.file)
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
-    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
     keep(replaced)
-    write_atomically(target, text.replace("REMARK", TEMPLATE_REMARK))
-    print(f"written:\n  {target}\n{hint('edit it, then', command_line('machine', 'check', target))}")
+    written = machine_template(target).save(target)
+    print(f"{written_text([written])}\n{hint('edit it, then', command_line('machine', 'check', target))}")
     return 0
 
 
 def _from_linuxcnc(args: argparse.Namespace) -> int:
-    from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.machine import machine_toml
-    from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
+    from toolpath_stiff.api.machines import machine_from_linuxcnc
 
-    path = Path(args.file)
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise InputError(f"cannot read {args.file!r}: {error.strerror}") from None
     replaced = check_written(args, [args.out])
-    units = args.units or units_of(path)
-    if units is None:
-        raise InputError(
-            "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)",
-            hint="give it with --units mm or --units inch",
-            file=args.file,
-        )
-    machine, notes = machine_from_hal(text, units, path.name)
-    content = machine_toml(machine, f"Made from {path.name}, pins in {units}.\n" + "\n".join(notes))
+    found = machine_from_linuxcnc(args.file, args.units)
     if args.out:
         keep(replaced)
-        write_atomically(args.out, content)
-        print(f"written:\n  {args.out}\n{hint('next', command_line('machine', 'check', args.out))}")
+        print(written_text([found.save(args.out)]))
+        print(hint("next", command_line("machine", "check", args.out)))
     else:
-        sys.stdout.write(content)
-    for note in notes:
+        sys.stdout.write(str(found))
+    for note in found.notes:
         print(f"tps: note: {note}", file=sys.stderr)
     return 0
 
 
 def _recover(args: argparse.Namespace) -> int:
-    from toolpath_stiff.updating.correction.machines import recover_geometry, recovery_text
+    from toolpath_stiff.api.machines import recover_geometry
 
-    if not 1 <= args.starts <= 1000:
-        raise InputError(f"--starts {args.starts}", expected="1 to 1000")
     found = recover_geometry(starts=args.starts, seed=args.seed)
-    if args.json:
-        json.dump(found, sys.stdout, indent=2)
-        print()
-    else:
-        print(recovery_text(found))
+    sys.stdout.write(found.to_json() if args.json else f"{found}\n")
     return 0

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 
 from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_machine_options,
     finite_number,
     load_argument,
-    model_for,
+    machine_for,
     range_argument,
 )
-from toolpath_stiff.cli.outputs import add_replace_option, destination
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.cli.outputs import add_replace_option, destination, show
+from toolpath_stiff.cli.progress import progress_line
 
 EPILOG = """\
 examples:
@@ -25,8 +23,6 @@ examples:
 
 files written to --out: map.csv (x_mm,y_mm,z_mm,stiffness_N_per_mm,reachable), map.json, map.png, map.html (3-D)
 """
-FARTHEST_MM = 1e5
-OUT_OF_REACH = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,39 +69,20 @@ def _angles(text: str) -> tuple[float, float, float]:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate the grid and write the files."""
-    from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.analysis.poses import map_stiffness
-    from toolpath_stiff.cli.progress import progress_bar
-    from toolpath_stiff.report.map import files, map_summary, names, text
-    from toolpath_stiff.units import m_from_mm, rad_from_deg
+    from toolpath_stiff.api.machines import map_stiffness
+    from toolpath_stiff.report.map import names
 
-    if not 2 <= args.points <= 2001:
-        raise InputError(f"--points {args.points}", expected="2 to 2001")
     target = destination(args, "map", [args.machine], "-map").check(names(not args.no_plots))
-    heights = args.slices or [args.z]
-    if max(abs(v) for v in (*args.x, *args.y, *heights)) > FARTHEST_MM:
-        raise InputError("a map beyond 100 m", expected="mm")
-    model = model_for(args)
-    a, b, c = (rad_from_deg(v) for v in args.tilt)
-    x, y = ((m_from_mm(lo), m_from_mm(hi)) for lo, hi in (args.x, args.y))
-    with progress_bar("map: poses", quiet=args.json) as progress:
+    with progress_line(quiet=args.json) as progress:
         found = map_stiffness(
-            model,
-            x,
-            y,
-            [m_from_mm(z) for z in heights],
-            parse_load(args.load),
-            args.points,
-            (a, b, c),
-            args.force,
-            progress,
+            machine_for(args),
+            x_mm=args.x,
+            y_mm=args.y,
+            z_mm=args.slices or args.z,
+            load=args.load,
+            tilt_deg=args.tilt,
+            points=args.points,
+            force_N=args.force,
+            progress=progress,
         )
-    summary = map_summary(model, found)
-    written = target.write(files(model, found, summary, plots=not args.no_plots))
-    if args.json:
-        json.dump(summary, sys.stdout, indent=2)
-        print()
-    else:
-        print(text(summary))
-        print("\n".join(["written:", *(f"  {file}" for file in written)]))
-    return 0
+    return show(args, found, target)

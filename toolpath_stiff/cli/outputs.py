@@ -7,13 +7,18 @@ same where it has no other meaning) the old file is kept beside the new one.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, check_outputs, keep_old
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
+
+if TYPE_CHECKING:
+    from toolpath_stiff.api.results import FolderResult
 
 LONGEST = 60  # letters of a default folder's name; of more files, the first and how many there are
 DESTINATIONS = ("out", "output", "write", "command_line")
@@ -89,6 +94,23 @@ class Destination:
     def write(self, contents: Mapping[str, Content | Callable[[], Content]]) -> list[Path]:
         """Write the files, all or none; see `write_folder`."""
         return write_folder(self.folder, contents, command=self.command, rules=self.rules)
+
+
+def show(args: argparse.Namespace, result: FolderResult, target: Destination, **options: Any) -> int:
+    """Save a result, print it as text or as JSON; the exit code of success."""
+    written = result.save(target.folder, plots=not args.no_plots, rules=target.rules, **options)
+    if args.json:
+        sys.stdout.write(result.to_json())
+    else:
+        print(f"{result}\n{written_text(written)}")
+    return 0
+
+
+def written_text(files: Iterable[Path]) -> str:
+    """What was written, a file a line."""
+    from toolpath_stiff.report.words import plain
+
+    return "\n".join(["written:", *(f"  {plain(str(file))}" for file in files)])
 
 
 def destination(args: argparse.Namespace, command: str, sources: Sequence[str], suffix: str = "") -> Destination:

@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
-from functools import partial
-from typing import TYPE_CHECKING
 
-from toolpath_stiff.cli.arguments import add_program_options, read_program_for
+from toolpath_stiff.cli.arguments import add_program_options, program_for
 from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
-
-if TYPE_CHECKING:
-    from toolpath_stiff.path import Samples
 
 EPILOG = """\
 example:
@@ -37,30 +31,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read, sample, write."""
-    from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.path import place, sample_moves
+    """Sample, write."""
+    from toolpath_stiff.api.programs import sample_path
 
     replaced = check_written(args, [args.out])
-    program = read_program_for(args, args.program, None)
-    origin = args.origin or program.origin
-    samples = sample_moves(place(program.moves, origin), step=args.step, origin=origin)
+    found = sample_path(program_for(args, args.program), origin_mm_deg=args.origin, step_mm=args.step)
     if args.out:
         keep(replaced)
-        write_atomically(args.out, path_csv(samples))
+        found.save(args.out)
     else:
-        for piece in path_csv(samples):
+        for piece in found.csv():
             sys.stdout.write(piece.decode())
-    for warning in program.warnings:
-        print(f"tps: warning: {program.name}: {warning}", file=sys.stderr)
-    for word in program.unsupported:
-        print(f"tps: note: {program.name}:{word.line}:{word.column}: {word.word}: {word.reason}", file=sys.stderr)
+    for warning in found.warnings:
+        print(f"tps: warning: {found.name}: {warning}", file=sys.stderr)
+    for note in found.unsupported:
+        print(f"tps: note: {note}", file=sys.stderr)
     return 0
-
-
-def path_csv(samples: Samples) -> Iterator[bytes]:
-    """The CSV text in pieces."""
-    from toolpath_stiff.column_files import csv_pieces
-    from toolpath_stiff.path import PATH_COLUMNS, path_columns
-
-    return csv_pieces(partial(path_columns, samples), len(samples), PATH_COLUMNS)

@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+from toolpath_stiff.api.placements import OBJECTIVES
 from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_load_options,
     add_machine_options,
     add_program_options,
-    controller_for,
     finite_number,
-    length_m,
-    model_for,
+    machine_for,
+    positive_number,
+    program_for,
     range_argument,
-    read_program_for,
 )
-from toolpath_stiff.cli.measurement_arguments import check_seed
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep
-from toolpath_stiff.errors import InputError
-
-if TYPE_CHECKING:
-    from toolpath_stiff.machine import Machine
-    from toolpath_stiff.placement.climb import Bounds
-    from toolpath_stiff.placement.evaluator import Keepout
-    from toolpath_stiff.placement.placing import Task
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, show
+from toolpath_stiff.cli.progress import progress_line
 
 EPILOG = """\
 examples:
@@ -44,9 +34,6 @@ A placement is where program zero sits and how the work is turned about it: the 
 --out: placements.csv (the front), placement.json, front.png, profiles.png, map.png, setup.pdf,
 report.html (click a placement of the front, see the path there).
 """
-FARTHEST_MM = 1e5
-FARTHEST_TURN = 720.0
-OBJECTIVES = ("balanced", "mean", "range", "weakest")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -124,7 +111,7 @@ def _add_write_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--linearise",
-        type=length_m(10.0),
+        type=positive_number("mm", 10.0),
         metavar="MM",
         help="write arcs that the turn takes out of the planes as straight moves within MM (default: refuse them)",
     )
@@ -160,129 +147,41 @@ def _keep_out(text: str) -> tuple[str, list[float]]:
 
 def run(args: argparse.Namespace) -> int:
     """Search, or take another point of an earlier search; write the files."""
-    from toolpath_stiff.cli.progress import progress_bar
+    from toolpath_stiff.api.placements import KeepOut, place
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.placement.placing import place_again, place_program
-    from toolpath_stiff.report.place import files, names, text
+    from toolpath_stiff.report.place import names
 
-    if not 2 <= args.points <= 1000:
-        raise InputError(f"--points {args.points}", expected="2 to 1000")
-    check_seed(args.seed)
-    _check_write(args)
     replaced = check_written(args, [args.write])
     target = destination(args, "place", [args.program], "-place").check(names(not args.no_plots))
-    earlier = _earlier(target.folder) if args.pick is not None else None
-    task = _task(args)
-    if earlier is not None:
-        placed = place_again(task, earlier, args.pick)
-    else:
-        with progress_bar(f"{task.program.name}: search", quiet=args.json) as progress:
-            placed = place_program(task, progress)
-    keep(replaced, quiet=args.json)
-    written = target.write(files(placed, plots=not args.no_plots))
-    if placed.rewritten is not None:
-        written.append(write_atomically(args.write, placed.rewritten))
-    if args.json:
-        json.dump(placed.summary, sys.stdout, indent=2)
-        print()
-    else:
-        print(text(placed.summary))
-        print("\n".join(["written:", *(f"  {file}" for file in written)]))
-    return 0
-
-
-def _earlier(out: Path) -> dict[str, Any]:
-    """placement.json of an earlier search."""
-    from toolpath_stiff.files import read_text
-
-    file = out / "placement.json"
-    if not file.exists():
-        raise InputError(
-            f"--pick: there is no earlier search in {out} (no placement.json)",
-            hint="search first, without --pick, or name the search's folder with --out",
-        )
-    try:
-        found = json.loads(read_text(file, "the earlier search"))
-    except ValueError as error:
-        raise InputError(f"--pick: {file} is no JSON: {error}", hint="search again, without --pick") from None
-    if not isinstance(found, dict):
-        raise InputError(f"--pick: {file} is no result of a search", hint="search again, without --pick")
-    return found
-
-
-def _task(args: argparse.Namespace) -> Task:
-    """The options in SI, the program read."""
-    from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.placement.placing import Rewriting, Task
-    from toolpath_stiff.placement.search import SearchRules
-
-    model = model_for(args)
-    program = read_program_for(args, args.program, model.machine)
-    rewriting = None
-    if args.write:
-        controller = controller_for(args)
-        reading = {"offsets": controller.offsets, "tools": controller.tools, "block_delete": args.block_delete}
-        rewriting = Rewriting(args.write, args.decimals, args.linearise, reading)
-    return Task(
-        model=model,
-        program=program,
-        present=args.origin or (program.origin if program.origin_source == "program" else model.machine.default_origin),
-        read=lambda origin: read_program_for(args, args.program, model.machine, origin),
-        bounds=_bounds(args, model.machine),
-        rules=SearchRules(
-            objective=args.objective,
-            margin=args.margin / 100.0,
+    with progress_line(quiet=args.json) as progress:
+        found = place(
+            machine_for(args),
+            program_for(args, args.program),
+            x_mm=args.x,
+            y_mm=args.y,
+            z_mm=args.z,
+            z_values_mm=args.z_values or (),
+            rotate_deg=args.rotate,
+            tilt_a_deg=args.tilt_a,
+            tilt_b_deg=args.tilt_b,
+            keep_out=[KeepOut(name, tuple(box[:3]), tuple(box[3:])) for name, box in args.keep_out],
+            margin_percent=args.margin,
             allow_extrapolation=args.allow_extrapolation,
-            keepouts=_keepouts(args),
-            seed=args.seed,
+            objective=args.objective,
             points=args.points,
-        ),
-        load=parse_load(args.load),
-        step=args.step,
-        force=args.force,
-        rewriting=rewriting,
-    )
-
-
-def _check_write(args: argparse.Namespace) -> None:
-    """What can be said of --write before the program is read."""
-    if not args.write:
-        for option in ("decimals", "linearise"):
-            if getattr(args, option) is not None:
-                raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
-
-
-def _bounds(args: argparse.Namespace, machine: Machine) -> Bounds:
-    import numpy as np
-
-    from toolpath_stiff.placement.climb import Bounds
-    from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
-
-    low, high = (mm_from_m(corner) for corner in machine.limits.workspace)
-    given = [args.x, args.y, args.z]
-    if args.z_values:
-        given[2] = (args.z_values[0], args.z_values[-1])
-    box = []
-    for name, asked, lo, hi in zip("xyz", given, low, high, strict=True):
-        if asked is None and not np.isfinite(hi - lo):
-            raise InputError(f"the machine file bounds no workspace in {name}", hint=f"give --{name} LO:HI")
-        box.append(asked if asked is not None else (float(lo), float(hi)))
-    if max(abs(v) for pair in box for v in pair) > FARTHEST_MM:
-        raise InputError("bounds beyond 100 m", expected="mm")
-    turns = [args.tilt_a, args.tilt_b, args.rotate]
-    if max(abs(v) for pair in turns for v in pair) > FARTHEST_TURN:
-        raise InputError(f"a turn or tilt beyond {FARTHEST_TURN:g} degrees", expected="at most two whole turns")
-    limits = [[*(m_from_mm(pair[end]) for pair in box), *(rad_from_deg(pair[end]) for pair in turns)] for end in (0, 1)]
-    heights = tuple(m_from_mm(z) for z in args.z_values) if args.z_values else ()
-    return Bounds(np.array(limits[0]), np.array(limits[1]), heights)
-
-
-def _keepouts(args: argparse.Namespace) -> tuple[Keepout, ...]:
-    from toolpath_stiff.placement.evaluator import Keepout
-    from toolpath_stiff.units import m_from_mm
-
-    boxes = []
-    for name, values in args.keep_out:
-        x0, y0, z0, x1, y1, z1 = (m_from_mm(v) for v in values)
-        boxes.append(Keepout(name, (x0, y0, z0), (x1, y1, z1)))
-    return tuple(boxes)
+            seed=args.seed,
+            pick=args.pick,
+            earlier=Path(target.folder, "placement.json"),
+            origin_mm_deg=args.origin,
+            load=args.load,
+            step_mm=args.step,
+            force_N=args.force,
+            write=args.write,
+            decimals=args.decimals,
+            linearise_mm=args.linearise,
+            progress=progress,
+        )
+    keep(replaced, quiet=args.json)
+    if args.write:
+        write_atomically(args.write, found.program_bytes)
+    return show(args, found, target)

@@ -1,4 +1,4 @@
-"""A progress bar on standard error for long work; nothing at all where no one watches."""
+"""A line of progress on standard error for long work; nothing at all where no one watches."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from contextlib import contextmanager
 QUIET_SECONDS = 0.5  # work shorter than this shows no bar
 REDRAW_SECONDS = 0.1
 WIDTH = 30
+Progress = Callable[[str, int, int], None]
 
 
 def say(text: str) -> None:
@@ -20,30 +21,33 @@ def say(text: str) -> None:
 
 
 @contextmanager
-def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int], None] | None]:
-    """Yield a function (done, total) that draws the bar, or None where standard error is no terminal."""
+def progress_line(quiet: bool = False) -> Iterator[Progress | None]:
+    """Yield what functions of the library call with (text, done, in all), or None where nobody watches.
+
+    What has a number is drawn as a bar, once it takes longer than a moment; the line is taken away at the end.
+    """
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    start = time.monotonic()
-    drawn = start + QUIET_SECONDS
-    shown = False
+    started: dict[str, float] = {}
+    last = 0.0
 
-    def draw(done: int, total: int) -> None:
-        nonlocal drawn, shown
+    def draw(text: str, done: int, total: int) -> None:
+        nonlocal last
         now = time.monotonic()
-        if now < drawn:
+        start = started.setdefault(text, now)
+        if not total:
+            say(text)
             return
-        drawn, shown = now + REDRAW_SECONDS, True
-        filled = WIDTH * done // max(total, 1)
-        left = (now - start) * (total - done) / max(done, 1)
+        if now - start < QUIET_SECONDS or now - last < REDRAW_SECONDS:
+            return
+        last = now
+        filled = WIDTH * done // total
         bar = "#" * filled + "." * (WIDTH - filled)
-        sys.stderr.write(f"\r{label} [{bar}] {done}/{total}, {left:.0f} s left ")
-        sys.stderr.flush()
+        left = (now - start) * (total - done) / max(done, 1)
+        say(f"{text} [{bar}] {done}/{total}, {left:.0f} s left ")
 
     try:
         yield draw
     finally:
-        if shown:
-            sys.stderr.write("\r\033[K")
-            sys.stderr.flush()
+        say("")
