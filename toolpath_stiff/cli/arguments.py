@@ -248,6 +248,11 @@ def conditions_for(args: argparse.Namespace, model: StiffnessModel) -> Condition
     )
 
 
+def asked_setup(args: argparse.Namespace) -> str | None:
+    """The set-up that an option or the controller file names; "" for none of them, None if nothing is said."""
+    return _asked_setup(args)[0]
+
+
 def _asked_setup(args: argparse.Namespace) -> tuple[str | None, str]:
     """The set-up that an option or the controller file names ("" for none of them), and who says so."""
     from toolpath_stiff.stiffness.model import NO_SETUP

@@ -15,7 +15,6 @@ from toolpath_stiff.cli.measurement_arguments import (
 )
 from toolpath_stiff.cli.outputs import destination
 from toolpath_stiff.files import Content
-from toolpath_stiff.hints import hint
 
 EPILOG = """\
 examples:
@@ -57,9 +56,8 @@ def run(args: argparse.Namespace) -> int:
     machine = load_machine(args.machine)
     found = compare(
         machine, read_measurements(args.data, machine), noise=args.noise, strut_spread=args.strut_spread,
-        effect_files=args.effects, seed=args.seed, jobs=args.jobs,
+        effect_files=args.effects, seed=args.seed, jobs=args.jobs, asked=asked(args),
     )  # fmt: skip
-    found.document["next"] = [hint("which effect would explain it", asked(args).command("diagnose"))]
     contents: dict[str, Content] = {
         "compare.json": json.dumps(found.document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "residuals.csv": residuals_csv(found),

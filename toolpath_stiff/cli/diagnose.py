@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.cli.arguments import (
     add_condition_options,
     add_program_options,
-    conditions_for,
+    asked_setup,
     limit_threads,
     read_program_for,
 )
@@ -25,6 +25,8 @@ from toolpath_stiff.cli.progress import say
 from toolpath_stiff.files import Content
 
 if TYPE_CHECKING:
+    from toolpath_stiff.machine import Machine
+    from toolpath_stiff.nc import Program
     from toolpath_stiff.updating.diagnosis import Diagnosis
 
 EPILOG = """\
@@ -74,10 +76,10 @@ def run(args: argparse.Namespace) -> int:
     data = read_measurements(args.data, machine)
     diagnosis = diagnose(
         machine, data, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed,
-        files=args.data, progress=say,
+        program=lambda: _program(args, machine), origin=args.origin, setup=asked_setup(args),
+        temperature=args.temperature, files=args.data, command=args.command_line, asked=asked(args), progress=say,
     )  # fmt: skip
-    found = document(diagnosis, args.command_line, asked(args))
-    _complete(found, diagnosis, args)
+    found = document(diagnosis)
     contents: dict[str, Content] = {
         "diagnose.json": json.dumps(found, indent=2, ensure_ascii=False) + "\n",
         "residuals.csv": _residuals(diagnosis),
@@ -97,23 +99,11 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _complete(found: dict[str, Any], diagnosis: Diagnosis, args: argparse.Namespace) -> None:
-    """Add what needs other rooms: the next measurements, and the choice's weight on a tool path."""
-    from toolpath_stiff.updating.diagnosis import choice_on_path, next_measurements
+def _program(args: argparse.Namespace, machine: Machine) -> Program:
+    """The program that the choice between explanations is tried on."""
+    from toolpath_stiff.placement.case_study import case_study_program
 
-    if diagnosis.verdict != "ambiguous":
-        return
-    say("planning the next measurements")
-    found["next_measurements"], remarks = next_measurements(diagnosis, seed=args.seed)
-    found["why"] += remarks
-    if args.program is None:
-        from toolpath_stiff.placement.case_study import case_study_program
-
-        program = case_study_program()
-    else:
-        program = read_program_for(args, args.program, diagnosis.machine)
-    conditions = conditions_for(args, diagnosis.predictor.base)
-    found["path"] = choice_on_path(diagnosis, program, args.origin, conditions)
+    return case_study_program() if args.program is None else read_program_for(args, args.program, machine)
 
 
 def _residuals(diagnosis: Diagnosis) -> str:

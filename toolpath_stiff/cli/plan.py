@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import finite_number, limit_threads, positive_number
@@ -15,14 +14,10 @@ from toolpath_stiff.cli.measurement_arguments import (
     check_seed,
 )
 from toolpath_stiff.cli.outputs import destination
+from toolpath_stiff.files import Content
 
 if TYPE_CHECKING:
-    from toolpath_stiff.machine import Machine
-    from toolpath_stiff.stiffness.effects.contract import Effect
-    from toolpath_stiff.updating.measurements import Measurements
-    from toolpath_stiff.updating.planning.campaign import Campaign
-    from toolpath_stiff.updating.planning.rivals import Rival
-    from toolpath_stiff.updating.planning.visits import Costs, Menu
+    from toolpath_stiff.updating.planning import Proposal
 
 EPILOG = """\
 examples:
@@ -35,8 +30,6 @@ Files written to --out: plan.csv (a measurement file with the stiffness left emp
 """
 DATA, PICTURES = ("plan.csv", "plan.json"), ("plan.png",)
 COSTS = ("reading", "pose", "tool", "setup")
-PLAN_POSES, CAMPAIGN_POSES = 6, 24
-CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -99,211 +92,51 @@ def run(args: argparse.Namespace) -> int:
     )
     limit_threads(args.jobs)
     from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.stiffness.effects import known_effects
+    from toolpath_stiff.units import m_from_mm, rad_from_deg
+    from toolpath_stiff.updating.measurements import read_measurements
+    from toolpath_stiff.updating.planning import plan
+    from toolpath_stiff.updating.planning.document import document, plan_csv, rows_of
     from toolpath_stiff.updating.planning.visits import Costs
 
     machine = load_machine(args.machine)
-    effects = known_effects(args.effects)
-    costs = Costs(**dict(args.cost))
-    if args.data or args.between:
-        document, contents = _told_apart(args, machine, effects, costs)
-    else:
-        document, contents = _campaign(args, machine, effects, costs)
-    document |= {
-        "machine": machine.name,
-        "data": list(args.data),
-        "seed": args.seed,
-        "costs_minutes": {name: getattr(costs, name) for name in COSTS},
-        "command": args.command_line,
-    }
-    text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
-    written = target.write({"plan.csv": contents["plan.csv"], "plan.json": text, **contents})
+    proposal = plan(
+        machine, read_measurements(args.data, machine) if args.data else None, between=args.between or (), n=args.n,
+        radius=None if args.radius is None else m_from_mm(args.radius),
+        heights=None if args.heights is None else tuple(m_from_mm(z) for z in args.heights),
+        max_tilt=None if args.max_tilt is None else rad_from_deg(args.max_tilt), loads=args.loads,
+        tool_extensions=None if args.tools is None else tuple(m_from_mm(t) for t in args.tools), setups=args.setups,
+        costs=Costs(**dict(args.cost)), noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects,
+        seed=args.seed, files=args.data,
+    )  # fmt: skip
+    found = document(proposal, args.command_line)
+    text = json.dumps(found, indent=2, ensure_ascii=False) + "\n"
+    contents: dict[str, Content] = {"plan.csv": plan_csv(rows_of(proposal)), "plan.json": text}
+    if not args.no_plots:
+        contents["plan.png"] = _picture(proposal)
+    written = target.write(contents)
     if args.json:
         print(text, end="")
     else:
-        print(_table(document))
+        print(_table(found))
         print("\n".join(["written:", *(f"  {file}" for file in written)]))
     return 0
 
 
-def _menu(args: argparse.Namespace, menu: Menu) -> Menu:
-    from toolpath_stiff.units import m_from_mm, rad_from_deg
-    from toolpath_stiff.updating.planning.visits import with_options
+def _picture(proposal: Proposal) -> bytes:
+    """The visits in the workspace; of a plan between rivals, with how well each place tells them apart."""
+    from toolpath_stiff.report.plan_picture import plan_picture
+    from toolpath_stiff.updating.planning import Plan
+    from toolpath_stiff.updating.planning.document import gap_map
 
-    return with_options(
-        menu,
-        radius=None if args.radius is None else m_from_mm(args.radius),
-        heights=None if args.heights is None else tuple(m_from_mm(z) for z in args.heights),
-        max_tilt=None if args.max_tilt is None else rad_from_deg(args.max_tilt),
-        loads=args.loads,
-        tool_extensions=None if args.tools is None else tuple(m_from_mm(t) for t in args.tools),
-        setups=args.setups,
-    )
-
-
-# -- telling rivals apart ----------------------------------------------------------------------------------------------
-
-
-def _told_apart(
-    args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    from toolpath_stiff.updating.measurements import read_measurements
-    from toolpath_stiff.updating.planning import plan_measurements
-    from toolpath_stiff.updating.planning.between import unfitted_rivals
-    from toolpath_stiff.updating.planning.document import plan_csv, plan_document, plan_rows
-    from toolpath_stiff.updating.planning.visits import Menu
-
-    taken: set[str] = set()
-    errors: dict[str, float] = {}
-    noise: float | tuple[float, float]
-    if args.data:
-        data = read_measurements(args.data, machine)
-        taken = set(data.point.tolist())
-        menu = _menu(args, Menu.of(data))
-        rivals, noise, notes, verdict, errors = _rivals(args, machine, data, effects)
-    else:
-        menu = _menu(args, Menu(setups=("table", "riser")))
-        noise = CAMPAIGN_NOISE if args.noise is None else args.noise
-        rivals = unfitted_rivals(args.between, effects, setup=menu.setups[-1])
-        notes = ["no data: the rivals are taken at their usual sizes"]
-        notes += [] if args.noise is not None else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
-        verdict = ""
-    n = PLAN_POSES if args.n is None else args.n
-    plan = plan_measurements(
-        machine, rivals, noise, n, menu=menu, costs=costs, seed=args.seed, effect_files=args.effects,
-        strut_spread=args.strut_spread,
-    )  # fmt: skip
-    plan = replace(plan, notes=(*notes, *plan.notes))
-    rows = plan_rows(plan.visits, plan.chosen, taken)
-    document = {"kind": "rivals", "verdict": verdict, "mean_abs_error_percent": errors, **plan_document(plan)}
-    if errors:
-        steps = ", ".join(f"{name} {value:.2f} %" for name, value in errors.items())
-        document["text"] = [f"mean error so far: {steps}", *document["text"]]
-    document["visits"] = _visits(rows, plan.kinds, plan.why)
-    contents: dict[str, Any] = {"plan.csv": plan_csv(rows)}
-    if not args.no_plots:
-        from toolpath_stiff.report.plan_picture import plan_picture
-        from toolpath_stiff.updating.planning.document import gap_map
-
-        gap = gap_map(machine, plan, menu, args.effects)
+    found, name = proposal.plan, proposal.machine.name
+    if isinstance(found, Plan):
+        gap = gap_map(proposal.machine, found, proposal.menu, proposal.effect_files)
         title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
-        text = f"machine {machine.name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
-        contents["plan.png"] = plan_picture(plan.visits, plan.chosen, plan.kinds, gap, title, text)
-    return document, contents
-
-
-def _rivals(
-    args: argparse.Namespace, machine: Machine, data: Measurements, effects: dict[str, Effect]
-) -> tuple[list[Rival], tuple[float, float], list[str], str, dict[str, float]]:
-    """Rivals, noise (repeat, clamping), notes, verdict of the diagnosis ("" if none was made), mean errors so far."""
-    import numpy as np
-
-    from toolpath_stiff.updating.inference import judge
-    from toolpath_stiff.updating.inference.evidence import Problem
-    from toolpath_stiff.updating.inference.noise import Scatter, covariance, noise_models
-    from toolpath_stiff.updating.inference.prediction import Predictor
-    from toolpath_stiff.updating.planning.between import errors_so_far, fitted_rivals, rivals_of
-
-    # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
-    noise = noise_models(data, args.noise, args.strut_spread)[-1]
-    notes = [f"noise: {noise.origin}"]
-    predictor = Predictor(machine, data, args.effects)
-    scatter = covariance(noise, predictor)
-    problem = Problem(predictor, Scatter.of(noise, scatter), scatter)
-    verdict = ""
-    if args.between:
-        rivals = fitted_rivals(problem, args.between, effects)
-    else:
-        own = {entry.name for entry in (*machine.effects, *machine.instruments)}
-        lacking = data.cannot_test(effects.values())
-        tested = [effect for name, effect in effects.items() if name not in own and name not in lacking]
-        judgement = judge(problem, noise, scatter, tested, args.seed)
-        rivals, verdict = rivals_of(judgement), judgement.verdict
-        if verdict != "ambiguous":
-            notes.append(f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next")
-    of_reading = (float(np.sqrt(np.mean(noise.repeat**2))), noise.clamping)
-    return rivals, of_reading, notes, verdict, errors_so_far(problem, rivals)
-
-
-# -- a first campaign --------------------------------------------------------------------------------------------------
-
-
-def _campaign(
-    args: argparse.Namespace, machine: Machine, effects: dict[str, Effect], costs: Costs
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    from toolpath_stiff.updating.planning.campaign import RISER, TABLE, first_campaign
-    from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
-    from toolpath_stiff.updating.planning.visits import Menu
-
-    noise = CAMPAIGN_NOISE if args.noise is None else args.noise
-    campaign = first_campaign(
-        machine, CAMPAIGN_POSES if args.n is None else args.n, menu=_menu(args, Menu(setups=(TABLE, RISER))),
-        costs=costs, seed=args.seed, effects=effects, noise=noise, effect_files=args.effects,
-    )  # fmt: skip
-    chosen = range(len(campaign.visits))
-    rows = plan_rows(campaign.visits, chosen, repeats=campaign.repeats)
-    document = {
-        "kind": "campaign",
-        "poses": len({row["point"] for row in rows}),
-        "readings": len(rows),
-        "minutes": campaign.minutes,
-        "sees": [{"effect": name, "gap_sigma": gap} for name, gap in campaign.sees.items()],
-        "text": _campaign_text(campaign, rows, noise),
-        "notes": [f"seen or not: at a noise of {100 * noise:g} %, each effect alone at its usual size"],
-        "visits": _visits(rows, campaign.purposes, campaign.purposes),
-    }
-    contents: dict[str, Any] = {"plan.csv": plan_csv(rows)}
-    if not args.no_plots:
-        from toolpath_stiff.report.plan_picture import plan_picture
-
-        text = f"machine {machine.name}   ·   {len(chosen)} clampings, {len(rows)} readings; lines: where spindles lean"
-        contents["plan.png"] = plan_picture(campaign.visits, chosen, campaign.purposes, None, "A first campaign", text)
-    return document, contents
-
-
-def _campaign_text(campaign: Campaign, rows: list[dict[str, Any]], noise: float) -> list[str]:
-    heights = sorted({row["z_mm"] for row in rows})
-    hidden = [name for name, gap in campaign.sees.items() if gap < 3.0]
-    lines = [
-        f"{len({row['point'] for row in rows})} poses at {len(heights)} heights, {len(campaign.visits)} clampings, "
-        f"{len(rows)} readings: about {campaign.minutes / 60.0:.0f} hours"
-    ]
-    if hidden:
-        lines.append(f"of usual size and alone, these would not show at {100 * noise:g} % noise: {', '.join(hidden)}")
-    return lines
-
-
-# -- for people --------------------------------------------------------------------------------------------------------
-
-
-def _visits(rows: list[dict[str, Any]], kinds: tuple[str, ...], why: tuple[str, ...]) -> list[dict[str, Any]]:
-    """One entry a clamping: where, how, what is read, why."""
-    from toolpath_stiff.updating.planning.document import POSE
-
-    found = []
-    for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):
-        own = [row for row in rows if row["clamp"] == clamp]
-        first = own[0]
-        found.append(
-            {
-                "clamp": clamp,
-                "point": first["point"],
-                **{name: first[name] for name in POSE},
-                "tool_extension_mm": first["tool_extension_mm"],
-                "setup": first.get("setup", ""),
-                "forces_N": sorted({row["force_N"] for row in own}),
-                "directions": list(dict.fromkeys(_direction(row) for row in own)),
-                "kind": kind,
-                "why": reason,
-            }
-        )
-    return found
-
-
-def _direction(row: dict[str, Any]) -> str:
-    if "direction" in row:
-        return str(row["direction"])
-    return "".join(axis for axis, part in zip("XYZ", (row["dx"], row["dy"], row["dz"]), strict=True) if part)
+        text = f"machine {name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
+        return plan_picture(found.visits, found.chosen, found.kinds, gap, title, text)
+    clampings, readings = len(found.visits), len(found.visits.readings)
+    text = f"machine {name}   ·   {clampings} clampings, {readings} readings; lines: where spindles lean"
+    return plan_picture(found.visits, range(clampings), found.purposes, None, "A first campaign", text)
 
 
 def _table(document: dict[str, Any]) -> str:

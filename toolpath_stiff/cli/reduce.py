@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import add_json_option
 from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.raw import Loop, LoopFigures
+    from toolpath_stiff.updating.raw import LoopEntry
 
 EPILOG = """\
 columns of RAW:
@@ -43,12 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.tables import read_table, split_name
-    from toolpath_stiff.updating.raw import COLUMNS, measurement_csv, read_raw, reduce_loops
+    from toolpath_stiff.tables import split_name
+    from toolpath_stiff.updating.raw import document, measurement_csv, reduce
 
-    raw = read_table(args.raw, "raw records", COLUMNS)
-    loops = read_raw(raw)
-    figures = reduce_loops(loops, args.raw)
+    reduction = reduce(args.raw)
+    loops, figures = reduction.loops, reduction.figures
     out = Path(args.out or f"{Path(split_name(args.raw)[0]).stem}_measurements.csv")
     picture = None if args.no_plots else out.with_name(f"{out.stem}_loops.png")
     replaced = check_written(args, [out, picture])
@@ -61,43 +59,25 @@ def run(args: argparse.Namespace) -> int:
     write_atomically(out, measurement_csv(loops, figures))
     if picture is not None:
         write_atomically(picture, png)
-    for note in raw.notes:
+    for note in reduction.notes:
         print(f"tps: note: {note}", file=sys.stderr)
     written = [str(path) for path in (out, picture) if path is not None]
     if args.json:
-        print(json.dumps({"loops": describe(loops, figures), "files": written}, indent=2, ensure_ascii=False))
+        print(json.dumps({"loops": document(reduction), "files": written}, indent=2, ensure_ascii=False))
     else:
-        print(table(loops, figures))
+        print(table(document(reduction)))
         print(f"\nwrote {' and '.join(written)}")
     return 0
 
 
-def describe(loops: list[Loop], figures: list[LoopFigures]) -> list[dict[str, Any]]:
-    """One dictionary a loop in the shop's units; what a loop cannot say is null."""
-    from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
-    from toolpath_stiff.updating.raw import shop_figures
-
-    found = []
-    for loop, one in zip(loops, figures, strict=True):
-        numbers = {
-            "stiffness_N_per_mm": n_per_mm_from_n_per_m(one.stiffness),
-            "force_N": one.force,
-            "deflection_um": um_from_m(one.deflection),
-            **shop_figures(one),
-        }
-        shown = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
-        found.append({"loop": loop.title, "line": loop.line, **shown})
-    return found
-
-
-def table(loops: list[Loop], figures: list[LoopFigures]) -> str:
+def table(entries: list[LoopEntry]) -> str:
     """The figures for people."""
     heading = ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
-    rows = [heading]
-    for one in describe(loops, figures):
+    rows: list[tuple[str, ...]] = [heading]
+    for one in entries:
+        lost = (one["lost_motion_um"], one["loop_width_um"], one["linearity_percent"], one["closure_um"])
         cells = [one["loop"], f"{one['stiffness_N_per_mm']:.0f}", f"{one['force_N']:.0f}"]
-        for name in ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um"):
-            cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")
+        cells += ["-" if value is None else f"{value + 0.0:.1f}" for value in (one["deflection_um"], *lost)]
         rows.append(tuple(cells))
     widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
     return "\n".join(

@@ -17,15 +17,11 @@ from toolpath_stiff.cli.measurement_arguments import (
 )
 from toolpath_stiff.cli.outputs import check_written, destination, keep
 from toolpath_stiff.cli.progress import say
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
-from toolpath_stiff.hints import command_line, hint, options
 
 if TYPE_CHECKING:
-    from toolpath_stiff.machine.model import Machine
     from toolpath_stiff.updating.correction.ladder import Update
-    from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
-    from toolpath_stiff.updating.measurements import Measurements
+    from toolpath_stiff.updating.correction.strut_law import BarCurve
 
 EPILOG = """\
 examples:
@@ -77,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit, judge, write. Refusal is success as well."""
-    _check(args)
+    check_seed(args.seed)
     args.replace |= args.force
     replaced = check_written(args, [args.output])
     target = destination(args, "update", args.data, "-update")
@@ -85,33 +81,30 @@ def run(args: argparse.Namespace) -> int:
     limit_threads(args.jobs)
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.machine import load_machine, machine_toml
+    from toolpath_stiff.updating.correction import update
     from toolpath_stiff.updating.correction.document import document, residuals_csv
     from toolpath_stiff.updating.measurements import read_measurements
 
     machine = load_machine(args.machine)
-    data = read_measurements(args.data, machine)
-    update, search = _update(args, machine, data)
-    provenance = _provenance(args, update)
-    updated = update.fitted(provenance) if update.accepted else None
-    machine_file = args.output or str(target.folder / MACHINE)
-    found = document(
-        update, updated, files=args.data, machine_file=machine_file if updated is not None else None,
-        provenance=provenance, seed=args.seed,
+    correction = update(
+        machine, read_measurements(args.data, machine), args.add, strut_law=args.strut_law,
+        keep_strut_law=args.keep_strut_law, auto=args.auto, force=args.force, objective=args.objective,
+        noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects, seed=args.seed, files=args.data,
+        machine_file=args.output or str(target.folder / MACHINE), asked=asked(args), progress=say,
     )  # fmt: skip
-    found["next"] = _next(args, updated, machine_file)
-    if search is not None:
-        found["search"] = _search(search)
+    updated = correction.machine
+    found = document(correction)
     contents: dict[str, Content] = {
         "update.json": json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
-        "residuals.csv": residuals_csv(update),
+        "residuals.csv": residuals_csv(correction.update),
     }
     if updated is not None and args.output is None:
         contents[MACHINE] = machine_toml(updated, _preamble(found))
-    if search is not None:
-        contents |= _figure3(args, machine, data)
+    if correction.bars is not None:
+        contents |= _figure3(correction.bars, args.no_plots)
     if not args.no_plots:
         say("drawing")
-        contents |= _pictures(found, update, contents.get("figure3.png"))
+        contents |= _pictures(found, correction.update, contents.get("figure3.png"))
     say("")
     keep(replaced, quiet=args.json)
     written = []
@@ -129,73 +122,6 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _next(args: argparse.Namespace, updated: Machine | None, machine_file: str) -> list[str]:
-    """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
-    if updated is None:
-        return []
-    from toolpath_stiff.stiffness.model import build_model, setup_of
-
-    model = build_model(updated, args.effects)
-    setups = [name for active in model.effects if (name := setup_of(active))]
-    found = [hint("what is left", asked(args).command("compare", machine=machine_file))]
-    shown = options(machine=machine_file, effects=args.effects, setup=setups[0] if setups else None)
-    also = " (analyze, place and pose take the same options)"
-    return [*found, hint(f"the stiffness over the workspace{also}", command_line("map", *shown))]
-
-
-def _check(args: argparse.Namespace) -> None:
-    check_seed(args.seed)
-    if args.objective == "mean-error" and (args.add or args.auto or not args.strut_law):
-        raise InputError(
-            "--objective mean-error is the paper's own estimation, of the strut law alone",
-            expected="--strut-law, without --add and --auto",
-            hint="effects are fitted by likelihood",
-        )
-
-
-def _update(args: argparse.Namespace, machine: Machine, data: Measurements) -> tuple[Update, StrutLawSearch | None]:
-    if args.objective == "mean-error":
-        from toolpath_stiff.updating.correction.strut_law import update_by_mean_error
-
-        return update_by_mean_error(
-            machine, data, noise=args.noise, strut_spread=args.strut_spread, seed=args.seed, progress=say,
-            effect_files=args.effects,
-        )  # fmt: skip
-    from toolpath_stiff.updating.correction.ladder import parse_addition, update
-
-    additions = [parse_addition(text, data, args.effects) for text in args.add]
-    found = update(
-        machine, data, additions, strut_law=args.strut_law, keep_law=args.keep_strut_law, auto=args.auto,
-        force=args.force, noise=args.noise, strut_spread=args.strut_spread, effect_files=args.effects,
-        seed=args.seed, progress=say,
-    )  # fmt: skip
-    return found, None
-
-
-def _provenance(args: argparse.Namespace, update: Update) -> dict[str, Any]:
-    """Where the fitted values come from. No date: the same data and command give the same bytes."""
-    from toolpath_stiff.updating.correction.machines import data_hash
-
-    return {
-        "data": list(args.data),
-        "data_sha256": data_hash(args.data),
-        "readings": len(update.data),
-        "command": _command(args),
-        "noise": update.noise.origin,
-        "mean_error_before_percent": round(100.0 * float(update.steps[0].fit.errors.mean()), 3),
-        "mean_error_after_percent": round(100.0 * float(update.last.fit.errors.mean()), 3),
-        "left_out_error_after_percent": round(100.0 * update.last.held.mean_error, 3),
-    }
-
-
-def _command(args: argparse.Namespace) -> str:
-    """The command that repeats the fit; where its results go does not matter."""
-    flags = {name: getattr(args, name) for name in ("strut_law", "keep_strut_law", "auto", "force")}
-    objective = args.objective if args.objective != "likelihood" else None
-    own = options(add=args.add, **flags, objective=objective, seed=args.seed or None)
-    return asked(args).command("update", *own)
-
-
 def _preamble(found: dict[str, Any]) -> str:
     from textwrap import fill
 
@@ -210,29 +136,12 @@ def _preamble(found: dict[str, Any]) -> str:
     )
 
 
-def _search(search: StrutLawSearch) -> dict[str, Any]:
-    """Starts and ends of the paper's search, in N/um."""
-    import numpy as np
-
-    machine_law = np.array([search.strut_law.stiffness_1, search.strut_law.stiffness_2]) / np.exp(search.law) / 1e6
-    return {
-        "starts_N_per_um": np.round(machine_law * np.exp(search.starts), 3).tolist(),
-        "ends_N_per_um": np.round(machine_law * np.exp(search.ends), 3).tolist(),
-        "end_errors_percent": np.round(100.0 * search.end_errors, 4).tolist(),
-        "agreeing": search.agreeing,
-    }
-
-
-def _figure3(args: argparse.Namespace, machine: Machine, data: Measurements) -> dict[str, Content]:
+def _figure3(curve: BarCurve, no_plots: bool) -> dict[str, Content]:
     """The paper's Figure 3 as data and, unless pictures are off, drawn."""
-    from toolpath_stiff.updating.correction.strut_law import bar_curve, bar_curve_csv
+    from toolpath_stiff.updating.correction.strut_law import bar_curve_csv
 
-    if any(entry.name == "platform_flexibility" for entry in machine.effects):
-        return {}
-    say("the platform's bars, soft to rigid")
-    curve = bar_curve(machine, data, seed=args.seed, starts=1)
     found: dict[str, Content] = {"figure3.csv": bar_curve_csv(curve)}
-    if not args.no_plots:
+    if not no_plots:
         from toolpath_stiff.report.figure3_picture import figure3_png
 
         found["figure3.png"] = figure3_png(

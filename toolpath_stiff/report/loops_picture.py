@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ COLUMNS = 4
 MOST = 60  # loops in one picture; further ones are counted in its heading
 
 
-def loops_png(loops: list[Loop], figures: list[LoopFigures], title: str) -> bytes:
+def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str) -> bytes:
     """One small diagram a loop, in the order of the file, as PNG."""
     shown = min(len(loops), MOST)
     columns = min(COLUMNS, shown)
