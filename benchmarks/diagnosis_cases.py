@@ -22,8 +22,8 @@ from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
 from toolpath_stiff.updating.diagnosis.document import document
 from toolpath_stiff.updating.measurements import read_measurements
 from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
-from toolpath_stiff.updating.planning.between import rivals_of
 from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
+from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
 
 LAYOUTS = ("tilted", "paper")
@@ -108,7 +108,7 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     file = folder / "measurements.csv"
     file.write_text(rig.csv_text(rows), encoding="utf-8")
     start = time.process_time()
-    diagnosis = diagnose(machine(), read_measurements(file, machine()))
+    diagnosis = diagnose(machine(), read_measurements(file, machine()), plan_next=False)
     found = document(diagnosis)
     cpu = time.process_time() - start
     record = _heading(job) | {
@@ -173,7 +173,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
     case = rig.draw_case(job.seed, job.layout, hidden=job.hidden)
     file = folder / "measurements.csv"
     file.write_text(rig.csv_text(case.rows), encoding="utf-8")
-    before = diagnose(machine(), read_measurements(file, machine()))
+    before = diagnose(machine(), read_measurements(file, machine()), plan_next=False)
     truth = case.truth["hidden"][0]
     record = _heading(job) | {"truth": [truth], "effects": case.truth["effects"], "plausible": list(before.plausible)}
     plans = {n: _plan(before, n) for n in POSES}
@@ -204,7 +204,7 @@ def _planned(job: Job, folder: Path) -> dict[str, Any]:
         for label, further, clamps in (("planned", chosen, kept), ("random", random, list(range(n)))):
             more = folder / f"{label}_{n}.csv"
             more.write_text(_rows_of_clamps(further, clamps), encoding="utf-8")
-            after = diagnose(machine(), read_measurements([file, more], machine()))
+            after = diagnose(machine(), read_measurements([file, more], machine()), plan_next=False)
             settled = after.verdict == "identified" and after.plausible == (truth,)
             record[f"{label}_{n}"] = [after.verdict, list(after.plausible), settled]
     return record

@@ -34,7 +34,8 @@ RANK = {
     "placement": 7,
     "updating": 7,
     "report": 8,
-    "cli": 9,
+    "api": 9,
+    "cli": 10,
 }
 # The same within `updating`, of its modules and rooms.
 UPDATING_RANK = {

@@ -18,6 +18,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
+    from toolpath_stiff.api.effects import EffectCheck as EffectCheck
+    from toolpath_stiff.api.effects import EffectFile as EffectFile
+    from toolpath_stiff.api.effects import check_effects as check_effects
+    from toolpath_stiff.api.effects import effect_template as effect_template
+    from toolpath_stiff.api.effects import effects as effects
     from toolpath_stiff.api.inputs import Machine as Machine
     from toolpath_stiff.api.inputs import Program as Program
     from toolpath_stiff.api.machines import MachineCheck as MachineCheck
@@ -30,6 +36,17 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.machines import pose as pose
     from toolpath_stiff.api.machines import read_poses as read_poses
     from toolpath_stiff.api.machines import recover_geometry as recover_geometry
+    from toolpath_stiff.api.measuring import Comparison as Comparison
+    from toolpath_stiff.api.measuring import Diagnosis as Diagnosis
+    from toolpath_stiff.api.measuring import Measurements as Measurements
+    from toolpath_stiff.api.measuring import Plan as Plan
+    from toolpath_stiff.api.measuring import Reduction as Reduction
+    from toolpath_stiff.api.measuring import Update as Update
+    from toolpath_stiff.api.measuring import compare as compare
+    from toolpath_stiff.api.measuring import diagnose as diagnose
+    from toolpath_stiff.api.measuring import plan as plan
+    from toolpath_stiff.api.measuring import reduce as reduce
+    from toolpath_stiff.api.measuring import update as update
     from toolpath_stiff.api.placements import CaseStudy as CaseStudy
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
@@ -43,25 +60,34 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.programs import analyze as analyze
     from toolpath_stiff.api.programs import check as check
     from toolpath_stiff.api.programs import sample_path as sample_path
+    from toolpath_stiff.errors import EffectFault as EffectFault
     from toolpath_stiff.errors import InputError as InputError
     from toolpath_stiff.errors import InputErrors as InputErrors
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
+    from toolpath_stiff.stiffness.effects.contract import Effect as Effect
+    from toolpath_stiff.stiffness.effects.contract import Parameter as Parameter
 
 __version__ = "0.2.0"
 
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
+    "api.effects": (
+        "EffectCatalogue", "EffectCheck", "EffectFile", "check_effects", "effect_template", "effects",
+    ),
     "api.inputs": ("Machine", "Program"),
     "api.machines": (
         "MachineCheck", "MachineFile", "PoseStiffness", "StiffnessMap", "machine_from_linuxcnc", "machine_template",
         "map_stiffness", "pose", "read_poses", "recover_geometry",
     ),
-    "api.placements": (
-        "CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite",
+    "api.measuring": (
+        "Comparison", "Diagnosis", "Measurements", "Plan", "Reduction", "Update", "compare", "diagnose", "plan",
+        "reduce", "update",
     ),
+    "api.placements": ("CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
-    "errors": ("InputError", "InputErrors", "TpsError", "UnreachableError"),
+    "errors": ("EffectFault", "InputError", "InputErrors", "TpsError", "UnreachableError"),
+    "stiffness.effects.contract": ("Effect", "Parameter"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 

@@ -17,10 +17,11 @@ from toolpath_stiff import rig
 from toolpath_stiff.machine import Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose, testable_effects
+from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
 from toolpath_stiff.updating.inference import Judgement, judge
+from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance, noise_models
+from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements, read_measurements
 
@@ -146,14 +147,23 @@ def simple_noise(
 def judged(seed: int, layout: str = "tilted", hidden: str = "none", size: float | None = None) -> Judgement:
     """The judgement of a rig campaign under the noise that the data give away or state."""
     data, _ = campaign(seed, layout, hidden, size)
-    predictor = Predictor(nist(), data)
     (noise,) = noise_models(data)
-    spread = covariance(noise, predictor)
-    problem = Problem(predictor, Scatter.of(noise, spread), spread)
-    return judge(problem, noise, spread, testable_effects(predictor)[0], seed=0)
+    problem = Problem.of(Predictor(nist(), data), noise)
+    return judge(problem, noise, testable_effects(problem.predictor)[0], seed=0)
+
+
+def make_problem(machine: Machine, data: Measurements, noise: Noise) -> tuple[Problem, FloatArray]:
+    """Data, model and scatter, ready for fits; and the covariance (n, n) of ln readings."""
+    problem = Problem.of(Predictor(machine, data), noise)
+    return problem, problem.covariance
+
+
+def examined(machine: Machine, data: Measurements, **options: Any) -> Diagnosis:
+    """A diagnosis without the plan of what to measure next."""
+    return diagnose(machine, data, plan_next=False, **options)
 
 
 @cache
 def diagnosed(seed: int, layout: str = "paper", hidden: str = "none", size: float | None = None) -> Diagnosis:
     """The whole diagnosis of a rig campaign."""
-    return diagnose(nist(), campaign(seed, layout, hidden, size)[0])
+    return examined(nist(), campaign(seed, layout, hidden, size)[0])

@@ -11,9 +11,9 @@ from scipy.integrate import quad
 
 from tests.effects.cases import all_effects
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, readings_by_hand, simple_noise, table_1
+from tests.updating.cases import campaign, make_problem, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.stiffness.effects.contract import Parameter
-from toolpath_stiff.updating.diagnosis import make_problem, testable_effects
+from toolpath_stiff.updating.inference import candidates
 from toolpath_stiff.updating.inference.candidates import (
     EXPECTED,
     VISIBLE,
@@ -149,7 +149,7 @@ def test_what_does_nothing_to_the_data_has_no_table():
 
 
 def test_effects_without_their_columns_are_named_with_what_they_lack():
-    effects, cannot = testable_effects(Predictor(nist(), table_1()))
+    effects, cannot = candidates.testable_effects(Predictor(nist(), table_1()))
     for name in ("joint_clearance", "contact_nonlinearity"):
         assert cannot[name] == ("force_N",)
     assert set(cannot["thermal_drift"]) >= {"time_min"}

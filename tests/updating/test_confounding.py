@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from scipy.linalg import subspace_angles
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, simple_noise, table_1
+from tests.updating.cases import campaign, make_problem, simple_noise, table_1
 from tests.updating.test_evidence import COUNT, by_hand, logs_by_hand, one_table, scatter
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.hypotheses import (
     CONFOUNDED,

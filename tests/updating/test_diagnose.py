@@ -12,10 +12,9 @@ import pytest
 
 from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, diagnosed, readings_by_hand, table_1
+from tests.updating.cases import campaign, diagnosed, examined, readings_by_hand, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis import diagnose
 from toolpath_stiff.updating.diagnosis.document import document
 from toolpath_stiff.updating.inference.prediction import scaled_law
 
@@ -56,7 +55,7 @@ EFFECTS = [Saddle()]
 
 
 def found(verdict: str) -> dict[str, Any]:
-    return document(diagnosed(*CASES[verdict]), "tps diagnose measurements.csv")
+    return document(replace(diagnosed(*CASES[verdict]), command="tps diagnose measurements.csv"))
 
 
 @pytest.mark.parametrize("verdict", CASES)
@@ -147,16 +146,16 @@ def test_where_nothing_is_missing_the_detectable_sizes_are_named():
 
 def test_the_same_data_and_seed_give_the_same_document():
     data = campaign(*CASES["ambiguous"])[0]
-    again = document(diagnose(nist(), data), "tps diagnose measurements.csv")
+    again = document(examined(nist(), data, command="tps diagnose measurements.csv"))
     assert json.dumps(again) == json.dumps(found("ambiguous"))
-    other = document(diagnose(nist(), data, seed=5), "tps diagnose measurements.csv")
+    other = document(examined(nist(), data, seed=5, command="tps diagnose measurements.csv"))
     assert other["gates"]["simulated_squares"] != again["gates"]["simulated_squares"]
     assert other["verdict"] == again["verdict"]
 
 
 def test_shuffled_readings_give_the_same_verdict_and_the_same_sizes():
     data = campaign(*CASES["identified"])[0]
-    shuffled = diagnose(nist(), data.select(np.random.default_rng(0).permutation(len(data))))
+    shuffled = examined(nist(), data.select(np.random.default_rng(0).permutation(len(data))))
     plain = diagnosed(*CASES["identified"])
     assert (shuffled.verdict, shuffled.plausible) == (plain.verdict, plain.plausible)
     name = "table_compliance"
@@ -168,7 +167,7 @@ def test_shuffled_readings_give_the_same_verdict_and_the_same_sizes():
 def test_stiffer_readings_move_the_law_and_nothing_else():
     """A unit that is off by 5 % everywhere is a change of the strut law, not an effect."""
     data = campaign(*CASES["identified"])[0]
-    louder = diagnose(nist(), replace(data, stiffness=1.05 * data.stiffness, sd=1.05 * data.sd))
+    louder = examined(nist(), replace(data, stiffness=1.05 * data.stiffness, sd=1.05 * data.sd))
     plain = diagnosed(*CASES["identified"])
     assert louder.verdict == plain.verdict and louder.plausible == plain.plausible
     # The prior of the law (20 %) holds it back by a few thousandths.
@@ -177,8 +176,8 @@ def test_stiffer_readings_move_the_law_and_nothing_else():
 
 def test_more_noise_is_less_sure():
     data = campaign(*CASES["identified"])[0]
-    assert diagnose(nist(), data, noise=0.10).verdict in ("adequate", "ambiguous")
-    spread = diagnose(nist(), data, strut_spread=0.10)
+    assert examined(nist(), data, noise=0.10).verdict in ("adequate", "ambiguous")
+    spread = examined(nist(), data, strut_spread=0.10)
     assert spread.noise.strut_spread == 0.10
     sure, doubtful = (d.main.probability["table_compliance"] for d in (diagnosed(*CASES["identified"]), spread))
     assert doubtful <= sure
@@ -192,7 +191,7 @@ def test_a_users_own_effect_takes_part(tmp_path):
     file = tmp_path / "saddle.py"
     file.write_text(SADDLE, encoding="utf-8")
     data, truth = campaign(*case)
-    after = diagnose(nist(), data, effect_files=[file])
+    after = examined(nist(), data, effect_files=[file])
     assert (after.verdict, after.plausible) == ("identified", ("saddle",))
     fit = after.fits["saddle"]
     hidden = truth["effects"][0]["parameters"]["size"]  # m/N at y = 0.3 m
@@ -204,23 +203,23 @@ def test_a_users_own_effect_takes_part(tmp_path):
 
 def test_an_effect_that_the_machine_has_already_is_not_tried_again():
     data = campaign(*CASES["identified"])[0]
-    with_bars = diagnose(nist(bars=5e8), data)
+    with_bars = examined(nist(bars=5e8), data)
     assert "platform_flexibility" not in {family.name for family in with_bars.main.families}
 
 
 def test_too_few_or_planned_readings_are_refused():
     few = readings_by_hand([4e7] * 5, (0.0, 0.0, 0.8), np.eye(3)[[0, 1, 2, 0, 1]])
     with pytest.raises(InputError, match="5 readings"):
-        diagnose(nist(), few)
+        examined(nist(), few)
     data = table_1()
     planned = replace(data, stiffness=np.where(np.arange(42) == 3, np.nan, data.stiffness))
     with pytest.raises(InputError, match="1 without a stiffness"):
-        diagnose(nist(), planned)
+        examined(nist(), planned)
 
 
 def test_six_readings_are_diagnosed_without_a_name():
     """Hardly more readings than parameters: nothing can be claimed, and nothing breaks."""
     six = table_1().select(np.arange(0, 42, 7))
-    verdict = diagnose(nist(), six, noise=0.05)
+    verdict = examined(nist(), six, noise=0.05)
     assert verdict.verdict in ("adequate", "ambiguous")
     json.dumps(document(verdict), allow_nan=False)

@@ -19,13 +19,13 @@ from scipy.special import logsumexp
 from tests.stiffness.cases import nist, orthogonal_hexapod
 from tests.updating.cases import (
     campaign,
+    make_problem,
     oblique_directions,
     orthogonal_compliance,
     readings_by_hand,
     simple_noise,
 )
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.inference.candidates import Table, candidates_of, tabulate
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
 from toolpath_stiff.updating.inference.hypotheses import probabilities, score_families, score_family

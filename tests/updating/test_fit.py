@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import active, campaign, simple_noise
+from tests.updating.cases import active, campaign, make_problem, simple_noise
 from toolpath_stiff.machine import Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.diagnosis.document import parameters
 from toolpath_stiff.updating.inference.candidates import Candidate, candidates_of
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem

@@ -11,9 +11,8 @@ from scipy.optimize import nnls
 from scipy.stats import binom, chi2, kstest
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, simple_noise
+from tests.updating.cases import campaign, make_problem, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.inference.evidence import Problem, Score
 from toolpath_stiff.updating.inference.gates import (
     DRAWS,

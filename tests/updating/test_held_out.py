@@ -9,9 +9,8 @@ import pytest
 from scipy.stats import ttest_1samp
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, simple_noise
+from tests.updating.cases import campaign, make_problem, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.inference.candidates import candidates_of
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import Fit, _inverse_without, fit_effects, gain_in_standard_errors, held_out

@@ -9,9 +9,8 @@ import pytest
 from scipy.stats import norm
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign
+from tests.updating.cases import campaign, make_problem
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.diagnosis import make_problem
 from toolpath_stiff.updating.diagnosis.document import parameters
 from toolpath_stiff.updating.inference.candidates import likely_interval
 from toolpath_stiff.updating.inference.fits import refine

@@ -29,15 +29,16 @@ from toolpath_stiff.report.explanations import explanations, headline, is_plausi
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.comparison import Comparison, compare
+from toolpath_stiff.updating.correction import Correction
 from toolpath_stiff.updating.correction.document import document as update_document
 from toolpath_stiff.updating.correction.document import residuals_csv
-from toolpath_stiff.updating.correction.ladder import _Work, parse_addition, update
+from toolpath_stiff.updating.correction.ladder import _Work, build_ladder, parse_addition
 from toolpath_stiff.updating.diagnosis import words as verdict_words
 from toolpath_stiff.updating.diagnosis.document import document as diagnosis_document
 from toolpath_stiff.updating.diagnosis.document import words
 from toolpath_stiff.updating.inference import NONE
 from toolpath_stiff.updating.measurements import Measurements
-from toolpath_stiff.updating.planning.between import errors_so_far, rivals_of
+from toolpath_stiff.updating.planning.rivals import errors_so_far, rivals_of
 
 # Seed, layout, what is hidden, its size: one of each verdict.
 CASES = {
@@ -57,14 +58,14 @@ def compared(data: Measurements) -> Comparison:
 @cache
 def told(verdict: str) -> dict[str, Any]:
     """The document of a diagnosis."""
-    return diagnosis_document(diagnosed(*CASES[verdict]), "tps diagnose a.csv")
+    return diagnosis_document(replace(diagnosed(*CASES[verdict]), command="tps diagnose a.csv"))
 
 
 def updated(data: Measurements, *names: str, **options: Any) -> dict[str, Any]:
     """The document of an update."""
-    found = update(nist(), data, [parse_addition(name, data) for name in names], **options)
+    found = build_ladder(nist(), data, [parse_addition(name, data) for name in names], **options)
     machine = found.fitted(PROVENANCE) if found.accepted else None
-    return update_document(found, machine, files=["a.csv"], machine_file=None, provenance=PROVENANCE, seed=0)
+    return update_document(Correction(found, machine, PROVENANCE, ("a.csv",), None, seed=0))
 
 
 # -- one baseline ------------------------------------------------------------------------------------------------------
@@ -110,11 +111,11 @@ def test_a_kept_law_is_said_beside_the_refitted_one():
 
 def test_nothing_added_leaves_the_machine_file_as_it_is():
     """The refitted law is shown, and it is not written unless it is asked for."""
-    found = update(nist(), table_1(), auto=True)
+    found = build_ladder(nist(), table_1(), auto=True)
     assert not found.accepted and not found.changed
     assert [step.name for step in found.steps] == ["as given", "strut law refitted"]
     assert found.last is found.steps[0]
-    assert update(nist(), table_1(), strut_law=True).accepted
+    assert build_ladder(nist(), table_1(), strut_law=True).accepted
 
 
 # -- one sign ----------------------------------------------------------------------------------------------------------
@@ -135,10 +136,8 @@ def test_minus_is_softer_than_modelled_everywhere(factor, sign):
     signs += [float(found.residual.mean())]  # what every picture of residuals draws, as 100 (exp r - 1)
     compliance = np.mean(1.0 / data.stiffness) / np.mean(np.exp(-found.log_model))
     signs += [stiffness_deviation_percent(float(compliance))]
-    found_update = update(nist(), data, strut_law=True)
-    told_update = update_document(
-        found_update, None, files=[], machine_file=None, provenance=PROVENANCE, seed=0
-    )["steps"][0]  # fmt: skip
+    found_update = build_ladder(nist(), data, strut_law=True)
+    told_update = update_document(Correction(found_update, None, PROVENANCE, (), None, seed=0))["steps"][0]
     signs += [told_update["bias_percent"], *(one["bias_percent"] for one in told_update["by_direction"].values())]
     rows = list(csv.DictReader(io.StringIO(residuals_csv(found_update))))
     signs += [np.mean([float(row["as_given_deviation_percent"]) for row in rows])]

@@ -21,15 +21,8 @@ from toolpath_stiff.rig.nominal import reachable as rig_reachable
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
 from toolpath_stiff.updating.planning.document import plan_document
-from toolpath_stiff.updating.planning.rivals import (
-    Forecast,
-    ReadingNoise,
-    Rival,
-    expected_outcome,
-    forecast_all,
-    joint_columns,
-    pair_shares,
-)
+from toolpath_stiff.updating.planning.gaps import ReadingNoise, expected_outcome, pair_shares
+from toolpath_stiff.updating.planning.rivals import Forecast, Rival, forecast_all, joint_columns
 from toolpath_stiff.updating.planning.visits import Costs, Matters, Menu, possible_visits
 
 

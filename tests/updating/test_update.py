@@ -13,8 +13,9 @@ from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import machine_toml, parse_machine
 from toolpath_stiff.machine.model import EffectEntry
+from toolpath_stiff.updating.correction import Correction
 from toolpath_stiff.updating.correction.document import document, residuals_csv
-from toolpath_stiff.updating.correction.ladder import parse_addition, update
+from toolpath_stiff.updating.correction.ladder import build_ladder, parse_addition
 from toolpath_stiff.updating.correction.strut_law import update_by_mean_error
 from toolpath_stiff.updating.inference.prediction import Predictor
 
@@ -51,7 +52,9 @@ def readings(*effects, law=(0.0, 0.0), scatter=0.02, seed=1):
 
 def updated(data, *names, files=(), **options):
     machine = options.pop("machine", nist())
-    return update(machine, data, [parse_addition(name, data, files) for name in names], effect_files=files, **options)
+    return build_ladder(
+        machine, data, [parse_addition(name, data, files) for name in names], effect_files=files, **options
+    )
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +62,7 @@ def two():
     """24 tilted poses of a rig machine that hides contact nonlinearity and a gauge 4 % off along Y."""
     data, truth = campaign(9, "tilted", "two")
     assert [one["effect"] for one in truth["effects"]] == ["contact_nonlinearity", "gauge_scale"]
-    return update(nist(), data, auto=True, strut_law=True), truth
+    return build_ladder(nist(), data, auto=True, strut_law=True), truth
 
 
 @pytest.fixture(scope="module")
@@ -150,10 +153,10 @@ def test_what_is_not_there_is_refused_unless_forced():
         assert not found.accepted
         assert found.supports[0].reasons
         assert updated(data, name, strut_law=True, force=True).accepted
-    told = document(found, None, files=["a.csv"], machine_file=None, provenance=PROVENANCE, seed=0)
+    told = document(Correction(found, None, PROVENANCE, ("a.csv",), None, seed=0))
     assert told["verdict"] == "refused"
     assert found.supports[0].reasons[0] in told["text"]
-    assert not update(nist(), data, auto=True, strut_law=True).last.fit.names
+    assert not build_ladder(nist(), data, auto=True, strut_law=True).last.fit.names
 
 
 def test_a_parameter_at_its_bound_is_refused():
@@ -227,9 +230,7 @@ def test_the_papers_own_estimation():
 
 
 def test_the_document_and_the_residuals_agree_with_the_fit(weak):
-    told = document(
-        weak, weak.fitted(PROVENANCE), files=["a.csv"], machine_file="m.toml", provenance=PROVENANCE, seed=0
-    )
+    told = document(Correction(weak, weak.fitted(PROVENANCE), PROVENANCE, ("a.csv",), "m.toml", seed=0))
     assert told["verdict"] == "updated"
     assert [step["name"] for step in told["steps"]] == ["as given", "strut law refitted", "+ weak_strut (strut 3)"]
     assert set(told["steps"][0]["by_direction"]) == {"X", "Y", "Z"}
@@ -265,11 +266,11 @@ def test_additions_that_cannot_be(text, match):
 def test_updates_that_cannot_be():
     data = readings()
     with pytest.raises(InputError, match="nothing to update"):
-        update(nist(), data)
+        build_ladder(nist(), data)
     with pytest.raises(InputError, match="twice"):
         updated(data, "weak_strut:strut=3", "weak_strut:strut=4")
     carrying = nist().with_changes(effects=(EffectEntry("joint_compliance", {"compliance_nm_per_N": 1.0}),))
     with pytest.raises(InputError, match="already"):
         updated(data, "joint_compliance", machine=carrying)
     with pytest.raises(InputError, match="at least 6"):
-        update(nist(), data.select(np.arange(5)), strut_law=True)
+        build_ladder(nist(), data.select(np.arange(5)), strut_law=True)

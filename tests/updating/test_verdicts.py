@@ -14,8 +14,8 @@ import pytest
 from scipy.stats import binom
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, diagnosed, judged, table_1
-from toolpath_stiff.updating.diagnosis import common_verdict, diagnose
+from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
+from toolpath_stiff.updating.diagnosis import common_verdict
 from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, _smallest_set
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate, discrepancy_forms
@@ -114,7 +114,7 @@ def test_residuals_of_the_other_sign_mean_something_else():
     data = campaign(7, "paper", "weak_strut", STRONG)[0]
     problem = judged(7, "paper", "weak_strut", STRONG).problem
     mirrored = np.exp(2.0 * problem.predictor.log_stiffness() - problem.observed)
-    found = diagnose(nist(), replace(data, stiffness=mirrored, sd=data.sd * mirrored / data.stiffness))
+    found = examined(nist(), replace(data, stiffness=mirrored, sd=data.sd * mirrored / data.stiffness))
     assert not (found.verdict == "identified" and found.plausible == ("weak_strut",))
 
 
@@ -140,7 +140,7 @@ def test_what_no_effect_describes_is_unexplained(layout, oddity):
 
 def test_table_1_gives_no_confident_name():
     """The negative control: without repeats or stated scatter a low and a high guess, and no name under both."""
-    found = diagnose(nist(), table_1())
+    found = examined(nist(), table_1())
     assert set(found.judgements) == {"low", "high"}
     assert found.verdict != "identified"
     assert len(found.plausible) > 1

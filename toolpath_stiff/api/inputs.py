@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import options
 from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
@@ -202,7 +203,7 @@ class Machine:
 
         model, setup, said_by = self.model, self.setup, f"--setup {self.setup}"
         if setup is None and program is not None:
-            setup, said_by = program.controller.setup, program.controller_file
+            setup, said_by = program.controller.setup, str(program.said.get("controller"))
         check_setup(model.conditions.setup or "", f"machine {self.name}, [setup] name", model)
         check_setup(setup or "", said_by, model, *(other.model for other in beside))
         asked = "" if setup == NO_SETUP else setup
@@ -319,8 +320,7 @@ class Program:
     controller: Controller = field(repr=False)
     options: dict[str, Any] = field(repr=False)
     text: str | None = field(default=None, repr=False)
-    controller_file: str = ""
-    read_with: tuple[str, ...] = ()
+    said: dict[str, Any] = field(default_factory=dict, repr=False)
     _last: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
@@ -365,11 +365,8 @@ class Program:
 
         if not Path(file).is_file():
             read_lines(file)  # says what is wrong with it
-        control, options = _control(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
-        beside = tuple(str(one) for one in (controller, offsets, tools) if one)
-        return cls(
-            Path(file).name, str(file), control, options, controller_file=str(controller or ""), read_with=beside
-        )
+        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
+        return cls(Path(file).name, str(file), *_control(said, block_delete), said=said)
 
     @classmethod
     def from_text(
@@ -386,8 +383,8 @@ class Program:
         rs274: str | None = None,
     ) -> Program:
         """A program given as text; arguments as of `read`."""
-        control, options = _control(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
-        return cls(name, None, control, options, text, controller_file=str(controller or ""))
+        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
+        return cls(name, None, *_control(said, block_delete), text, said)
 
     def __repr__(self) -> str:
         count = "" if self.text is None else f": {len(self.text.splitlines())} lines"
@@ -407,9 +404,15 @@ class Program:
         return {"offsets": control.offsets, "tools": control.tools, "block_delete": self.options["block_delete"]}
 
     @property
+    def words(self) -> list[str]:
+        """The options of a command that say how it is read."""
+        return options(**self.said)
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         """The files that it is read from."""
-        return (*([self.file] if self.file else []), *self.read_with)
+        beside = (self.said[name] for name in ("controller", "offsets", "tools"))
+        return tuple(one for one in (self.file, *beside) if one)
 
     def moves(self, origin: Pose | None = None, default_origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> ReadProgram:
         """The program read for a zero, SI: as asked for, and unless anyone says; the last one is kept.
@@ -444,7 +447,7 @@ class Program:
         return pd.DataFrame(move_columns(self.moves().moves))
 
 
-def _control(
+def _said(
     dialect: str | None,
     controller: str | Path | None,
     offsets: str | Path | None,
@@ -452,21 +455,35 @@ def _control(
     block_delete: bool | Iterable[int],
     interpreter: str,
     rs274: str | None,
-) -> tuple[Controller, dict[str, Any]]:
-    """The control that the arguments describe, tables included, and the other options of reading."""
+) -> dict[str, Any]:
+    """What was said of the reading, as options have it; None for what was not."""
+    switches = block_delete if isinstance(block_delete, bool) else sorted(block_delete)
+    if not isinstance(switches, bool) and not all(switch in range(1, 10) for switch in switches):
+        raise InputError(f"block_delete {switches}", expected="switches 1 to 9, True or False")
+    return {
+        "dialect": dialect,
+        **{name: str(file) if file else None for name, file in (("controller", controller), ("offsets", offsets))},
+        "tools": str(tools) if tools else None,
+        "block_delete": ",".join(map(str, switches)) if isinstance(switches, list) else switches,
+        "interpreter": interpreter if interpreter != "builtin" else None,
+        "rs274": rs274,
+    }
+
+
+def _control(said: Mapping[str, Any], block_delete: bool | Iterable[int]) -> tuple[Controller, dict[str, Any]]:
+    """The control that is meant, tables included, and the other options of reading."""
     from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
     from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 
-    unknown = Controller(dialect_named(dialect or "generic"))
-    found = read_controller(str(controller), dialect) if controller else unknown
-    if offsets:
-        found = replace(found, offsets=read_offsets(str(offsets)))
-    if tools:
-        found = replace(found, tools=read_tool_table(str(tools)))
+    unknown = Controller(dialect_named(said["dialect"] or "generic"))
+    found = read_controller(said["controller"], said["dialect"]) if said["controller"] else unknown
+    if said["offsets"]:
+        found = replace(found, offsets=read_offsets(said["offsets"]))
+    if said["tools"]:
+        found = replace(found, tools=read_tool_table(said["tools"]))
     switches = block_delete if isinstance(block_delete, bool) else frozenset(block_delete)
-    if not isinstance(switches, bool) and not all(switch in range(1, 10) for switch in switches):
-        raise InputError(f"block_delete {sorted(switches)}", expected="switches 1 to 9, True or False")
-    return found, {"block_delete": switches, "interpreter": interpreter, "rs274": rs274}
+    interpreter = said["interpreter"] or "builtin"
+    return found, {"block_delete": switches, "interpreter": interpreter, "rs274": said["rs274"]}
 
 
 def program_from(program: Program | str | Path) -> Program:

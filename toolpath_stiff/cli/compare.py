@@ -9,11 +9,11 @@ from toolpath_stiff.cli.measurement_arguments import (
     add_data_arguments,
     add_noise_arguments,
     add_output_arguments,
-    asked,
-    check_seed,
+    measured,
+    noise_options,
 )
-from toolpath_stiff.cli.outputs import destination
-from toolpath_stiff.hints import hint
+from toolpath_stiff.cli.outputs import destination, show
+from toolpath_stiff.cli.progress import progress_line
 
 EPILOG = """\
 examples:
@@ -39,26 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compare, write, say where the model fails."""
-    check_seed(args.seed)
-    limit_threads(args.jobs)
-    from toolpath_stiff.machine import load_machine
-    from toolpath_stiff.report.compare import files, names, text
-    from toolpath_stiff.updating.comparison import compare
-    from toolpath_stiff.updating.measurements import read_measurements
+    from toolpath_stiff.report.compare import names
 
     target = destination(args, "compare", args.data, "-compare").check(names(not args.no_plots))
-    machine = load_machine(args.machine)
-    found = compare(
-        machine, read_measurements(args.data, machine), noise=args.noise, strut_spread=args.strut_spread,
-        effect_files=args.effects, seed=args.seed, jobs=args.jobs,
-    )  # fmt: skip
-    found.document["next"] = [hint("which effect would explain it", asked(args).command("diagnose"))]
-    contents = files(found, plots=not args.no_plots)
-    written = target.write(contents)
-    if args.json:
-        print(contents["compare.json"], end="")
-    else:
-        print(text(found.document))
-        print("\n".join(found.document["next"]))
-        print("\n".join(["written:", *(f"  {file}" for file in written)]))
-    return 0
+    limit_threads(args.jobs)
+    from toolpath_stiff.api.measuring import compare
+
+    with progress_line(quiet=args.json) as progress:
+        found = compare(*measured(args), **noise_options(args), progress=progress)
+        return show(args, found, target)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import add_json_option, finite_number
 from toolpath_stiff.cli.outputs import add_replace_option
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import MACHINE, STRUT_SPREAD, Asked
+from toolpath_stiff.hints import MACHINE, STRUT_SPREAD
+
+if TYPE_CHECKING:
+    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.measuring import Measurements
 
 
 def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherwise: str = "") -> None:
@@ -35,7 +39,7 @@ def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and
         f"(default: from repeats, else from sd_N_per_mm, else {guess})",
     )  # fmt: skip
     group.add_argument(
-        "--strut-spread", type=spread_argument, default=STRUT_SPREAD, metavar="PERCENT",
+        "--strut-spread", type=spread_argument, default=100.0 * STRUT_SPREAD, metavar="PERCENT",
         help="of the struts' stiffness (default: 1)",
     )  # fmt: skip
 
@@ -55,28 +59,30 @@ def add_output_arguments(
     add_json_option(parser, f"print {command}.json to standard output and nothing else")
 
 
-def asked(args: argparse.Namespace) -> Asked:
-    """What the next command on these data has to carry on."""
-    return Asked(tuple(args.data), args.machine, tuple(args.effects), args.noise, args.strut_spread)
+def measured(args: argparse.Namespace) -> tuple[Machine, Measurements]:
+    """The machine with its effect files, and the measurements."""
+    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.measuring import Measurements
+
+    return Machine.load(args.machine, effects=args.effects), Measurements(args.data)
 
 
-def check_seed(seed: int) -> None:
-    """Raise `InputError` for a negative seed."""
-    if seed < 0:
-        raise InputError(f"--seed {seed}", expected="0 or more")
+def noise_options(args: argparse.Namespace) -> dict[str, Any]:
+    """--noise, --strut-spread and --seed, as every function on measurements takes them."""
+    return {"noise_percent": args.noise, "strut_spread_percent": args.strut_spread, "seed": args.seed}
 
 
 def noise_argument(text: str) -> float | tuple[float, float]:
-    """One or two percentages as relative standard deviations."""
-    parts = [finite_number(part) / 100.0 for part in text.split(",")]
-    if len(parts) > 2 or not all(0.0 <= part <= 0.5 for part in parts) or parts[0] <= 0.0:
+    """One or two percentages."""
+    parts = [finite_number(part) for part in text.split(",")]
+    if len(parts) > 2 or not all(0.0 <= part <= 50.0 for part in parts) or parts[0] <= 0.0:
         raise argparse.ArgumentTypeError(f"{text!r}: expected one or two percentages, more than 0 and at most 50")
     return parts[0] if len(parts) == 1 else (parts[0], parts[1])
 
 
 def spread_argument(text: str) -> float:
-    """A percentage from 0 to 50 as a relative standard deviation."""
+    """A percentage from 0 to 50."""
     value = finite_number(text)
     if not 0.0 <= value <= 50.0:
         raise argparse.ArgumentTypeError(f"{text} %: expected 0 to 50 %")
-    return value / 100.0
+    return value

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from toolpath_stiff.cli.arguments import add_json_option
 from toolpath_stiff.cli.outputs import add_replace_option, check_written, keep
-
-if TYPE_CHECKING:
-    pass
 
 EPILOG = """\
 columns of RAW:
@@ -41,24 +36,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
+    from toolpath_stiff.api.measuring import reduce
+    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
-    from toolpath_stiff.report.reduce import describe, files, names, text
-    from toolpath_stiff.tables import read_table, split_name
-    from toolpath_stiff.updating.raw import COLUMNS, read_raw, reduce_loops
+    from toolpath_stiff.tables import split_name
 
-    raw = read_table(args.raw, "raw records", COLUMNS)
-    loops = read_raw(raw)
-    figures = reduce_loops(loops, args.raw)
+    found = reduce(args.raw)
     out = Path(args.out or f"{Path(split_name(args.raw)[0]).stem}_measurements.csv")
-    replaced = check_written(args, names(out, plots=not args.no_plots))
-    contents = files(loops, figures, out, Path(args.raw).name, plots=not args.no_plots)
-    keep(replaced, quiet=args.json)
-    written = [str(write_atomically(path, content)) for path, content in contents.items()]
-    for note in raw.notes:
+    files = found.files(out, plots=not args.no_plots)
+    keep(check_written(args, files), quiet=args.json)
+    written = [str(write_atomically(name, content)) for name, content in files.items()]
+    for note in found.notes:
         print(f"tps: note: {note}", file=sys.stderr)
     if args.json:
-        print(json.dumps({"loops": describe(loops, figures), "files": written}, indent=2, ensure_ascii=False))
+        sys.stdout.write(json_text({**found.to_dict(), "files": written}))
     else:
-        print(text(loops, figures))
-        print(f"\nwrote {' and '.join(written)}")
+        print(f"{found}\n\nwrote {' and '.join(written)}")
     return 0

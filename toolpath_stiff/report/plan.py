@@ -13,15 +13,20 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, picture
 from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m
-from toolpath_stiff.updating.planning.document import POSE, GapMap, group_of, height_groups, plan_csv
+from toolpath_stiff.updating.planning import Plan, Proposal
+from toolpath_stiff.updating.planning.document import (
+    GapMap,
+    gap_map,
+    group_of,
+    height_groups,
+    plan_csv,
+    rows_of,
+)
 from toolpath_stiff.updating.planning.visits import Visits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from toolpath_stiff.updating.planning import Plan
-    from toolpath_stiff.updating.planning.campaign import Campaign
 
 FloatArray = NDArray[np.float64]
 
@@ -198,18 +203,17 @@ def _legend(figure: Any, kinds: Sequence[str]) -> None:
     )
 
 
-def rivals_picture(plan: Plan, gap: GapMap, machine: str) -> bytes:
-    """The picture of a plan that tells rivals apart, over the gap between the two that are alike most."""
-    title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
-    text = f"machine {machine}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
-    return plan_picture(plan.visits, plan.chosen, plan.kinds, gap, title, text)
-
-
-def campaign_picture(campaign: Campaign, readings: int, machine: str) -> bytes:
-    """The picture of a first campaign: the poses alone."""
-    chosen = range(len(campaign.visits))
-    text = f"machine {machine}   ·   {len(chosen)} clampings, {readings} readings; lines: where spindles lean"
-    return plan_picture(campaign.visits, chosen, campaign.purposes, None, "A first campaign", text)
+def picture_arguments(proposal: Proposal) -> tuple[Any, ...]:
+    """What `plan_picture` takes: the visits, and of a plan between rivals how well each place tells them apart."""
+    found, name = proposal.plan, proposal.machine.name
+    if isinstance(found, Plan):
+        gap = gap_map(proposal.machine, found, proposal.menu, proposal.effect_files)
+        title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
+        text = f"machine {name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
+        return found.visits, found.chosen, found.kinds, gap, title, text
+    clampings, readings = len(found.visits), len(found.visits.readings)
+    text = f"machine {name}   ·   {clampings} clampings, {readings} readings; lines: where spindles lean"
+    return found.visits, range(clampings), found.purposes, None, "A first campaign", text
 
 
 def names(plots: bool = True) -> tuple[str, ...]:
@@ -217,43 +221,13 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return ("plan.csv", "plan.json", *(("plan.png",) if plots else ()))
 
 
-def files(
-    document: Mapping[str, Any], rows: Sequence[dict[str, Any]], picture: bytes | None = None
-) -> dict[str, Content]:
-    """The measurement file to fill in, `document` as JSON, and the picture where one was drawn."""
+def files(proposal: Proposal, document: Mapping[str, Any], *, plots: bool = True) -> dict[str, Content]:
+    """The measurement file to fill in, `document` as JSON, and with `plots` the picture."""
     contents: dict[str, Content] = {
-        "plan.csv": plan_csv(rows),
+        "plan.csv": plan_csv(rows_of(proposal)),
         "plan.json": json.dumps(document, indent=2, ensure_ascii=False) + "\n",
     }
-    return contents | ({"plan.png": picture} if picture is not None else {})
-
-
-def visit_entries(rows: list[dict[str, Any]], kinds: tuple[str, ...], why: tuple[str, ...]) -> list[dict[str, Any]]:
-    """One entry a clamping: where, how, what is read, why."""
-    found = []
-    for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):
-        own = [row for row in rows if row["clamp"] == clamp]
-        first = own[0]
-        found.append(
-            {
-                "clamp": clamp,
-                "point": first["point"],
-                **{name: first[name] for name in POSE},
-                "tool_extension_mm": first["tool_extension_mm"],
-                "setup": first.get("setup", ""),
-                "forces_N": sorted({row["force_N"] for row in own}),
-                "directions": list(dict.fromkeys(_direction(row) for row in own)),
-                "kind": kind,
-                "why": reason,
-            }
-        )
-    return found
-
-
-def _direction(row: dict[str, Any]) -> str:
-    if "direction" in row:
-        return str(row["direction"])
-    return "".join(axis for axis, part in zip("XYZ", (row["dx"], row["dy"], row["dz"]), strict=True) if part)
+    return contents | ({"plan.png": plan_picture(*picture_arguments(proposal))} if plots else {})
 
 
 def text(document: Mapping[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,19 +12,19 @@ import numpy as np
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.figure import INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
-from toolpath_stiff.updating.raw import measurement_csv, shop_figures
+from toolpath_stiff.updating.raw import measurement_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.updating.raw import Loop, LoopFigures
+    from toolpath_stiff.updating.raw import Loop, LoopFigures, Reduction
 
 COLUMNS = 4
 MOST = 60  # loops in one picture; further ones are counted in its heading
 
 
 @picture
-def loops_png(loops: list[Loop], figures: list[LoopFigures], title: str) -> Figure:
+def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str) -> Figure:
     """One small diagram a loop, in the order of the file, as PNG."""
     shown = min(len(loops), MOST)
     columns = min(COLUMNS, shown)
@@ -63,35 +64,18 @@ def names(out: Path, *, plots: bool = True) -> tuple[Path, ...]:
     return (out, out.with_name(f"{out.stem}_loops.png")) if plots else (out,)
 
 
-def files(
-    loops: list[Loop], figures: list[LoopFigures], out: Path, title: str, *, plots: bool = True
-) -> dict[Path, Content]:
+def files(reduction: Reduction, out: Path, title: str, *, plots: bool = True) -> dict[Path, Content]:
     """The measurement file, and with `plots` the loops drawn under `title`."""
-    contents: list[Content] = [measurement_csv(loops, figures)]
-    contents += [loops_png(loops, figures, title)] if plots else []
+    contents: list[Content] = [measurement_csv(reduction.loops, reduction.figures)]
+    contents += [loops_png(reduction.loops, reduction.figures, title)] if plots else []
     return dict(zip(names(out, plots=plots), contents, strict=True))
 
 
-def describe(loops: list[Loop], figures: list[LoopFigures]) -> list[dict[str, Any]]:
-    """One dictionary a loop in the shop's units; what a loop cannot say is null."""
-    found = []
-    for loop, one in zip(loops, figures, strict=True):
-        numbers = {
-            "stiffness_N_per_mm": n_per_mm_from_n_per_m(one.stiffness),
-            "force_N": one.force,
-            "deflection_um": um_from_m(one.deflection),
-            **shop_figures(one),
-        }
-        shown = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
-        found.append({"loop": loop.title, "line": loop.line, **shown})
-    return found
-
-
-def text(loops: list[Loop], figures: list[LoopFigures]) -> str:
-    """The figures for people."""
+def text(entries: Sequence[Mapping[str, Any]]) -> str:
+    """The figures for people: a line a loop."""
     heading = ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
-    rows = [heading]
-    for one in describe(loops, figures):
+    rows: list[tuple[str, ...]] = [heading]
+    for one in entries:
         cells = [one["loop"], f"{one['stiffness_N_per_mm']:.0f}", f"{one['force_N']:.0f}"]
         for name in ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um"):
             cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")

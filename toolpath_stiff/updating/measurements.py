@@ -20,6 +20,7 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table, read_table
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.rows import (
     COLUMNS,
     LABELS,
@@ -312,6 +313,23 @@ def _shown(data: Measurements, i: int) -> str:
     mm = ", ".join(f"{value * 1e3:g}" for value in data.position[i])
     degrees = np.degrees(data.angles[i])
     return f"({mm}) mm" + (f" at ({', '.join(f'{d:.4g}' for d in degrees)}) deg" if degrees.any() else "")
+
+
+def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:
+    """Column -> values of a table of the readings, in the shop's units; those that no file has are left out."""
+    pose = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles)], axis=1)
+    columns: dict[str, NDArray[Any]] = {"file": data.file, "line": data.line, "point": data.point}
+    columns |= {name: pose[:, i] for i, name in enumerate(("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"))}
+    columns |= {f"d{axis}": data.direction[:, i] for i, axis in enumerate("xyz")}
+    columns |= {"stiffness_N_per_mm": n_per_mm_from_n_per_m(data.stiffness), "force_N": data.force}
+    others = {
+        "sd_N_per_mm": n_per_mm_from_n_per_m(data.sd),
+        "tool_extension_mm": mm_from_m(data.tool_extension),
+        "time_min": data.time / 60.0,
+        "temperature_C": data.temperature,
+        **{name: getattr(data, name) for name in ("setup", "clamp", "repeat", "loop")},
+    }
+    return columns | {name: values for name, values in others.items() if name not in data.missing}
 
 
 def measured_path(model: StiffnessModel, data: Measurements) -> LoadPath:

@@ -11,14 +11,16 @@ extremes:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypedDict, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.tables import Columns, Table
+from toolpath_stiff.tables import Columns, Table, read_table
 from toolpath_stiff.units import m_from_um, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.rows import (
     ANGLES,
@@ -270,6 +272,75 @@ def _linearity(loop: Loop, deflection: float) -> float:
     return float(np.abs(read - secant).max() / deflection)
 
 
+@dataclass(frozen=True)
+class Reduction:
+    """Loops of a file of raw records with what they say, and what reading it left to be said."""
+
+    loops: tuple[Loop, ...]
+    figures: tuple[LoopFigures, ...]
+    notes: tuple[str, ...]
+
+
+def reduce(raw: str | Path) -> Reduction:
+    """Raw records of force and displacement to measured stiffnesses.
+
+    Parameters
+    ----------
+    raw
+        A file: CSV, or FILE.xlsx[#SHEET].
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, has not the right columns, or no records.
+    InputErrors
+        Bad records, or loops that give no stiffness, all of them.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> rows = ["x_mm,y_mm,z_mm,direction,jog_um,force_N,displacement_um"]
+    >>> rows += [f"0,0,800,X,{jog},{40 * jog},{0.2 * jog}" for jog in (0, 200, -200, 0)]
+    >>> with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+    ...     _ = file.write(chr(10).join(rows)), file.flush()
+    ...     found = reduce(file.name)
+    >>> document(found)[0]["stiffness_N_per_mm"]
+    50000.0
+    """
+    table = read_table(str(raw), "raw records", COLUMNS)
+    loops = read_raw(table)
+    return Reduction(tuple(loops), tuple(reduce_loops(loops, str(raw))), tuple(table.notes))
+
+
+def document(reduction: Reduction) -> list[LoopEntry]:
+    """One entry a loop in the shop's units; what a loop cannot say is None."""
+    found = []
+    for loop, one in zip(reduction.loops, reduction.figures, strict=True):
+        numbers = {
+            "stiffness_N_per_mm": n_per_mm_from_n_per_m(one.stiffness),
+            "force_N": one.force,
+            "deflection_um": um_from_m(one.deflection),
+            **shop_figures(one),
+        }
+        shown = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
+        found.append(cast(LoopEntry, {"loop": loop.title, "line": loop.line, **shown}))
+    return found
+
+
+class LoopEntry(TypedDict):
+    """A loop as `tps reduce --json` has it."""
+
+    loop: str
+    line: int
+    stiffness_N_per_mm: float
+    force_N: float
+    deflection_um: float
+    lost_motion_um: float | None
+    loop_width_um: float | None
+    linearity_percent: float | None
+    closure_um: float | None
+
+
 def reduce_loops(loops: Iterable[Loop], file: str = "") -> list[LoopFigures]:
     """Figures of every loop. Raises `InputErrors` that name all loops that give none."""
     figures, errors = [], []
@@ -293,7 +364,7 @@ def shop_figures(figures: LoopFigures) -> dict[str, float]:
     }
 
 
-def measurement_csv(loops: list[Loop], figures: list[LoopFigures]) -> str:
+def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> str:
     """A measurement file, one row a loop; a figure that some loop lacks is left out as a column."""
     shown = [shop_figures(one) for one in figures]
     there = [name for name in FIGURES if all(math.isfinite(one[name]) for one in shown)]

@@ -174,6 +174,7 @@ def _value(value: float | None) -> str:
 
 
 WIDTH = 110
+MACHINE_FILE = "machine.toml"
 
 
 def text(document: Mapping[str, Any]) -> str:
@@ -261,7 +262,7 @@ def _figure(value: float | None, width: int, digits: int = 2) -> str:
 def names(plots: bool = True, *, machine: bool = True, figure3: bool = False) -> tuple[str, ...]:
     """Names of the files that `files` makes; `figure3`: those of the paper's Figure 3 too."""
     found = ["update.json", "residuals.csv"]
-    found += ["machine.toml"] if machine else []
+    found += [MACHINE_FILE] if machine else []
     found += ["figure3.csv"] if figure3 else []
     if plots:
         found += [*(["figure3.png"] if figure3 else []), "ladder.png", "before_after.png", "report.html"]
@@ -285,7 +286,7 @@ def files(
         "residuals.csv": residuals_csv(update),
     }
     if machine is not None:
-        contents["machine.toml"] = machine_toml(machine, machine_heading(document))
+        contents[MACHINE_FILE] = machine_toml(machine, machine_heading(document))
     if bars is not None:
         contents["figure3.csv"] = bar_curve_csv(bars)
     return contents | (_pictures(document, update, bars) if plots else {})
@@ -317,15 +318,17 @@ def _pictures(found: dict[str, Any], update: Update, bars: BarCurve | None) -> d
         percent = 100.0 * bars.error[:-1], 100.0 * bars.error_refitted[:-1]
         pictures["figure3.png"] = figure3_png(bars.bars[:-1], percent[0], refitted_percent=percent[1])
     pictures |= {
-        "ladder.png": error_ladder_png(
-            [_rung(step) for step in found["steps"]],
-            found["noise_floor_percent"],
-            "What does each step do to the error?",
-            [{**one, "name": one["effect"]} for one in found["turned_down"]],
-        ),
+        "ladder.png": error_ladder_png(*ladder(found)),
         "before_after.png": drawn,
     }
     return {**pictures, "report.html": update_html(found, pictures)}
+
+
+def ladder(found: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What `error_ladder_png` takes."""
+    turned_down = [{**one, "name": one["effect"]} for one in found["turned_down"]]
+    floor, question = found["noise_floor_percent"], "What does each step do to the error?"
+    return [_rung(step) for step in found["steps"]], floor, question, turned_down
 
 
 def _rung(step: dict[str, Any]) -> dict[str, Any]:

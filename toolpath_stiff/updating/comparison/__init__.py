@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.comparison.principles import Shares, assess, load_path_shares, model_free_checks
@@ -114,8 +115,11 @@ def compare(
     seed: int = 0,
     jobs: int = 1,
     draws: int = DRAWS,
+    asked: Asked | None = None,
 ) -> Comparison:
-    """Compare a machine file as it stands with measurements.
+    """How far the model is from measurements, where, and how much of it is more than scatter.
+
+    The machine is compared as its file has it; `Comparison.document` is the content of compare.json.
 
     Parameters
     ----------
@@ -133,11 +137,22 @@ def compare(
         Threads; the low and the high guess are independent.
     draws
         Simulated sets of readings.
+    asked
+        What the commands that go on from here carry.
 
     Raises
     ------
     InputError
         The model has no stiffness at a measured pose; a noise that cannot be.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.updating.measurements import read_measurements
+    >>> nist = load_machine("nist")
+    >>> found = compare(nist, read_measurements("nist-table1", nist), noise=0.05, draws=200)
+    >>> round(found.document["baseline"]["mean_abs_error_percent"], 2)
+    9.62
     """
     predictor = Predictor(machine, data, effect_files)
     log_model = predictor.log_stiffness()
@@ -171,6 +186,8 @@ def compare(
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         answers = list(pool.map(answer, noises))
     document = _document(predictor, answers, residual, looked_for, numbers, cannot, notes, seed)
+    asked = asked or Asked(tuple(document["data"]), machine.name, tuple(map(str, effect_files)), noise, strut_spread)
+    document["next"] = [hint("which effect would explain it", asked.command("diagnose"))]
     last = answers[-1]
     whole = last.scattering.covariance + last.structure.excess**2 * (place[:, None] == place[None, :])
     return Comparison(

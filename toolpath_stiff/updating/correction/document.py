@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,9 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison.residuals import directions
+from toolpath_stiff.updating.correction import Correction
 from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
+from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
 from toolpath_stiff.updating.diagnosis.document import interval, json_number, rounded_errors
 from toolpath_stiff.updating.inference.fits import (
     LAW_REFITTED,
@@ -32,30 +33,9 @@ MEAN_OVER_SD = 0.80  # mean absolute value of a normal deviate over its standard
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
 
 
-def document(
-    update: Update,
-    updated: Machine | None,
-    *,
-    files: Sequence[str],
-    machine_file: str | None,
-    provenance: Mapping[str, Any],
-    seed: int,
-) -> dict[str, Any]:
-    """Everything that `update.json` holds.
-
-    Parameters
-    ----------
-    update
-        What was done.
-    updated
-        The machine that is written, None if there is none.
-    files, machine_file
-        Names of the measurement files and of the new machine file.
-    provenance
-        As in the machine file.
-    seed
-        For the record.
-    """
+def document(correction: Correction) -> dict[str, Any]:
+    """Everything that `update.json` holds."""
+    update, updated = correction.update, correction.machine
     steps = [_step(update, k) for k in range(len(update.steps))]
     verdict = _verdict(update)
     uncertainty = updated.uncertainty if updated is not None else None
@@ -84,11 +64,24 @@ def document(
         "notes": list(update.data.notes),
         "machine": update.machine.name,
         "effects": update.problem.predictor.effects_that_act,
-        "machine_file": machine_file,
-        "data": list(files),
+        "machine_file": correction.machine_file,
+        "data": list(correction.files),
         "readings": len(update.data),
-        "provenance": dict(provenance),
-        "seed": seed,
+        "provenance": dict(correction.provenance),
+        "seed": correction.seed,
+        "next": list(correction.next),
+        **({} if correction.search is None else {"search": _search(correction.search)}),
+    }
+
+
+def _search(search: StrutLawSearch) -> dict[str, Any]:
+    """Starts and ends of the paper's search, in N/um."""
+    machine_law = np.array([search.strut_law.stiffness_1, search.strut_law.stiffness_2]) / np.exp(search.law) / 1e6
+    return {
+        "starts_N_per_um": np.round(machine_law * np.exp(search.starts), 3).tolist(),
+        "ends_N_per_um": np.round(machine_law * np.exp(search.ends), 3).tolist(),
+        "end_errors_percent": np.round(100.0 * search.end_errors, 4).tolist(),
+        "agreeing": search.agreeing,
     }
 
 

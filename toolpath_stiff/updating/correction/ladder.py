@@ -30,8 +30,8 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.correction.machines import fitted_machine
-from toolpath_stiff.updating.diagnosis import FEWEST, make_problem, testable_effects
-from toolpath_stiff.updating.inference.candidates import Candidate, Component, candidates_of
+from toolpath_stiff.updating.diagnosis import FEWEST
+from toolpath_stiff.updating.inference.candidates import Candidate, Component, candidates_of, testable_effects
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import (
     AS_GIVEN,
@@ -48,6 +48,7 @@ from toolpath_stiff.updating.inference.fits import (
 from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures
 from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, Noise, noise_models
+from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
@@ -164,7 +165,7 @@ class Update:
         return fitted_machine(self.machine, self.last.fit, provenance, self.widening, self.data.setup.tolist())
 
 
-def update(
+def build_ladder(
     machine: Machine,
     data: Measurements,
     additions: Sequence[Addition] = (),
@@ -207,7 +208,7 @@ def update(
     say = progress or (lambda text: None)
     # Of several noise models the one with the largest noise, as in a diagnosis.
     worst = max(noise_models(data, noise, strut_spread), key=lambda one: one.typical)
-    problem, _ = make_problem(machine, data, worst, effect_files)
+    problem = Problem.of(Predictor(machine, data, effect_files), worst)
     work = _Work(problem, worst, not keep_law, seed, tuple(effect_files), say)
     baseline = Baseline.of(problem)
     steps = [work.step(AS_GIVEN, baseline.as_given)]
@@ -329,12 +330,12 @@ class _Work:
             self.say("searching all effects for what chance alone would gain")
             machine = self.problem.predictor.machine
             carrying = fitted_machine(machine, others, {"command": "", "data_sha256": ""})
-            problem, covariance = make_problem(carrying, self.data, self.noise, self.effect_files)
+            problem = Problem.of(Predictor(carrying, self.data, self.effect_files), self.noise)
             base = problem.score_base()
-            effects, _ = testable_effects(problem.predictor, self.effect_files)
+            effects, _ = testable_effects(problem.predictor)
             families = score_families(problem, effects, base)
             gate = absolute_gate(
-                problem, base.residual, base.jacobian, Simulator.of(self.noise, covariance, self.seed),
+                problem, base.residual, base.jacobian, Simulator.of(self.noise, problem.covariance, self.seed),
                 discrepancy_forms(problem.predictor), signatures(problem, families),
             )  # fmt: skip
             self.fields[key] = problem, families, gate.gain_threshold

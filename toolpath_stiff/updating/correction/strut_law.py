@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.updating.correction.ladder import Step, Update
-from toolpath_stiff.updating.diagnosis import make_problem
+from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, Fit, HeldOut, held_out
 from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, noise_models
 from toolpath_stiff.updating.inference.prediction import NO_CHANGE, Predictor, scaled_law
@@ -292,7 +292,7 @@ def update_by_mean_error(
     say("searching from several starts")
     found = minimise_mean_error(Predictor(machine, data, effect_files), seed)
     worst = max(noise_models(data, noise, strut_spread), key=lambda one: one.typical)
-    problem, _ = make_problem(machine, data, worst, effect_files)
+    problem = Problem.of(Predictor(machine, data, effect_files), worst)
     predictor = problem.predictor
     baseline = Baseline.of(problem)
     given = baseline.as_given

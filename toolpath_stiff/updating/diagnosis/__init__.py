@@ -15,20 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.hints import Asked
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model, setup_of
 from toolpath_stiff.updating.inference import NONE, Judgement, judge
+from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import Baseline, Fit, HeldOut, held_out, refine
 from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
-from toolpath_stiff.updating.inference.noise import JOINT_ERROR, STRUT_SPREAD, Noise, Scatter, covariance, noise_models
+from toolpath_stiff.updating.inference.noise import JOINT_ERROR, STRUT_SPREAD, Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning import plan_measurements
-from toolpath_stiff.updating.planning.between import rivals_of
 from toolpath_stiff.updating.planning.document import plan_rows
+from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
 
 if TYPE_CHECKING:
@@ -62,8 +63,12 @@ class Diagnosis:
         Errors at left-out points.
     confounding, detectable
         What these data cannot tell apart, and what they would have shown.
-    files, seed
-        For the record.
+    files, seed, command, asked
+        For the record, and for the commands that go on from here.
+    next_measurements, remarks
+        Where the verdict is `ambiguous`: rows of a plan that would tell the explanations apart; what it cannot do.
+    path
+        How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
     """
 
     verdict: str
@@ -83,6 +88,11 @@ class Diagnosis:
     detectable: tuple[Detectable, ...]
     files: tuple[str, ...]
     seed: int
+    command: str = ""
+    asked: Asked | None = None
+    next_measurements: tuple[dict[str, Any], ...] = ()
+    remarks: tuple[str, ...] = ()
+    path: dict[str, Any] | None = None
 
     @property
     def noise(self) -> Noise:
@@ -138,29 +148,6 @@ class Diagnosis:
         return names + [f.name for f in self.main.families if f.name not in names]
 
 
-def make_problem(
-    machine: Machine, data: Measurements, noise: Noise, effect_files: Sequence[str | Path] = ()
-) -> tuple[Problem, FloatArray]:
-    """Data, model and scatter, ready for fits; and the covariance (n, n) of ln readings."""
-    predictor = Predictor(machine, data, effect_files)
-    spread = covariance(noise, predictor)
-    return Problem(predictor, Scatter.of(noise, spread), spread), spread
-
-
-def testable_effects(
-    predictor: Predictor, effect_files: Sequence[str | Path] = ()
-) -> tuple[tuple[Effect, ...], dict[str, tuple[str, ...]]]:
-    """Effects of the catalogue and of files that are not in the machine yet and whose columns the data have.
-
-    And those that they have not, with the columns that are missing.
-    """
-    known = known_effects(effect_files)
-    present = {active.effect.name for active in (*predictor.base.effects, *predictor.base.instruments)}
-    cannot = predictor.data.cannot_test(known.values())
-    effects = tuple(e for name, e in known.items() if name not in cannot and name not in present)
-    return effects, cannot
-
-
 def diagnose(
     machine: Machine,
     data: Measurements,
@@ -170,10 +157,17 @@ def diagnose(
     joint_error: float = JOINT_ERROR,
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
+    plan_next: bool = True,
+    program: Program | Callable[[], Program] | None = None,
+    origin: Pose | None = None,
+    setup: str | None = None,
+    temperature: float | None = None,
     files: Sequence[str] = (),
+    command: str = "",
+    asked: Asked | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
-    """Find out which physical effect the model lacks, if any.
+    """Find out which physical effect the model lacks, if any: everything that `tps diagnose` says.
 
     Parameters
     ----------
@@ -186,9 +180,16 @@ def diagnose(
     effect_files
         A user's own effects, which take part.
     seed
-        Of the bootstrap.
-    files
-        Names of the measurement files, for the record.
+        Of the bootstrap and of the poses of the plan.
+    plan_next
+        Whether to plan the next measurements where the verdict is `ambiguous`.
+    program
+        Where several explanations remain, how much the choice between them matters is worked out on this program, or
+        on what this function returns; None: not at all.
+    origin, setup, temperature
+        Placement of that program (mm, degrees), set-up and degrees C under which it runs; None: the machine file's.
+    files, command, asked
+        Names of the measurement files and the command, for the record; what the commands that go on from here carry.
     progress
         Told what is being done.
 
@@ -196,22 +197,59 @@ def diagnose(
     ------
     InputError
         Too few readings, or what `Predictor` and `noise_models` refuse.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.updating.measurements import read_measurements
+    >>> nist = load_machine("nist")
+    >>> found = diagnose(nist, read_measurements("nist-table1", nist), noise=0.10, plan_next=False)
+    >>> found.verdict
+    'ambiguous'
     """
+    say = progress or (lambda text: None)
+    found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(files), say)
+    found = replace(found, command=command, asked=asked)
+    if found.verdict != "ambiguous":
+        return found
+    if plan_next:
+        say("planning the next measurements")
+        rows, remarks = next_measurements(found, seed=seed)
+        found = replace(found, next_measurements=tuple(rows), remarks=tuple(remarks))
+    if program is not None:
+        of_machine = found.predictor.base.conditions
+        conditions = Conditions(
+            of_machine.setup if setup is None else setup, of_machine.temperature if temperature is None else temperature
+        )
+        chosen = program() if callable(program) else program
+        found = replace(found, path=choice_on_path(found, chosen, origin, conditions))
+    return found
+
+
+def _examined(
+    machine: Machine,
+    data: Measurements,
+    noise: float | tuple[float, float] | None,
+    strut_spread: float,
+    joint_error: float,
+    effect_files: Sequence[str | Path],
+    seed: int,
+    files: tuple[str, ...],
+    say: Callable[[str], None],
+) -> Diagnosis:
+    """From readings to verdict under each noise model, then what stands behind the verdict that they share."""
     if len(data) < FEWEST or np.isnan(data.stiffness).any():
         raise InputError(
             f"{len(data)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
             expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
         )
-    say = progress or (lambda text: None)
     predictor = Predictor(machine, data, effect_files)
     joints = predictor.joint_columns()
-    effects, cannot = testable_effects(predictor, effect_files)
+    effects, cannot = testable_effects(predictor)
     judgements: dict[str, Judgement] = {}
     for one in noise_models(data, noise, strut_spread, joint_error):
         say(f"searching {len(effects)} effects, noise {one.name}")
-        spread = covariance(one, predictor, joints)
-        problem = Problem(predictor, Scatter.of(one, spread), spread)
-        judgements[one.name] = judge(problem, one, spread, effects, seed)
+        judgements[one.name] = judge(Problem.of(predictor, one, joints), one, effects, seed)
     verdict, plausible = common_verdict(list(judgements.values()))
     # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
     main = max(judgements.values(), key=lambda judgement: judgement.noise.typical)
@@ -228,7 +266,7 @@ def diagnose(
         fits, held_out(baseline.refitted, data.point), {name: held_out(fit, data.point) for name, fit in fits.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
-        tuple(files) or tuple(dict.fromkeys(data.file.tolist())), seed,
+        files or tuple(dict.fromkeys(data.file.tolist())), seed,
     )  # fmt: skip
 
 

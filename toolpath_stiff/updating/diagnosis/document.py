@@ -24,11 +24,8 @@ SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed 
 TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
 
 
-def document(diagnosis: Diagnosis, command: str = "", asked: Asked | None = None) -> dict[str, Any]:
-    """Everything that `diagnose.json` holds but the next measurements, which `plan` works out.
-
-    `command` is the one that was run, `asked` what those must carry that go on from there.
-    """
+def document(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Everything that `diagnose.json` holds."""
     main = diagnosis.main
     return {
         "verdict": diagnosis.verdict,
@@ -39,12 +36,12 @@ def document(diagnosis: Diagnosis, command: str = "", asked: Asked | None = None
         "plausible": list(diagnosis.plausible),
         "explanations": list(diagnosis.explanations),
         "best": diagnosis.best,
-        "why": why(diagnosis),
+        "why": [*why(diagnosis), *diagnosis.remarks],
         "cannot_test": [
             {"effect": name, "missing": list(columns)} for name, columns in sorted(diagnosis.cannot_test.items())
         ],
-        "next_measurements": [],
-        "next": next_steps(diagnosis, asked or Asked(diagnosis.files)),
+        "next_measurements": list(diagnosis.next_measurements),
+        "next": next_steps(diagnosis, diagnosis.asked or Asked(diagnosis.files)),
         "by_noise": {name: _in_short(judgement) for name, judgement in diagnosis.judgements.items()},
         "noise": _noise(main),
         "gates": _gates(main),
@@ -65,7 +62,7 @@ def document(diagnosis: Diagnosis, command: str = "", asked: Asked | None = None
             "sets": [list(group) for group in diagnosis.confounding.sets],
             "threshold": CONFOUNDED,
         },
-        "path": None,
+        "path": diagnosis.path,
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": list(diagnosis.data.notes),
@@ -74,7 +71,7 @@ def document(diagnosis: Diagnosis, command: str = "", asked: Asked | None = None
         "effects": diagnosis.predictor.effects_that_act,
         "data": list(diagnosis.files),
         "readings": len(diagnosis.data),
-        "command": command,
+        "command": diagnosis.command,
     }
 
 

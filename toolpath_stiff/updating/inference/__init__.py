@@ -101,12 +101,12 @@ class Judgement:
         return next(family for family in self.families if family.name == name)
 
 
-def judge(problem: Problem, noise: Noise, covariance: FloatArray, effects: Sequence[Effect], seed: int) -> Judgement:
+def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:
     """Search all candidates, test them, and come to a verdict under one noise model."""
     base = problem.score_base()
     families = score_families(problem, effects, base)
     forms = discrepancy_forms(problem.predictor)
-    simulator = Simulator.of(noise, covariance, seed)
+    simulator = Simulator.of(noise, problem.covariance, seed)
     # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
     base_gate = absolute_gate(

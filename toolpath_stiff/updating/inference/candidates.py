@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.prediction import Predictor
@@ -133,6 +134,17 @@ class Candidate:
         sizes = range(1, count + 1) if count <= MOST_COMPONENTS else (1, count)
         for size in sizes:
             yield from combinations(range(count), size)
+
+
+def testable_effects(predictor: Predictor) -> tuple[tuple[Effect, ...], dict[str, tuple[str, ...]]]:
+    """Effects of the catalogue and of the user's files that are not in the machine yet and that the data can test.
+
+    And those that they cannot, with the columns that are missing.
+    """
+    known = known_effects(predictor.effect_files)
+    present = {active.effect.name for active in (*predictor.base.effects, *predictor.base.instruments)}
+    cannot = predictor.data.cannot_test(known.values())
+    return tuple(e for name, e in known.items() if name not in cannot and name not in present), cannot
 
 
 def choice_text(key: str, value: Any) -> str:

@@ -24,7 +24,7 @@ from toolpath_stiff.updating.inference.candidates import (
     likely_interval,
     log_comparable,
 )
-from toolpath_stiff.updating.inference.noise import Scatter
+from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance
 from toolpath_stiff.updating.inference.prediction import Predictor
 
 FloatArray = NDArray[np.float64]
@@ -116,6 +116,12 @@ class Problem:
     sight: Sight = field(init=False)
     rest: FloatArray = field(init=False)  # (n,) m/N of the machine file's own effects
     base_compliance: FloatArray = field(init=False)
+
+    @classmethod
+    def of(cls, predictor: Predictor, noise: Noise, joints: FloatArray | None = None) -> Problem:
+        """From the model's answers and a noise model; `joints`: `predictor.joint_columns()`, if known already."""
+        spread = covariance(noise, predictor, joints)
+        return cls(predictor, Scatter.of(noise, spread), spread)
 
     def __post_init__(self) -> None:
         self.observed = np.log(self.predictor.data.stiffness)

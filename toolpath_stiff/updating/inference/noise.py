@@ -83,6 +83,11 @@ class Noise:
         return np.hypot(self.repeat, self.clamping)
 
     @property
+    def typical_repeat(self) -> float:
+        """Root mean square of `repeat`."""
+        return float(np.sqrt(np.mean(self.repeat**2)))
+
+    @property
     def typical(self) -> float:
         """Root mean square of `reading`."""
         return float(np.sqrt(np.mean(self.reading**2)))

@@ -1,4 +1,4 @@
-"""`tps plan`: which measurements would tell rival explanations apart, per minute of work.
+"""What to measure next, or first: which measurements would tell rival explanations apart, per minute of work.
 
 Visits are chosen one after another. Each lowers the bound on the chance of taking one rival for another,
 
@@ -11,7 +11,7 @@ has been told apart counts no more; one that cannot be told apart takes nothing 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -21,20 +21,42 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.updating.inference.noise import STRUT_SPREAD
-from toolpath_stiff.updating.planning.rivals import (
+from toolpath_stiff.stiffness.effects import known_effects
+from toolpath_stiff.stiffness.effects.contract import Effect
+from toolpath_stiff.updating.inference import Judgement, judge
+from toolpath_stiff.updating.inference.candidates import testable_effects
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, Noise, noise_models
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.measurements import Measurements
+from toolpath_stiff.updating.planning.campaign import RISER, TABLE, Campaign, first_campaign
+from toolpath_stiff.updating.planning.gaps import (
     SETTLED,
-    Forecast,
     Outcome,
     ReadingNoise,
-    Rival,
     Shares,
-    expected_outcome,
-    forecast_all,
+    choose,
+    enough,
+    expectation,
+    in_order,
+    kind_of,
     pair_shares,
+    plan_minutes,
     repeat_and_clamping,
+    repeats_needed,
+    same_place,
+    why_of,
 )
-from toolpath_stiff.updating.planning.visits import Costs, Matters, Menu, Visits, possible_visits
+from toolpath_stiff.updating.planning.rivals import (
+    Forecast,
+    Rival,
+    errors_so_far,
+    fitted_rivals,
+    forecast_all,
+    rivals_of,
+    unfitted_rivals,
+)
+from toolpath_stiff.updating.planning.visits import Costs, Matters, Menu, Visits, possible_visits, with_options
 
 FloatArray = NDArray[np.float64]
 
@@ -42,7 +64,6 @@ MOST_RIVALS = 6  # a plan that separates more would separate none well
 MOST_VISITS = 200
 LEAST_NOISE = 1e-3  # relative; the paper's best readings, not clamped anew, scatter by 44 N/mm, 0.1 %
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart
-MOST_REPEATS = 64
 
 # Where an indicator reads a link's own deflection.
 INDICATORS = {
@@ -202,8 +223,8 @@ def plan_measurements(
     before = float(np.square([f.weight for f in forecasts]).sum())
     after = expectation(visits, picked, forecasts, noise, seed)
     pairs = tuple(sorted((_pair(p, shares[p], chosen, usable, ranked) for p in shares), key=lambda pair: pair.gap))
-    kinds = tuple(_kind(visits, v, menu) for v in chosen)
-    why = tuple(_why(visits, v, shares, menu) for v in chosen)
+    kinds = tuple(kind_of(visits, v, menu) for v in chosen)
+    why = tuple(why_of(visits, v, shares, menu) for v in chosen)
     return Plan(
         visits=visits,
         chosen=chosen,
@@ -213,8 +234,8 @@ def plan_measurements(
         why=why,
         before=Outcome(before, float(max(weights.values()) >= SETTLED)),
         after=after,
-        enough=_enough(visits, picked, forecasts, noise, seed),
-        repeats=_repeats(visits, picked, forecasts, noise, seed),
+        enough=enough(visits, picked, forecasts, noise, seed),
+        repeats=repeats_needed(visits, picked, forecasts, noise, seed),
         minutes=plan_minutes(visits, chosen, costs, menu),
         rivals=ranked,
         noise=(repeat, clamping),
@@ -269,49 +290,6 @@ def random_visits(plan: Plan, n: int, seed: int) -> tuple[int, ...]:
     return tuple(found)
 
 
-# -- what is to be expected --------------------------------------------------------------------------------------------
-
-
-def expectation(
-    visits: Visits,
-    chosen: Sequence[int],
-    forecasts: Sequence[Forecast],
-    noise: ReadingNoise,
-    seed: int,
-    repeats: int = 1,
-) -> Outcome:
-    """What is to be expected of these visits, each made so often."""
-    rows = [visits.rows(visit) for visit in chosen]
-    visit_of = np.repeat(np.arange(len(chosen)), [len(own) for own in rows])
-    return expected_outcome(forecasts, np.concatenate(rows), visit_of, noise.shared_out(repeats), seed)
-
-
-def _enough(
-    visits: Visits, picked: Sequence[int], forecasts: Sequence[Forecast], noise: ReadingNoise, seed: int
-) -> int | None:
-    for k in range(1, len(picked) + 1):
-        if expectation(visits, picked[:k], forecasts, noise, seed).truth >= SETTLED:
-            return k
-    return None
-
-
-def _repeats(
-    visits: Visits, picked: Sequence[int], forecasts: Sequence[Forecast], noise: ReadingNoise, seed: int
-) -> int | None:
-    def settles(repeats: int) -> bool:
-        return expectation(visits, picked, forecasts, noise, seed, repeats).truth >= SETTLED
-
-    if settles(1):
-        return 1
-    if not settles(MOST_REPEATS):
-        return None
-    low, high = 1, MOST_REPEATS
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if settles(middle) else (middle, high)
-    return high
-
-
 def _pair(
     names: tuple[str, str],
     share: Shares,
@@ -337,108 +315,155 @@ def _indicators(first: Rival, second: Rival) -> dict[str, str]:
     return {link: INDICATORS[link] for link in links}
 
 
-def _kind(visits: Visits, visit: int, menu: Menu) -> str:
-    """What the visit changes, the dearest thing first."""
-    if visits.setup[visit] != menu.setups[0]:
-        return "another set-up"
-    if visits.wait[visit] > menu.waits[0]:
-        return "waiting"
-    if visits.extension[visit] != menu.tool_extensions[0]:
-        return "another tool"
-    return "tilted" if visits.tilt(visit) > 1e-6 else "vertical"
+# -- what to measure ---------------------------------------------------------------------------------------------------
 
 
-def _why(visits: Visits, visit: int, shares: dict[tuple[str, str], Shares], menu: Menu) -> str:
-    pair = max(shares, key=lambda p: shares[p].gap([visit]))
-    what = [f"tilted {np.degrees(visits.tilt(visit)):.3g} deg" if visits.tilt(visit) > 1e-6 else "vertical"]
-    extension = visits.extension[visit]
-    if extension:
-        what.append(f"tool {1e3 * abs(extension):.4g} mm {'longer' if extension > 0 else 'shorter'}")
-    if visits.setup[visit]:
-        what.append(f"set-up {visits.setup[visit]}")
-    loads = np.unique(visits.readings.force[visits.rows(visit)])
-    what.append("at " + " and ".join(f"{load:g} N" for load in loads))
-    if visits.wait[visit] > menu.waits[0]:
-        what.append(f"{visits.wait[visit] / 60.0:.3g} minutes after zeroing")
-    if visits.rounds[visits.rows(visit)].max() > 1:
-        what.append("each reading twice" if visits.rounds[visits.rows(visit)].max() == 2 else "readings repeated")
-    gap = shares[pair].gap([visit])
-    return f"{', '.join(what)}: {gap:.1f} sigma between {pair[0]} and {pair[1]}"
+PLAN_POSES, CAMPAIGN_POSES = 6, 24
+CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
 
 
-# -- choice of visits --------------------------------------------------------------------------------------------------
-#
-# Which visits: the bound on taking one rival for another, the minutes that each costs, one after another.
+@dataclass(frozen=True)
+class Proposal:
+    """What to measure, and why.
+
+    Attributes
+    ----------
+    machine, data
+        What is to be measured; what has been, None before the first campaign.
+    plan
+        Visits that tell rivals apart, or a first campaign.
+    menu, costs
+        What might vary, and what it costs.
+    noise
+        Relative sd of a reading, or (repeat, clamping), that was planned for.
+    verdict, errors
+        Of the diagnosis of the data, "" if none was made; mean errors so far, %.
+    effect_files, files, seed
+        For the record.
+    """
+
+    machine: Machine
+    data: Measurements | None
+    plan: Plan | Campaign
+    menu: Menu
+    costs: Costs
+    noise: float | tuple[float, float]
+    verdict: str
+    errors: Mapping[str, float]
+    effect_files: tuple[str | Path, ...]
+    files: tuple[str, ...]
+    seed: int
 
 
-def log_confusion(gaps: dict[tuple[str, str], FloatArray], weights: dict[str, float]) -> FloatArray:
-    """Logarithm of the bound on the chance of taking one rival for another, of any shape that the gaps have."""
-    each = [0.5 * np.log(weights[i] * weights[j]) - gap**2 / 4.0 for (i, j), gap in gaps.items()]
-    return np.asarray(np.logaddexp.reduce(each, axis=0))
+def plan(
+    machine: Machine,
+    data: Measurements | None = None,
+    *,
+    between: Sequence[str] = (),
+    n: int | None = None,
+    radius: float | None = None,
+    heights: Sequence[float] | None = None,
+    max_tilt: float | None = None,
+    loads: Sequence[float] | None = None,
+    tool_extensions: Sequence[float] | None = None,
+    setups: Sequence[str] | None = None,
+    costs: Costs | None = None,
+    noise: float | tuple[float, float] | None = None,
+    strut_spread: float = STRUT_SPREAD,
+    effect_files: Sequence[str | Path] = (),
+    seed: int = 0,
+    judgement: Judgement | None = None,
+    files: Sequence[str] = (),
+) -> Proposal:
+    """What to measure next, after some measurements; or first.
+
+    Parameters
+    ----------
+    machine, data
+        The model; n readings, or None for a plan before any.
+    between
+        Effects to be told apart, or `none`; empty: what a diagnosis leaves standing, or a first campaign.
+    n
+        Poses; None: 6, or 24 of a first campaign.
+    radius, heights, max_tilt, loads, tool_extensions, setups
+        What may vary, as in `Menu`: m, m, rad, N, m, names; None: the usual, and what the data have.
+    costs
+        Minutes of work.
+    noise, strut_spread, effect_files, seed
+        As in `diagnose`; without data, a noise of `CAMPAIGN_NOISE` is assumed.
+    judgement
+        What a diagnosis of these data came to already (`Diagnosis.main`): it is not made again.
+    files
+        Names of the measurement files, for the record.
+
+    Raises
+    ------
+    InputError
+        An unknown effect, a number of poses or a menu that cannot be, no reachable pose.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> found = plan(load_machine("nist"), between=("spindle_compliance", "none"), n=2)
+    >>> len(found.plan.chosen), found.plan.separable
+    (2, True)
+    """
+    costs = costs or Costs()
+    menu = with_options(
+        Menu(setups=(TABLE, RISER)) if data is None else Menu.of(data), radius=radius, heights=heights,
+        max_tilt=max_tilt, loads=loads, tool_extensions=tool_extensions, setups=setups,
+    )  # fmt: skip
+    record = (tuple(effect_files), tuple(files), seed)
+    effects = known_effects(effect_files)
+    planned_for: float | tuple[float, float] = CAMPAIGN_NOISE if noise is None else noise
+    if data is None and not between:
+        campaign = first_campaign(
+            machine, CAMPAIGN_POSES if n is None else n, menu=menu, costs=costs, seed=seed, effects=effects,
+            noise=planned_for, effect_files=effect_files,
+        )  # fmt: skip
+        return Proposal(machine, data, campaign, menu, costs, planned_for, "", {}, *record)
+    verdict, errors = "", dict[str, float]()
+    if data is None:
+        rivals = unfitted_rivals(between, effects, setup=menu.setups[-1])
+        notes = ["no data: the rivals are taken at their usual sizes"]
+        notes += [] if noise is not None else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
+    else:
+        rivals, verdict, scatter, problem, notes = _rivals_after(
+            machine, data, between, effects, noise, strut_spread, effect_files, seed, judgement
+        )
+        planned_for, errors = (scatter.typical_repeat, scatter.clamping), errors_so_far(problem, rivals)
+    found = plan_measurements(
+        machine, rivals, planned_for, PLAN_POSES if n is None else n, menu=menu, costs=costs, seed=seed,
+        effect_files=effect_files, strut_spread=strut_spread,
+    )  # fmt: skip
+    found = replace(found, notes=(*notes, *found.notes))
+    return Proposal(machine, data, found, menu, costs, planned_for, verdict, errors, *record)
 
 
-def choose(
-    visits: Visits,
-    usable: NDArray[np.bool_],
-    shares: dict[tuple[str, str], Shares],
-    weights: dict[str, float],
-    n: int,
-    costs: Costs,
-    menu: Menu,
-) -> tuple[int, ...]:
-    """Up to `n` usable visits, one after another, each the one that lowers the bound most per minute."""
-    chosen: list[int] = []
-    free = usable.copy()
-    now = float(log_confusion({pair: np.zeros(()) for pair in shares}, weights))
-    for _ in range(min(n, int(usable.sum()))):
-        after = log_confusion({pair: share.gaps_with(chosen) for pair, share in shares.items()}, weights)
-        gain = np.where(free, (now - after) / further_minutes(visits, chosen, costs, menu), -np.inf)
-        best = int(np.argmax(gain))
-        if not np.isfinite(gain[best]):
-            break
-        chosen.append(best)
-        now = float(after[best])
-        free &= ~same_place(visits, best)
-    return tuple(chosen)
-
-
-def same_place(visits: Visits, visit: int) -> NDArray[np.bool_]:
-    """(v,) visits to the same pose with the same tool in the same set-up: other readings there are no new pose."""
-    return np.asarray(
-        (visits.pose == visits.pose[visit]).all(axis=1)
-        & (visits.extension == visits.extension[visit])
-        & (visits.setup == visits.setup[visit])
-    )
-
-
-def further_minutes(visits: Visits, chosen: Sequence[int], costs: Costs, menu: Menu) -> FloatArray:
-    """(v,) minutes that each visit adds to those chosen; visits of one set-up and tool are made together."""
-    setups = {menu.setups[0], *visits.setup[list(chosen)].tolist()}
-    equipped = {(menu.setups[0], menu.tool_extensions[0])}
-    equipped |= {(str(visits.setup[v]), float(visits.extension[v])) for v in chosen}
-    minutes = costs.pose + costs.reading * visits.counts + visits.wait / 60.0
-    minutes = minutes + costs.setup * ~np.isin(visits.setup, list(setups))
-    tools: dict[str, set[float]] = {}
-    for setup, tool in equipped:
-        tools.setdefault(setup, set()).add(tool)
-    # In a new set-up the tool that is in the spindle stays there.
-    known = np.array(
-        [
-            float(tool) in tools.get(str(setup), {menu.tool_extensions[0]})
-            for setup, tool in zip(visits.setup, visits.extension, strict=True)
-        ]
-    )
-    return np.asarray(minutes + costs.tool * ~known)
-
-
-def plan_minutes(visits: Visits, chosen: Sequence[int], costs: Costs, menu: Menu) -> float:
-    """Minutes of work for the chosen visits."""
-    return sum(float(further_minutes(visits, chosen[:k], costs, menu)[visit]) for k, visit in enumerate(chosen))
-
-
-def in_order(visits: Visits, chosen: Sequence[int], menu: Menu, seed: int) -> tuple[int, ...]:
-    """Set-up by set-up, tool by tool, at random within: a drift over the day looks like no pose."""
-    order = list(np.random.default_rng([seed, 1]).permutation(len(chosen)))
-    setups, tools = list(menu.setups), list(menu.tool_extensions)
-    order.sort(key=lambda k: (setups.index(visits.setup[chosen[k]]), tools.index(visits.extension[chosen[k]])))
-    return tuple(chosen[k] for k in order)
+def _rivals_after(
+    machine: Machine,
+    data: Measurements,
+    between: Sequence[str],
+    effects: Mapping[str, Effect],
+    noise: float | tuple[float, float] | None,
+    strut_spread: float,
+    effect_files: Sequence[str | Path],
+    seed: int,
+    judgement: Judgement | None,
+) -> tuple[list[Rival], str, Noise, Problem, list[str]]:
+    """Rivals after some measurements, the diagnosis's verdict ("" if none was made), noise, problem, notes."""
+    if judgement is not None:
+        scatter, problem = judgement.noise, judgement.problem
+    else:
+        # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
+        scatter = noise_models(data, noise, strut_spread)[-1]
+        problem = Problem.of(Predictor(machine, data, effect_files), scatter)
+    notes = [f"noise: {scatter.origin}"]
+    if between:
+        return fitted_rivals(problem, between, effects), "", scatter, problem, notes
+    if judgement is None:
+        judgement = judge(problem, scatter, testable_effects(problem.predictor)[0], seed)
+    verdict = judgement.verdict
+    if verdict != "ambiguous":
+        notes.append(f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next")
+    return rivals_of(judgement), verdict, scatter, problem, notes

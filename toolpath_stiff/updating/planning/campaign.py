@@ -24,8 +24,8 @@ from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.units import RAD_PER_DEG
 from toolpath_stiff.updating.inference import NONE
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
-from toolpath_stiff.updating.planning.between import unfitted_rivals
-from toolpath_stiff.updating.planning.rivals import ReadingNoise, forecast_all, pair_shares, repeat_and_clamping
+from toolpath_stiff.updating.planning.gaps import ReadingNoise, pair_shares, repeat_and_clamping
+from toolpath_stiff.updating.planning.rivals import forecast_all, unfitted_rivals
 from toolpath_stiff.updating.planning.visits import (
     AXES,
     READING_EVERY,

@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import deg_from_rad, mm_from_m
-from toolpath_stiff.updating.planning import MOST_REPEATS, Plan, matters
-from toolpath_stiff.updating.planning.rivals import SETTLED, ReadingNoise, forecast_all, pair_shares
+from toolpath_stiff.updating.planning import Plan, Proposal, matters
+from toolpath_stiff.updating.planning.campaign import Campaign
+from toolpath_stiff.updating.planning.gaps import MOST_REPEATS, SETTLED, ReadingNoise, pair_shares
+from toolpath_stiff.updating.planning.rivals import forecast_all
 from toolpath_stiff.updating.planning.visits import (
     AXES,
     READING_EVERY,
@@ -27,6 +29,105 @@ from toolpath_stiff.updating.planning.visits import (
     planned_readings,
     reachable,
 )
+
+COSTS = ("reading", "pose", "tool", "setup")
+SHOWS = 3.0  # standard deviations from which on an effect is said to show
+
+
+def document(proposal: Proposal, command: str = "") -> dict[str, Any]:
+    """The content of plan.json."""
+    found = proposal.plan
+    rows = rows_of(proposal)
+    if isinstance(found, Plan):
+        own: dict[str, Any] = {
+            "kind": "rivals",
+            "verdict": proposal.verdict,
+            "mean_abs_error_percent": dict(proposal.errors),
+            **plan_document(found),
+        }
+        if proposal.errors:
+            steps = ", ".join(f"{name} {value:.2f} %" for name, value in proposal.errors.items())
+            own["text"] = [f"mean error so far: {steps}", *own["text"]]
+        kinds, why = found.kinds, found.why
+    else:
+        own = _campaign(found, rows, proposal.noise)
+        kinds = why = found.purposes
+    return own | {
+        "visits": _visits_of(rows, kinds, why),
+        "machine": proposal.machine.name,
+        "data": list(proposal.files),
+        "seed": proposal.seed,
+        "costs_minutes": {name: getattr(proposal.costs, name) for name in COSTS},
+        "command": command,
+    }
+
+
+def rows_of(proposal: Proposal) -> list[dict[str, Any]]:
+    """The rows of plan.csv: a measurement file whose stiffness is left empty."""
+    found = proposal.plan
+    if isinstance(found, Plan):
+        taken = () if proposal.data is None else set(proposal.data.point.tolist())
+        return plan_rows(found.visits, found.chosen, taken)
+    return plan_rows(found.visits, range(len(found.visits)), repeats=found.repeats)
+
+
+def _campaign(campaign: Campaign, rows: list[dict[str, Any]], noise: float | tuple[float, float]) -> dict[str, Any]:
+    return {
+        "kind": "campaign",
+        "poses": len({row["point"] for row in rows}),
+        "readings": len(rows),
+        "minutes": campaign.minutes,
+        "sees": [{"effect": name, "gap_sigma": gap} for name, gap in campaign.sees.items()],
+        "text": _campaign_text(campaign, rows, noise),
+        "notes": [f"seen or not: at a noise of {_noise_text(noise)}, each effect alone at its usual size"],
+    }
+
+
+def _campaign_text(campaign: Campaign, rows: list[dict[str, Any]], noise: float | tuple[float, float]) -> list[str]:
+    heights = sorted({row["z_mm"] for row in rows})
+    hidden = [name for name, gap in campaign.sees.items() if gap < SHOWS]
+    lines = [
+        f"{len({row['point'] for row in rows})} poses at {len(heights)} heights, {len(campaign.visits)} clampings, "
+        f"{len(rows)} readings: about {campaign.minutes / 60.0:.0f} hours"
+    ]
+    if hidden:
+        lines.append(
+            f"of usual size and alone, these would not show at {_noise_text(noise)} noise: {', '.join(hidden)}"
+        )
+    return lines
+
+
+def _noise_text(noise: float | tuple[float, float]) -> str:
+    """As "2 %"; of a reading and of a clamping, "2 % and 1 %"."""
+    return " and ".join(f"{100 * part:g} %" for part in (noise if isinstance(noise, tuple) else (noise,)))
+
+
+def _visits_of(rows: list[dict[str, Any]], kinds: Sequence[str], why: Sequence[str]) -> list[dict[str, Any]]:
+    """One entry a clamping: where, how, what is read, why."""
+    found = []
+    for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):
+        own = [row for row in rows if row["clamp"] == clamp]
+        first = own[0]
+        found.append(
+            {
+                "clamp": clamp,
+                "point": first["point"],
+                **{name: first[name] for name in POSE},
+                "tool_extension_mm": first["tool_extension_mm"],
+                "setup": first.get("setup", ""),
+                "forces_N": sorted({row["force_N"] for row in own}),
+                "directions": list(dict.fromkeys(_direction(row) for row in own)),
+                "kind": kind,
+                "why": reason,
+            }
+        )
+    return found
+
+
+def _direction(row: dict[str, Any]) -> str:
+    if "direction" in row:
+        return str(row["direction"])
+    return "".join(axis for axis, part in zip("XYZ", (row["dx"], row["dy"], row["dz"]), strict=True) if part)
 
 
 def plan_document(plan: Plan) -> dict[str, Any]:

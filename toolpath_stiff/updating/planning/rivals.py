@@ -1,30 +1,16 @@
-"""What rival explanations of the same data expect of further readings, and how far they are apart.
+"""The rivals that a plan is to tell apart: as a diagnosis left them, as the user names them, or before any data.
 
-Each rival has been fitted to the data so far. What it expects of new readings y = ln k is normal: its prediction, with
-the covariance C = N + G P G^T, where N is the scatter of the readings, P the covariance of its fitted parameters (strut
-law included) and G how the readings hang on them. So a difference that refitting would close is no difference.
-
-The gap of two rivals is that of Buzzi-Ferraris and Forzatti (1983, Chemical Engineering Science 38, 225; several
-responses 1984, ibid. 39, 81),
-
-    gap^2 = (m_i - m_j)^T (C_i + C_j)^-1 (m_i - m_j),
-
-in standard deviations; where C_i = C_j its square is the expected logarithm of the Bayes factor. Readings of different
-visits are independent but for the parameters and for what the machine file does not know of the machine (struts that
-are not quite alike, joints not quite in place: columns B), which are the same everywhere. With
-F = [G_i L_i, G_j L_j, sqrt(2) B], P = L L^T, every visit adds its own
-
-    a = d^T N^-1 d,    h = F^T N^-1 d,    M = F^T N^-1 F,    and    gap^2 = sum a - (sum h)^T (1 + sum M)^-1 (sum h)
-
-(Woodbury). One visit more costs a solution of a dozen equations.
+What each of them expects of readings is its forecast.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +18,24 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
+from toolpath_stiff.updating.inference import NONE, Judgement
 from toolpath_stiff.updating.inference.candidates import Component
-from toolpath_stiff.updating.inference.noise import CLAMPING, JOINT_ERROR, STRUT_SPREAD
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
+from toolpath_stiff.updating.inference.fits import (
+    AS_GIVEN,
+    LAW_REFITTED,
+    Baseline,
+    Fit,
+    error_figures,
+    fit_effects,
+    refine,
+)
+from toolpath_stiff.updating.inference.hypotheses import score_family
+from toolpath_stiff.updating.inference.noise import JOINT_ERROR, STRUT_SPREAD
 from toolpath_stiff.updating.inference.prediction import JOINT_STEP, Predictor
 from toolpath_stiff.updating.measurements import Measurements
-from toolpath_stiff.updating.planning.visits import Visits
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -100,37 +98,6 @@ class Forecast:
     weight: float
     mean: FloatArray
     factor: FloatArray
-
-
-@dataclass(frozen=True)
-class ReadingNoise:
-    """Scatter of ln readings: of each, of each clamping (relative sd), and of the machine as a factor (m, k)."""
-
-    repeat: float
-    clamping: float
-    machine: FloatArray
-
-    def shared_out(self, repeats: float) -> ReadingNoise:
-        """The noise of the mean of so many re-clamped readings; the machine stays as it is."""
-        return ReadingNoise(self.repeat / np.sqrt(repeats), self.clamping / np.sqrt(repeats), self.machine)
-
-
-def repeat_and_clamping(relative: float | tuple[float, float]) -> tuple[float, float]:
-    """Relative sd of a reading and of a clamping, from these or from that of a reading in total.
-
-    Raises
-    ------
-    InputError
-        A noise that cannot be.
-    """
-    if isinstance(relative, tuple):
-        repeat, clamping = relative
-    else:
-        clamping = float(min(CLAMPING, relative / np.sqrt(2.0)))
-        repeat = float(np.sqrt(max(relative**2 - clamping**2, 0.0)))
-    if not (0.0 < repeat <= 1.0 and 0.0 <= clamping <= 1.0):
-        raise InputError(f"a noise of {relative!r}", expected="more than 0 and at most 1 (100 %)")
-    return repeat, clamping
 
 
 def forecast_all(
@@ -261,120 +228,142 @@ def _answers(predictor: Predictor, law: FloatArray, effects: Sequence[ActiveEffe
     )
 
 
-# -- gaps --------------------------------------------------------------------------------------------------------------
+# -- which rivals ------------------------------------------------------------------------------------------------------
+
+LEAST_WEIGHT = 0.02  # probability below which an explanation is no rival
+UNKNOWN_SIZE = 0.5  # relative sd of a size that nothing has been measured of; assumed
 
 
-@dataclass(frozen=True)
-class Shares:
-    """What each of v visits adds to the gap of a pair: a (v,), h (v, q), M (v, q, q)."""
-
-    a: FloatArray
-    h: FloatArray
-    M: FloatArray
-
-    def gap(self, chosen: Sequence[int] | IntArray = (), repeats: float = 1.0) -> float:
-        """Gap in standard deviations after the chosen visits, each clamped and read so often."""
-        index = np.asarray(chosen, dtype=np.int64)
-        squared = _squared_gap(self.a[index].sum(), self.h[index].sum(axis=0), self.M[index].sum(axis=0), repeats)
-        return float(np.sqrt(max(float(squared), 0.0)))
-
-    def gaps_with(self, chosen: Sequence[int] | IntArray) -> FloatArray:
-        """(v,) gaps after the chosen visits and one more, for each that it could be."""
-        index = np.asarray(chosen, dtype=np.int64)
-        squared = _squared_gap(
-            self.a + self.a[index].sum(), self.h + self.h[index].sum(axis=0), self.M + self.M[index].sum(axis=0), 1.0
-        )
-        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+def rival_of_fit(name: str, fit: Fit, weight: float = 1.0) -> Rival:
+    """A rival as fitted to the data so far."""
+    return Rival(name, fit.law, fit.effects, fit.covariance, fit.free, weight)
 
 
-def _squared_gap(a: FloatArray, h: FloatArray, M: FloatArray, repeats: float) -> FloatArray:
-    if h.shape[-1] == 0:
-        return np.asarray(repeats * a)
-    inner = np.eye(h.shape[-1]) + repeats * M
-    solved = np.linalg.solve(inner, h[..., None])[..., 0]
-    return np.asarray(repeats * a - repeats**2 * (h * solved).sum(axis=-1))
+def rivals_of(judgement: Judgement) -> list[Rival]:
+    """The explanations that a diagnosis leaves standing, with their probabilities.
 
-
-def _summed_products(columns: FloatArray, starts: IntArray) -> FloatArray:
-    """(v, q, q) sums over each visit's rows of the products of columns (n, q); one column at a time to save memory."""
-    q = columns.shape[1]
-    products = np.empty((len(starts), q, q))
-    for k in range(q):
-        products[:, k, k:] = np.add.reduceat(columns[:, k : k + 1] * columns[:, k:], starts, axis=0)
-        products[:, k:, k] = products[:, k, k:]
-    return products
-
-
-def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: ReadingNoise) -> Shares:
-    """What every visit adds to the gap of two rivals."""
-    difference = first.mean - second.mean
-    F = np.concatenate([first.factor, second.factor, np.sqrt(2.0) * noise.machine], axis=1)
-    columns = np.concatenate([difference[:, None], F], axis=1)[visits.members]
-    starts, counts = visits.starts, visits.counts
-    products = _summed_products(columns, starts)
-    sums = np.add.reduceat(columns, starts, axis=0)
-    # Inverse of 2 (r^2 1 + c^2 11^T) by Sherman and Morrison.
-    common = noise.clamping**2 / (noise.repeat**2 + counts * noise.clamping**2)
-    form = (products - common[:, None, None] * sums[:, :, None] * sums[:, None, :]) / (2.0 * noise.repeat**2)
-    return Shares(form[:, 0, 0], form[:, 1:, 0], form[:, 1:, 1:])
-
-
-# -- what would come of it ---------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What is to be expected of readings: mean probability of the truth, and how often one rival exceeds `SETTLED`."""
-
-    truth: float
-    settled: float
-
-
-SETTLED = 0.95  # probability at which a question counts as settled
-DRAWS = 400  # simulated results a rival
-
-
-def expected_outcome(
-    forecasts: Sequence[Forecast],
-    rows: IntArray,
-    visit_of: IntArray,
-    noise: ReadingNoise,
-    seed: int,
-) -> Outcome:
-    """Simulate the readings under every rival in turn and judge them by Bayes' rule.
-
-    All rivals scatter by the mean of their covariances here, as in the gap: that one rival is vaguer than another is
-    a matter of its prior, and not counted on.
-
-    Parameters
-    ----------
-    forecasts
-        Of all readings; their weights add up to 1.
-    rows, visit_of
-        (k,) the readings taken, and the number of the visit each belongs to.
-    noise
-        Of these readings.
-    seed
-        Of the draws.
+    Where it leaves one or none standing, the most likely others beside it, at `LEAST_WEIGHT`: what a plan would
+    confirm the answer against.
     """
-    from scipy.linalg import solve_triangular
+    found = []
+    for name, weight in sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0])):
+        fit = _fit_of(judgement, name) if weight >= LEAST_WEIGHT or name in judgement.explanations else None
+        if fit is not None:
+            found.append(rival_of_fit(name, fit, max(weight, LEAST_WEIGHT)))
+    for name in (NONE, *(family.name for family in judgement.families)):
+        if len(found) >= 2:
+            break
+        fit = _fit_of(judgement, name)
+        if fit is not None and name not in {rival.name for rival in found}:
+            found.append(rival_of_fit(name, fit, LEAST_WEIGHT))
+    return found
 
-    rng = np.random.default_rng(seed)
-    weights = np.array([forecast.weight for forecast in forecasts])
-    same = visit_of[:, None] == visit_of[None, :]
-    covariance = noise.repeat**2 * np.eye(len(rows)) + noise.clamping**2 * same
-    for factor, weight in [(noise.machine, 1.0), *((f.factor, f.weight) for f in forecasts)]:
-        covariance += weight * factor[rows] @ factor[rows].T
-    means = np.stack([forecast.mean[rows] for forecast in forecasts], axis=1)
-    whitened = solve_triangular(np.linalg.cholesky(covariance), means, lower=True).T
-    standard = rng.standard_normal((DRAWS, len(rows)))
-    truth = settled = 0.0
-    for i, weight in enumerate(weights):
-        # Of -|z + (m_i - m_j)|^2 / 2 for every j, z standard normal.
-        apart = whitened[i] - whitened
-        logs = np.log(weights) - 0.5 * (apart**2).sum(axis=1) - standard @ apart.T
-        probability = np.exp(logs - logs.max(axis=1, keepdims=True))
-        probability /= probability.sum(axis=1, keepdims=True)
-        truth += weight * float(probability[:, i].mean())
-        settled += weight * float((probability.max(axis=1) >= SETTLED).mean())
-    return Outcome(truth, settled)
+
+def _fit_of(judgement: Judgement, name: str) -> Fit | None:
+    """The final fit of a hypothesis; None if there is none to be had."""
+    if name == NONE:
+        return fit_effects(judgement.problem, (), (), (), judgement.base.law)
+    if name in judgement.fits:
+        return judgement.fits[name]
+    best = next((family.best for family in judgement.families if family.name == name), None)
+    return None if best is None else refine(judgement.problem, best)
+
+
+def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, Effect]) -> list[Rival]:
+    """Effects by name, or `none`, fitted to the data, all of the same weight.
+
+    Raises
+    ------
+    InputError
+        An effect that does not exist, that the data lack a column for, or that the data leave at nothing.
+    """
+    _check(names, effects)
+    base = problem.score_base()
+    found = []
+    lacking = problem.predictor.data.cannot_test(effects[name] for name in names if name != NONE)
+    for name in names:
+        if name == NONE:
+            found.append(rival_of_fit(NONE, fit_effects(problem, (), (), (), base.law)))
+            continue
+        if name in lacking:
+            raise InputError(
+                f"the data cannot be fitted with {name}: column {lacking[name][0]} is missing",
+                hint="plan without data: leave the files out",
+            )
+        family = score_family(problem, effects[name], base)
+        if family is None or family.best is None:
+            raise InputError(
+                f"fitted to these data, {name} comes out at nothing: it is no other explanation than {NONE}",
+                hint="plan without data (leave the files out) for the size that it usually has",
+            )
+        found.append(rival_of_fit(name, refine(problem, family.best)))
+    return found
+
+
+def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: str = "") -> list[Rival]:
+    """Effects by name, or `none`, at their usual sizes, before any data; `setup` is what a set-up's own effect is of.
+
+    The size is the middle of the usual range on a logarithmic scale and known within `UNKNOWN_SIZE` of it; the strut
+    law within `LAW_PRIOR`.
+
+    Raises
+    ------
+    InputError
+        An effect that does not exist.
+    """
+    _check(names, effects)
+    found = []
+    for name in names:
+        if name == NONE:
+            found.append(Rival(NONE, (0.0, 0.0), (), np.diag([LAW_PRIOR**2] * 2)))
+            continue
+        effect = effects[name]
+        sizes = [usual_size(Component.of(p)) for p in effect.parameters if not p.discrete]
+        values: dict[str, Any] = {}
+        discrete = sum(parameter.discrete for parameter in effect.parameters)
+        for parameter in effect.parameters:
+            if parameter.kind == "real":
+                component = Component.of(parameter)
+                values[parameter.name] = component.value(usual_size(component))
+            elif parameter.kind == "integer":  # 0 means all: with other choices beside it that is no effect at all
+                values[parameter.name] = max(int(parameter.bounds[0]), int(discrete > 1))
+            else:
+                values[parameter.name] = setup if discrete == 1 else ""
+        covariance = np.diag([LAW_PRIOR**2] * 2 + [(UNKNOWN_SIZE * size) ** 2 for size in sizes])
+        found.append(Rival(name, (0.0, 0.0), (ActiveEffect(effect, values),), covariance))
+    return found
+
+
+def errors_so_far(problem: Problem, rivals: Sequence[Rival]) -> dict[str, float]:
+    """Mean errors on the data so far, %: as given, strut law refitted, then with each rival that is an effect."""
+    baseline = Baseline.of(problem)
+    found = {AS_GIVEN: baseline.as_given.residual, LAW_REFITTED: baseline.refitted.residual}
+    for rival in rivals:
+        if rival.effects:
+            modelled = problem.predictor.log_stiffness(np.asarray(rival.law), rival.effects)
+            found[f"with {rival.name}"] = problem.observed - modelled
+    return {name: error_figures(residual)["mean_abs_error_percent"] for name, residual in found.items()}
+
+
+def usual_size(component: Component) -> float:
+    """The middle of the usual sizes on a logarithmic scale, a fifth of the largest where the usual range holds 0."""
+    low, high = component.typical()
+    sign = component.signs[-1]
+    if not np.isfinite(high):
+        high = component.reach(sign)
+    if low <= 0.0:
+        low = 0.04 * high
+    return sign * float(np.sqrt(low * high))
+
+
+def _check(names: Sequence[str], effects: Mapping[str, Effect]) -> None:
+    if len(set(names)) != len(names) or len(names) < 2:
+        raise InputError(f"--between {','.join(names)}", expected="two or more different effects, or none")
+    for name in names:
+        if name != NONE and name not in effects:
+            near = difflib.get_close_matches(name, [*effects, NONE], n=1)
+            raise InputError(
+                f"unknown effect {name!r}",
+                expected=f"{NONE}, {', '.join(effects)}",
+                hint=f"did you mean {near[0]}?" if near else "",
+            )

@@ -453,5 +453,5 @@ def images(pose: FloatArray) -> FloatArray:
 
 def with_options(menu: Menu, **changes: Any) -> Menu:
     """The menu with those options that are not None. Who names the heights knows how low a set-up may be used."""
-    given = {name: value for name, value in changes.items() if value is not None}
+    given: dict[str, Any] = {n: tuple(v) if isinstance(v, list) else v for n, v in changes.items() if v is not None}
     return replace(menu, **given | ({"floors": {}} if "heights" in given else {}))

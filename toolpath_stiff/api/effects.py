@@ -1,0 +1,195 @@
+"""The physical effects that a machine can carry: the catalogue, and one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from toolpath_stiff.api.inputs import Machine, machine_from
+from toolpath_stiff.api.results import Result
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.effects.contract import Effect
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from toolpath_stiff.stiffness.effects.trial import Trial
+
+
+class EffectCatalogue(Result):
+    """Effects, in the order of the load path.
+
+    Attributes
+    ----------
+    effects
+        The effects themselves.
+    broken
+        Plug-ins that do not load -> why.
+    """
+
+    command: ClassVar[str] = "effects"
+
+    def __init__(self, effects: Sequence[Effect], broken: Mapping[str, str]) -> None:
+        self.effects, self.broken = list(effects), dict(broken)
+
+    def __getitem__(self, name: str) -> Effect:
+        """An effect by its name."""
+        return next(effect for effect in self.effects if effect.name == name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What each effect declares, in its own units."""
+        from toolpath_stiff.report.effects import describe
+
+        return {"effects": [describe(effect) for effect in self.effects], "broken": self.broken}
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row an effect: link of the load path, name, title, equation, source."""
+        import pandas as pd
+
+        columns = ["link", "name", "title", "equation", "source", "load_dependent"]
+        return pd.DataFrame(self.to_dict()["effects"])[columns]
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.effects import table
+
+        return table(self.effects, self.broken)
+
+    def _short(self) -> str:
+        return f"{len(self.effects)} effects"
+
+
+def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
+    """The effects that a machine can carry: the catalogue's, plug-ins', those in files of one's own.
+
+    Raises
+    ------
+    InputError
+        A file cannot be loaded.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.effects()["weak_strut"].title
+    'one strut is weak'
+    """
+    from toolpath_stiff.stiffness.effects import installed_effects, known_effects
+
+    return EffectCatalogue(list(known_effects(list(map(str, files))).values()), installed_effects()[1])
+
+
+class EffectCheck(Result):
+    """Effects of a file tried against the contract: shapes, symmetry, units, neutral value, speed."""
+
+    command: ClassVar[str] = "effects"
+
+    def __init__(self, file: str, machine: str, trials: Sequence[Trial]) -> None:
+        self.file, self.machine, self.trials = file, machine, list(trials)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every effect keeps the contract."""
+        return all(trial.passed for trial in self.trials)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Each check of each effect."""
+        rows = [
+            {"effect": t.effect.name, "passed": t.passed, "checks": [vars(outcome) for outcome in t.outcomes]}
+            for t in self.trials
+        ]
+        return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a check."""
+        import pandas as pd
+
+        rows = [{"effect": t["effect"], **check} for t in self.to_dict()["effects"] for check in t["checks"]]
+        return pd.DataFrame(rows)
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.effects import trials_text
+
+        return trials_text(self.trials, self.machine)
+
+    def _short(self) -> str:
+        return f"{self.file}, {'good' if self.passed else 'FAILS'}"
+
+
+def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> EffectCheck:
+    """Try the effects of a file against the contract, on a machine.
+
+    Raises
+    ------
+    InputError
+        The file cannot be loaded, or names an effect that there is already.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py"))
+    ...     tps.check_effects(file).passed
+    True
+    """
+    from toolpath_stiff.stiffness.effects import effects_from_file, known_effects
+    from toolpath_stiff.stiffness.effects.trial import try_effect
+
+    on = machine_from(machine)
+    model = on.model.given or on.model.machine
+    known_effects([str(file)])  # names that are taken
+    trials = [try_effect(effect, model) for effect in effects_from_file(str(file)).values()]
+    return EffectCheck(str(file), on.name, trials)
+
+
+class EffectFile(Result):
+    """The text of a file with an effect.
+
+    Attributes
+    ----------
+    name, text
+        The effect's name; the file.
+    """
+
+    command: ClassVar[str] = "effects"
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name, self.text = name, text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Name and text."""
+        return {"effect": self.name, "text": self.text}
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _short(self) -> str:
+        return f"{self.name}, {len(self.text.splitlines())} lines"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the file, whole or not at all."""
+        from toolpath_stiff.files import write_atomically
+
+        return write_atomically(file, self.text)
+
+
+def effect_template(name: str) -> EffectFile:
+    """A commented, working example of an effect to change into one's own.
+
+    Parameters
+    ----------
+    name
+        Of the effect and of its file without the ending.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.effect_template("my_screw").name
+    'my_screw'
+    """
+    from importlib import resources
+
+    if not name.isidentifier():
+        raise InputError(f"{name!r} cannot be an effect's name", expected="a name such as my_screw")
+    text = (resources.files("toolpath_stiff") / "data" / "templates" / "effect.py.txt").read_text("utf-8")
+    return EffectFile(name, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
