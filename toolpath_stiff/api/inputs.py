@@ -64,6 +64,12 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
     return pose_in_si((x, y, z, a, b, c))
 
 
+def origin_word(origin: Pose) -> str:
+    """A placement in SI as --origin takes it; angles that are all 0 go without saying."""
+    words = [f"{value:.10g}" for value in pose_in_mm(origin)]
+    return ",".join(words if any(origin[3:]) else words[:3])
+
+
 @dataclass(frozen=True)
 class Machine:
     """A machine with the physical effects that act on it, and what it runs under.

@@ -10,6 +10,7 @@ from toolpath_stiff.api.inputs import (
     Machine,
     Program,
     machine_from,
+    origin_word,
     pose_si,
     positive,
     program_from,
@@ -442,7 +443,7 @@ def diagnose(
     default = asked.model.default_origin
     own = options(
         program=None if part is None else part.file,
-        origin=None if origin_mm_deg is None else ",".join(f"{value:.10g}" for value in origin_mm_deg),
+        origin=None if origin is None else origin_word(origin),
         setup=asked.on.setup,
         temperature=asked.on.temperature_C,
         seed=seed or None,
@@ -763,7 +764,7 @@ def plan(
         loads=loads_N,
         tool_extensions=None if tool_extensions_mm is None else tuple(m_from_mm(float(t)) for t in tool_extensions_mm),
         setups=setups,
-        costs=Costs(**dict(minutes or {})),
+        costs=Costs(**{name: float(value) for name, value in (minutes or {}).items()}),
         judgement=None if diagnosis is None else diagnosis.diagnosed.main,
         files=asked.files,
         **asked.common,

@@ -1,0 +1,265 @@
+"""What people import: each function against the command that shows its result, and what every result can do."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.figure
+import pandas as pd
+import pytest
+
+import toolpath_stiff as tps
+from toolpath_stiff.cli.main import main
+
+ROOT = Path(__file__).parents[1]
+SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG2 X60 Y20 R20\nM2\n"
+RAW = "x_mm,y_mm,z_mm,direction,jog_um,force_N,displacement_um\n" + "".join(
+    f"0,0,800,X,{jog},{40 * jog},{0.2 * jog}\n" for jog in (0, 200, -200, 0)
+)
+PLACE = {"x_mm": (-60, 60), "y_mm": 0, "z_mm": (700, 800), "rotate_deg": 0, "step_mm": 10, "points": 5}
+
+# The command -> the function that must give the same JSON. Each in a folder with slot.nc and raw.csv.
+PAIRS = {
+    "analyze slot.nc --step 5 --origin 10,0,800 --load normal --require 50000 --compare genhexkins --partial": lambda: (
+        tps.analyze(
+            "nist",
+            "slot.nc",
+            step_mm=5,
+            origin_mm_deg=(10, 0, 800),
+            load="normal",
+            require_N_per_mm=50000,
+            compare_with="genhexkins",
+            partial=True,
+        )
+    ),
+    "check slot.nc --strut-speed 5000": lambda: tps.check("slot.nc", strut_speed_mm_per_min=5000),
+    "check slot.nc --machine none --dialect fanuc": lambda: tps.check(
+        tps.Program.read("slot.nc", dialect="fanuc"), None
+    ),
+    "pose -300 300 300 -30 0 0 --force 500": lambda: tps.pose("nist", (-300, 300, 300, -30, 0, 0), force_N=500),
+    "map --slices 800,1200 --points 11 --load z --tilt 5,0,0": lambda: tps.map_stiffness(
+        "nist", z_mm=(800, 1200), points=11, load="z", tilt_deg=(5, 0, 0)
+    ),
+    "place slot.nc --x -60:60 --y 0 --z 700:800 --rotate 0 --step 10 --points 5": lambda: tps.place(
+        "nist", "slot.nc", **PLACE
+    ),
+    "case-study": tps.case_study,
+    "compare nist-table1 --noise 5": lambda: tps.compare("nist", "nist-table1", noise_percent=5),
+    "diagnose nist-table1 --noise 10 --seed 3 --program slot.nc --origin 0,0,800": lambda: tps.diagnose(
+        "nist", "nist-table1", noise_percent=10, seed=3, program="slot.nc", origin_mm_deg=(0, 0, 800)
+    ),
+    "update nist-table1 --strut-law --noise 2,1 -o mine.toml": lambda: tps.update(
+        "nist", "nist-table1", strut_law=True, noise_percent=(2, 1), machine_file="mine.toml"
+    ),
+    "plan --between spindle_compliance,none --n 2 --cost pose=20": lambda: tps.plan(
+        "nist", between=("spindle_compliance", "none"), n=2, minutes={"pose": 20}
+    ),
+    "machine recover --starts 2": lambda: tps.recover_geometry(starts=2),
+    "effects list": tps.effects,
+}
+NO_PICTURES = ("analyze", "map", "place", "case-study", "compare", "diagnose", "update", "plan")
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("slot.nc").write_text(SLOT)
+    Path("raw.csv").write_text(RAW)
+    return tmp_path
+
+
+@pytest.mark.parametrize("line", PAIRS)
+def test_a_command_shows_what_its_function_returns(line, here, capsys):
+    argv = [*line.split(), "--json"]
+    argv += ["--no-plots", "--out", "out"] if argv[0] in NO_PICTURES else []
+    assert main(argv) in (0, 1, 3)
+    shown = capsys.readouterr().out
+    result = PAIRS[line]()
+    assert json.loads(shown) == result.to_dict()
+    assert shown == result.to_json()
+    name = {"analyze": "summary", "place": "placement", "case-study": "case_study"}.get(argv[0], argv[0])
+    if argv[0] in NO_PICTURES:
+        assert (here / "out" / f"{name}.json").read_text(encoding="utf-8") == shown
+    assert str(result).strip()
+    assert len(repr(result)) < 200
+    assert "<script" not in result._repr_html_()
+
+
+def test_reduce_is_its_function_and_where_it_wrote(here, capsys):
+    assert main(["reduce", "raw.csv", "--no-plots", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert shown.pop("files") == ["raw_measurements.csv"]
+    found = tps.reduce("raw.csv")
+    assert shown == found.to_dict()
+    assert found.to_frame()["stiffness_N_per_mm"].tolist() == [50000.0]  # 16 kN over 0.32 mm of deflection
+
+
+def test_path_is_its_function(here, capsys):
+    assert main(["path", "slot.nc", "--step", "5", "--csv"]) == 0
+    found = tps.sample_path("slot.nc", step_mm=5)
+    assert capsys.readouterr().out == str(found)
+    assert list(found.to_dict())[-1] == "feed_mm_per_min"
+
+
+def test_a_saved_folder_is_the_command_s(here):
+    found = tps.analyze("nist", "slot.nc", step_mm=5)
+    written = found.save("saved", plots=False)
+    assert main(["analyze", "slot.nc", "--step", "5", "--no-plots", "--out", "made"]) == 0
+    assert {file.name for file in written} == {"samples.csv", "summary.json"}
+    for file in written:
+        assert file.read_bytes() == (here / "made" / file.name).read_bytes()
+
+
+def test_saving_clears_what_an_earlier_run_left_and_keeps_what_is_not_the_tool_s(here):
+    found = tps.analyze("nist", "slot.nc", step_mm=5)
+    found.save("saved")
+    (here / "saved" / "notes.txt").write_text("mine")
+    found.save("saved", plots=False)
+    assert {file.name for file in (here / "saved").glob("[!.]*")} == {"samples.csv", "summary.json", "notes.txt"}
+    Path("other").mkdir()
+    Path("other/summary.json").write_text("mine")
+    with pytest.raises(tps.InputError, match="summary"):
+        found.save("other", plots=False)
+    found.save("other", plots=False, replace=True)
+    assert Path("other/summary.json.old").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "result",
+    [
+        lambda: tps.analyze("nist", tps.Program.from_text(SLOT), step_mm=5),
+        lambda: tps.map_stiffness("nist", points=11),
+        lambda: tps.Machine.load("nist"),
+        lambda: tps.Machine.load("nist").check(),
+        lambda: tps.compare("nist", "nist-table1", noise_percent=5),
+        lambda: tps.plan("nist", n=8),
+    ],
+)
+def test_a_result_draws_itself(result):
+    found = result()
+    assert isinstance(found.plot(), matplotlib.figure.Figure)
+    assert isinstance(found.to_frame(), pd.DataFrame)
+
+
+def test_every_public_name_is_there_and_listed():
+    assert set(tps.__all__) == set(dir(tps))
+    for name in tps.__all__:
+        assert getattr(tps, name) is not None
+    wanted = "analyze check sample_path pose place map_stiffness case_study reduce compare diagnose update plan rewrite"
+    assert {*wanted.split(), "Machine", "Program", "Measurements", "Effect"} <= set(tps.__all__)
+    with pytest.raises(AttributeError, match="analyse"):
+        tps.analyse  # noqa: B018
+
+
+def test_a_name_that_is_imported_for_type_checkers_is_public_and_the_other_way_round():
+    text = Path(tps.__file__).read_text(encoding="utf-8")
+    typed = {
+        line.split(" as ")[-1].strip() for line in text.splitlines() if line.startswith("    from ") and " as " in line
+    }
+    assert typed == set(tps.__all__) - {"__version__"}
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    code = (
+        "import sys, toolpath_stiff; print([m for m in ('numpy', 'scipy', 'pandas', 'matplotlib') if m in sys.modules])"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
+
+
+def test_shop_units_at_the_door():
+    slot = tps.Program.from_text(SLOT)
+    found = tps.analyze("nist", slot, step_mm=5, origin_mm_deg=(0, 0, 800)).to_frame()
+    assert found["z_mm"].max() == pytest.approx(805.0)
+    assert found["s_mm"].diff().max() <= 5.0 + 1e-9
+    turned = tps.analyze("nist", slot, step_mm=5, origin_mm_deg=(0, 0, 800, 0, 0, 90)).to_frame()
+    assert turned["y_mm"].max() == pytest.approx(60.0)  # x of the program lies along y
+
+
+@pytest.mark.parametrize(
+    ("ask", "told"),
+    [
+        (lambda: tps.analyze("nist", tps.Program.from_text(SLOT), step_mm=0), "step 0 mm"),
+        (lambda: tps.analyze("nist", tps.Program.from_text(SLOT), step_mm=float("nan")), "step nan mm"),
+        (lambda: tps.analyze("nist", tps.Program.from_text(SLOT), origin_mm_deg=(1, 2)), "origin of 2 numbers"),
+        (lambda: tps.analyze("nist", tps.Program.from_text(SLOT), load="sideways"), "sideways"),
+        (lambda: tps.analyze("nist", "nowhere.nc"), "nowhere.nc"),
+        (lambda: tps.Machine.load("nobody"), "nobody"),
+        (lambda: tps.Machine.load("nist", temperature_C=1000), "1000 degrees C"),
+        (lambda: tps.pose("nist", (0, 0)), "a pose of 2 numbers"),
+        (lambda: tps.pose("nist", (0, 0, 1e9)), "1e\\+09"),
+        (lambda: tps.map_stiffness("nist", points=1), "points 1"),
+        (lambda: tps.map_stiffness("nist", z_mm=(800, 800)), "twice"),
+        (lambda: tps.place("nist", tps.Program.from_text(SLOT), x_mm=(5, -5)), "lower bound first"),
+        (lambda: tps.place("nist", tps.Program.from_text(SLOT), decimals=3), "without --write"),
+        (lambda: tps.place("nist", tps.Program.from_text(SLOT), objective="best"), "objective 'best'"),
+        (lambda: tps.compare("nist", "nist-table1", noise_percent=80), "noise 80 %"),
+        (lambda: tps.compare("nist", "nist-table1", seed=-1), "seed -1"),
+        (lambda: tps.compare("nist", "nowhere.csv"), "nowhere.csv"),
+        (lambda: tps.plan("nist", minutes={"lunch": 30}), "lunch"),
+        (lambda: tps.update("nist", "nist-table1"), "nothing"),
+    ],
+)
+def test_what_is_wrong_is_one_error_that_can_be_caught(ask, told):
+    with pytest.raises(tps.TpsError, match=told):
+        ask()
+
+
+def test_a_pose_out_of_reach_is_an_error_alone_and_empty_among_others():
+    with pytest.raises(tps.UnreachableError):
+        tps.pose("nist", (0, 0, 5000))
+    found = tps.pose("nist", [(0, 0, 800), (0, 0, 5000)])
+    assert found.reachable.tolist() == [True, False]
+    assert found.to_dict()["poses"][1]["kx_N_per_mm"] is None
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_progress_is_told_what_how_much_and_of_how_much(here):
+    told = []
+    tps.analyze("nist", "slot.nc", progress=lambda *what: told.append(what))
+    text, done, total = told[-1]
+    assert text == "slot.nc: samples"
+    assert done == total > 0
+
+
+def test_an_updated_machine_goes_on(here):
+    update = tps.update("nist", "nist-table1", strut_law=True)
+    assert update.accepted
+    better = update.machine
+    file = update.save_machine("mine.toml")
+    again = tps.Machine.load(file)
+    at = (0, 0, 800)
+    assert tps.pose(better, at).to_dict()["kz_N_per_mm"] == pytest.approx(tps.pose(again, at).to_dict()["kz_N_per_mm"])
+    assert tps.compare(again, "nist-table1", noise_percent=5).to_dict()["machine"] == "nist"
+
+
+def test_a_rewritten_program_cuts_where_the_placed_one_does(here):
+    slot = tps.Program.read("slot.nc")
+    written = tps.rewrite(slot, to_mm_deg=(10, 20, 800, 0, 0, 30), from_mm_deg=(0, 0, 800))
+    written.save("placed.nc")
+    cuts = []
+    for program, origin in ((slot, (10, 20, 800, 0, 0, 30)), ("placed.nc", (0, 0, 800))):
+        frame = tps.sample_path(program, origin_mm_deg=origin, step_mm=5).to_frame()
+        cuts.append(frame[frame["motion"] != "rapid"])
+    for column in ("x_mm", "y_mm", "z_mm"):
+        assert cuts[0][column].tolist() == pytest.approx(cuts[1][column].tolist(), abs=2e-4)
+
+
+def test_a_machine_and_a_program_travel_to_another_process():
+    machine = pickle.loads(pickle.dumps(tps.Machine.load("nist")))
+    program = pickle.loads(pickle.dumps(tps.Program.from_text(SLOT)))
+    assert tps.analyze(machine, program, step_mm=5).complete
+
+
+def test_a_diagnosis_is_not_made_again_for_the_plan(monkeypatch):
+    from toolpath_stiff.updating import planning
+
+    data = tps.Measurements.read("nist-table1")
+    found = tps.diagnose("nist", data, noise_percent=10)
+    plain = tps.plan("nist", data, noise_percent=10)
+    monkeypatch.setattr(planning, "judge", None, raising=True)
+    assert tps.plan("nist", data, noise_percent=10, diagnosis=found).to_dict() == plain.to_dict()
