@@ -17,11 +17,16 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
+from toolpath_stiff.units import deg_from_rad, m_per_s_from_mm_per_min, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+
+RAPID_FEED = m_per_s_from_mm_per_min(10_000.0)  # assumed where no machine says otherwise
+ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
+BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
+MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
 
 
 @dataclass(frozen=True)
@@ -126,16 +131,9 @@ def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
     return roll_pitch_yaw(turn @ rotation_matrices(abc) @ back)
 
 
-RAPID_FEED = 10.0 / 60.0  # m/s, assumed where no machine says otherwise
-ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
-BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
-MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
-
-
 def move_durations(moves: Moves, rapid_feed: float = RAPID_FEED) -> FloatArray:
     """(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s."""
-    turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0)
-    return _durations(moves, move_lengths(moves), turn, rapid_feed)
+    return _durations(moves, move_lengths(moves), _turn(moves), rapid_feed)
 
 
 def sample_moves(
@@ -163,20 +161,8 @@ def sample_moves(
         The step gives more than `MOST_SAMPLES` samples.
     """
     length = move_lengths(moves)
-    turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0)
-    # A length that is a whole number of steps up to rounding must not gain a step.
-    pieces = np.maximum(
-        np.ceil(length * _fastest_part(moves) / step - 1e-9),
-        np.ceil(turn / ANGULAR_STEP - 1e-9),
-    )
-    pieces = np.maximum(pieces, 1.0)
-    total = float(pieces.sum()) + len(moves)
-    if total > MOST_SAMPLES:
-        raise InputError(
-            f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
-            expected=f"at most {MOST_SAMPLES}",
-            hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
-        )
+    turn = _turn(moves)
+    pieces = _pieces(moves, length, turn, step)
     counts = pieces.astype(np.int64) + 1
     duration = _durations(moves, length, turn, rapid_feed)
     cutting = moves.motion != RAPID
@@ -200,6 +186,29 @@ def sample_moves(
         _sample_block(moves.take(block), counts[block], some, first_move, origin, samples.take(rows))
         first_move, first_sample = end, rows.stop
     return samples
+
+
+def _turn(moves: Moves) -> FloatArray:
+    """(n,) rad, the largest turn of a rotary axis in each move."""
+    return np.asarray(np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0))
+
+
+def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> FloatArray:
+    """(n,) whole numbers from 1, into how many pieces the samples divide each move. Raises `InputError`."""
+    # A length that is a whole number of steps up to rounding must not gain a step.
+    pieces = np.maximum(
+        np.ceil(length * _fastest_part(moves) / step - 1e-9),
+        np.ceil(turn / ANGULAR_STEP - 1e-9),
+    )
+    pieces = np.maximum(pieces, 1.0)
+    total = float(pieces.sum()) + len(moves)
+    if total > MOST_SAMPLES:
+        raise InputError(
+            f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
+            expected=f"at most {MOST_SAMPLES}",
+            hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
+        )
+    return np.asarray(pieces)
 
 
 def _empty_samples(n: int) -> Samples:

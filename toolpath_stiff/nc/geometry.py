@@ -15,6 +15,11 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.nc.moves import Moves
 
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Point2 = tuple[float, float]
+Vector = tuple[float, float, float]
+
 # LinuxCNC's defaults (manual, "INI configuration", CENTER_ARC_RADIUS_TOLERANCE_MM; interp_arc.cc): start and end radius
 # may differ by a thousandth of the radius, or by 0.00127 mm if that is more, and never by more than 0.127 mm.
 RELATIVE_TOLERANCE = 1e-3
@@ -27,7 +32,9 @@ PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}  # first, second
 CENTER_WORDS = ("I", "J", "K")
 CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
-Point2 = tuple[float, float]
+PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
+SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
+MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
 
 
 class ArcError(Exception):
@@ -103,10 +110,6 @@ def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     return math.degrees(math.atan2(-j, across)), pitch
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-
 def move_lengths(moves: Moves) -> FloatArray:
     """(n,) m, length of the tip's path in each move.
 
@@ -176,11 +179,6 @@ def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray
     position = frame.center[arc] + radius * outward + height * normal
     velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
     return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
-
-
-PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
-
-SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,8 @@ from toolpath_stiff.nc.codes.offsets import HOLDS_TIP
 from toolpath_stiff.nc.codes.points import read_numbers
 from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
 from toolpath_stiff.nc.moves import Jump
-from toolpath_stiff.nc.state import FARTHEST_MM, POINT_WORDS, Call, CurrentBlock, Flow, State
+from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, State
+from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
 
 if TYPE_CHECKING:
@@ -103,8 +104,8 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
         if letter in current.values:
             raise current.fail(current.values[letter], "moves an axis that this machine does not have", "X Y Z A B C")
     for letter in (*AXES, "@"):
-        if letter in current.values and abs(current.values[letter].value) > FARTHEST_MM:
-            raise current.fail(current.values[letter], "is beyond 100 m", f"at most {FARTHEST_MM:g}")
+        if letter in current.values and abs(current.values[letter].value) > LARGEST_MM:
+            raise current.fail(current.values[letter], "is beyond 100 m", f"at most {LARGEST_MM:g}")
     return current
 
 

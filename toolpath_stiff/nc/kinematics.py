@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.geometry import Vector
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import m_from_mm, mm_from_m
 
@@ -45,7 +46,6 @@ PLACE_KEYS = {TABLE: "point_mm", HEAD: "pivot_mm"}
 TOLERANCE_MM, LEAST_TOLERANCE_MM, LARGEST_TOLERANCE_MM = 1e-3, 1e-5, 1.0
 PARALLEL = 1e-6  # sine of the angle between two axes that are one
 
-Vector = tuple[float, float, float]
 Fail = Callable[[str, str], InputError]
 
 

@@ -17,6 +17,7 @@ from toolpath_stiff.units import (
     mm_from_m,
     mm_per_min_from_m_per_s,
     rad_from_deg,
+    rad_per_s_from_deg_per_min,
 )
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ class Program:
     origin_source
         Who says so: "option" (the caller), "program" (`G10 L2 P1` or an offsets file) or "default".
     unsupported, warnings, assumptions
-        What was read but not acted upon; what deserves a look; what was assumed. Sentences for people.
+        What was read but not acted upon; what deserves a look; what was assumed; each a sentence.
     tools
         The tools that the program used.
     interpreter
@@ -368,7 +369,7 @@ def _copy(part: MovesInMm, into: Moves) -> None:
     # The feed of a move of the rotary axes alone is in degrees per minute.
     rotary = (into.start[:, :3] == into.end[:, :3]).all(axis=1)
     rotary[part.arc_rows] = False
-    speed = np.where(rotary, rad_from_deg(part.feed) / 60.0, m_per_s_from_mm_per_min(part.feed))
+    speed = np.where(rotary, rad_per_s_from_deg_per_min(part.feed), m_per_s_from_mm_per_min(part.feed))
     into.feed[:] = np.where(part.motion == RAPID, math.nan, speed)
     into.line[:], into.motion[:], into.dwell[:] = part.line, part.motion, part.dwell
     into.tool[:], into.tool_length[:] = part.tool, m_from_mm(part.tool_length)

@@ -41,7 +41,8 @@ from toolpath_stiff.nc.codes.points import (
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, MovesInMm
-from toolpath_stiff.nc.state import FARTHEST_MM, State
+from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, read_block
 
 CHUNK = 8192  # lines: their words fit into a processor's cache
@@ -209,7 +210,7 @@ class _Lines:
         self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
         for letter in AXES:
             if letter in self.values:
-                self._stop(np.abs(self.values[letter]) > FARTHEST_MM)
+                self._stop(np.abs(self.values[letter]) > LARGEST_MM)
         if state.dialect.increments:
             self._count_increments()
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import cutter_location
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
-from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
+from toolpath_stiff.nc.cutter_location.statements import HEAD_LINES, looks_like_cutter_location
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
@@ -23,8 +23,6 @@ from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
 from toolpath_stiff.nc.words import read_lines, split_lines
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm, pose_in_si
-
-HEAD_LINES = 50  # a file says what it is at its beginning
 
 _HEIDENHAIN = "Heidenhain's conversational language"
 _SIEMENS = "Siemens' own language (Sinumerik)"

@@ -19,7 +19,6 @@ from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
 from toolpath_stiff.units import MM_PER_INCH
 
 POINT_WORDS = (*AXES, *POLAR)
-FARTHEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
 
 
 class Flow(Enum):

@@ -12,7 +12,7 @@ from toolpath_stiff.errors import InputError
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
-LARGEST_MM = 1e5
+LARGEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
 # LinuxCNC's parameter file (manual, "Parameters"): G54 is 5221 to 5230, each further offset 20 on; X Y Z A B C U V W R.
 FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
 HOME_G28, HOME_G30 = 5161, 5181

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes import MOTION, RETRACT, Code, g_codes
-from toolpath_stiff.nc.codes.modes import SECONDS_PER_DAY, time_word
+from toolpath_stiff.nc.codes.modes import time_word
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_spoke
-from toolpath_stiff.nc.geometry import SAME_HEIGHT_MM, Drilling, strokes
+from toolpath_stiff.nc.geometry import MOST_STROKES, SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.moves import CYCLE, RAPID
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
+from toolpath_stiff.units import SECONDS_PER_DAY
 
 CYCLES = ("G73", "G81", "G82", "G83", "G85", "G89")
 PECKS, DWELLS = ("G73", "G83"), ("G82", "G89")
-MOST_STROKES = 100_000  # of one block; beyond, Q or L is a slip
 MOST_REPEATS = 10_000
 RENEWED = ("level", "unit")  # what one cycle leaves to another one of its run
 

@@ -34,7 +34,7 @@ from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, State
 from toolpath_stiff.nc.words import Word
-from toolpath_stiff.units import MM_PER_INCH
+from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
 
 def units(state: State, block: CurrentBlock, code: str) -> None:
@@ -82,9 +82,6 @@ MODE_ALIASES = (
     Alias("G70", "G20", "inch", _FANUC, ("fanuc",)),
     Alias("G71", "G21", "mm", _FANUC, ("fanuc",)),
 )
-
-
-SECONDS_PER_DAY = 86400.0
 
 
 def feed_mode(state: State, block: CurrentBlock, code: str) -> None:

@@ -24,9 +24,8 @@ from toolpath_stiff.nc.cutter_location.state import (
 )
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
 from toolpath_stiff.nc.moves import ToolUse
-from toolpath_stiff.units import MM_PER_INCH
+from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUTE
 
-SECONDS_PER_DAY = 86400.0
 MM_PER_FOOT = 12.0 * MM_PER_INCH
 # FEDRAT: mm of its unit (None: the file's length unit), and whether per revolution.
 FEED_UNITS: dict[str, tuple[float | None, bool]] = {
@@ -131,7 +130,7 @@ def delay(state: State, statement: Statement) -> None:
     if words[1:]:
         if not state.speed > 0.0:
             raise state.fail("a pause in revolutions without a spindle speed", "SPINDL/ with RPM before it")
-        time *= 60.0 / state.speed
+        time *= SECONDS_PER_MINUTE / state.speed
     if not 0.0 <= time <= SECONDS_PER_DAY:
         raise state.fail(statement.shown, "the seconds, 0 or more")
     state.recorder.add_dwell(time)

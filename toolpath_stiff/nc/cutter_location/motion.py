@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location import geometry
 from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, AxisError, Circle, Vector, unit_axis
-from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS, SECONDS_PER_DAY
+from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
 from toolpath_stiff.nc.cutter_location.state import (
     ALL,
     APT,
@@ -37,15 +37,15 @@ from toolpath_stiff.nc.cutter_location.state import (
 )
 from toolpath_stiff.nc.cutter_location.state import drill as drill_hole
 from toolpath_stiff.nc.cutter_location.statements import Argument, Nested, Statement, is_number, nested
-from toolpath_stiff.nc.geometry import Drilling
+from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling
 from toolpath_stiff.nc.moves import FEED, RAPID
+from toolpath_stiff.units import SECONDS_PER_DAY
 
 # The first word, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip breaking).
 KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73"}
 PAIRS = ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL")
 ALIASES = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}
 EXPAND = "have the CAM system write the moves of the cycle"
-MOST_PECKS = 100_000
 
 
 @dataclass
@@ -154,7 +154,7 @@ def _check(state: State, given: _Given, hole: Drilling) -> None:
         )
     if hole.peck and not pecks:
         raise state.fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP")
-    if pecks and (not hole.peck > 0.0 or (clear - hole.bottom) / hole.peck > MOST_PECKS):
+    if pecks and (not hole.peck > 0.0 or (clear - hole.bottom) / hole.peck > MOST_STROKES):
         raise state.fail(f"{shown} without its STEP, or with one too small", "STEP above 0")
     if hole.dwell and pecks:
         raise _refusal(state, "DWELL in a cycle with pecks", "no DWELL")
