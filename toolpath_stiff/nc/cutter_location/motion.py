@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location import geometry
-from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, AxisError, Circle, Vector, unit_axis
+from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, AxisError, Circle, unit_axis
 from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
 from toolpath_stiff.nc.cutter_location.state import (
     ALL,
@@ -37,7 +37,7 @@ from toolpath_stiff.nc.cutter_location.state import (
 )
 from toolpath_stiff.nc.cutter_location.state import drill as drill_hole
 from toolpath_stiff.nc.cutter_location.statements import Argument, Nested, Statement, is_number, nested
-from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling
+from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling, Vector
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.units import SECONDS_PER_DAY
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location import geometry
-from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle, Vector
+from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, number_of
-from toolpath_stiff.nc.geometry import Drilling, strokes
+from toolpath_stiff.nc.geometry import Drilling, Vector, strokes
 from toolpath_stiff.nc.moves import ARC, CYCLE, RAPID, Arc, Recorder, ToolUse
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry
 from toolpath_stiff.units import m_from_mm
