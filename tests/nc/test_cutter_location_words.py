@@ -123,7 +123,7 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("TLRGT,GORGT/L1", 3, "TLRGT"),
         ("RETRCT", 3, "retracts"),
         ("CYCLE/TAP,10,IPM,2", 3, "CYCLE/TAP"),
-        ("CYCLE/DRILL, 126.0, 85.0, 1.0,MMPR", 3, "order hangs on"),
+        ("CYCLE/DRILL, 126.0, 85.0, 1.0,MMPR", 3, "order depends on"),
         ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2,RAPTO,1", 3, "RAPTO"),
         ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2,RETURN,0", 3, "RETURN,0"),
         ("CYCLE/DRILL,DEEP,STEP,20,CLEAR,3,FEDTO,-72,RTRCTO,AUTO,MMPM,250", 3, "AUTO"),

@@ -37,7 +37,7 @@ MOST_ERRORS = 100  # beyond, a file is no program for this reader
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing to say of a program.
+    """One finding about a program.
 
     Attributes
     ----------
@@ -46,9 +46,9 @@ class Finding:
     code
         What kind of finding it is, a short word; of used and unsupported words the word itself.
     text
-        A sentence for people.
+        One sentence.
     severity
-        "error": the program is refused for it; "warning": have a look; "note": for the record.
+        "error": the program is refused for it; "warning": to be checked; "note": for the record.
     """
 
     line: int
@@ -272,7 +272,7 @@ def _check_cutter_location(
 def findings_of(
     errors: Iterable[InputError], warnings: Iterable[str], assumptions: Iterable[str]
 ) -> tuple[Finding, ...]:
-    """All that is to be said of a program, in the order of lines."""
+    """All findings about a program, in the order of lines."""
     return in_order(
         [
             *(finding_of(error) for error in errors),

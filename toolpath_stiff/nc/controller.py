@@ -60,9 +60,9 @@ class Dialect:
     dwell
         What the P of G4 and of cycles counts; with milliseconds, G4 X is a time too.
     retract
-        G98 or G99 at the start; None: nobody says, LinuxCNC's habit (G99) is assumed and listed.
+        G98 or G99 at the start; None: not defined, LinuxCNC's G99 is assumed and listed.
     keeps_heights
-        Whether a drilling cycle's hole keeps its depth when G90 or G91 follows, or Z and R are read anew (LinuxCNC);
+        Whether a drilling cycle's hole keeps its depth when G90 or G91 follows, or Z and R are read again (LinuxCNC);
         None: refused.
     repeats_in_p
         `M98 P21000` is two runs of O1000 (True), O21000 (False), or whichever the file has (None).
@@ -79,7 +79,7 @@ class Dialect:
     local_calls
         Whether M97 calls a block by its N number.
     feed_needs_point
-        Units in which F without a decimal point hangs on a parameter, and is refused.
+        Units in which F without a decimal point depends on a parameter, and is refused.
     holds_tip
         Its code for tool centre point control.
     """
@@ -208,7 +208,7 @@ def plain(block_delete: Switches, controller: Controller) -> bool:
 
 
 def check_plain(block_delete: Switches, controller: Controller) -> None:
-    """Raise `InputError` if LinuxCNC's interpreter would read the program otherwise than the control."""
+    """Raise `InputError` if LinuxCNC's interpreter would read the program differently from the control."""
     if not plain(block_delete, controller):
         raise InputError(
             f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {controller.dialect.name!r}, "
@@ -323,7 +323,7 @@ class _Reader:
             return read_tool_table(self.path.parent / given)
         if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
             raise self.fail(
-                "tools is no list of tables", "[[tools]] with number, length_mm, ..., or the name of a file"
+                "tools is not a list of tables", "[[tools]] with number, length_mm, ..., or the name of a file"
             )
         tools: dict[int, ToolEntry] = {}
         for place, tool in enumerate(given, 1):

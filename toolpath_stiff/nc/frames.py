@@ -33,7 +33,7 @@ class Frames:
     offsets
         Work offsets and reference points.
     option, default
-        Where G54's zero sits on the machine as the caller says, and unless anyone says; mm and degrees.
+        Where G54's zero sits on the machine as the caller says, and by default; mm and degrees.
     active
         Index of the work offset in force, as `Offsets.at` counts.
     g92

@@ -54,7 +54,7 @@ def execute(state: State, block: Block) -> Flow | Call:
 
 
 def begin(state: State, block: Block) -> CurrentBlock:
-    """Take a block's codes and set its modes, not moving yet; to do so twice changes nothing but dwells."""
+    """Take a block's codes and set its modes, not moving yet; doing so twice changes nothing but dwells."""
     current = sort_words(state, block)
     read_numbers(state, current)
     for code in _in_order(current, ahead=True):
@@ -165,21 +165,21 @@ def _same_group(block: CurrentBlock, word: Word, other: str, group: str) -> Exce
 
 
 def _check_axis_words(block: CurrentBlock) -> None:
-    """Two codes that want the axis words of their block are an error."""
+    """Two codes that use the axis words of their block are an error."""
     present = [name for group in (ONCE, ROTATION, LENGTH) if (name := block.groups.get(group)) is not None]
     takers = [name for name in present if CODES[name].takes_axes]
     moving = block.groups.get(MOTION)
     if len(takers) > 1 or (takers and moving and moving != "G80"):
         other = moving if moving and len(takers) == 1 else takers[0]
         word = block.codes[takers[-1]]
-        raise block.fail(word, f"and {other} both want the axis words of their block", "two blocks")
+        raise block.fail(word, f"and {other} both use the axis words of their block", "two blocks")
 
 
 # -- the moves of a block --------------------------------------------------------------------------------------------
 
 
 def _move(state: State, block: CurrentBlock) -> None:
-    """Change the motion mode, and have it move if the block says so."""
+    """Change the motion mode, and move as the block asks."""
     given = block.groups.get(MOTION)
     if given is not None:
         if given in CYCLES:

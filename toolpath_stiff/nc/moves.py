@@ -160,9 +160,9 @@ class Program:
         Where program zero (G54) sits in machine coordinates: x, y, z in m, A, B, C in rad. The moves do
         not depend on it, except those that were given in machine coordinates.
     origin_source
-        Who says so: "option" (the caller), "program" (`G10 L2 P1` or an offsets file) or "default".
+        Where that comes from: "option" (the caller), "program" (`G10 L2 P1` or an offsets file) or "default".
     unsupported, warnings, assumptions
-        What was read but not acted upon; what deserves a look; what was assumed; each a sentence.
+        What was read but not acted upon; what should be checked; what was assumed; each one sentence.
     tools
         The tools that the program used.
     interpreter
@@ -174,8 +174,8 @@ class Program:
         The kinematics that it was posted for ("table-table A C"), from which the moves were recovered; "": A, B, C are
         roll, pitch, yaw of the platform.
     marks
-        (line, name) where operations begin, ascending, in a language whose text says so otherwise than by comment
-        lines; None: the comment lines of `source` say it.
+        (line, name) where operations begin, ascending, in a language that marks them otherwise than by comment
+        lines; None: the comment lines of `source` mark them.
     jumps
         Where the run left the order of the lines, for a subprogram or back from it; None: not known.
     """
@@ -298,13 +298,13 @@ class Recorder:
             self.parts[-1].dwell[-1] += seconds
 
     def moves(self) -> Moves:
-        """The moves as arrays, SI; they are thereby taken."""
+        """The moves as arrays, SI; the recorder is empty afterwards."""
         self.parts.append(self._close())
         parts, self.parts = self.parts[::-1], []
         return _joined(parts)
 
     def _close(self) -> MovesInMm:
-        """The lists as a part; they are empty thereafter."""
+        """The lists as a part; they are empty afterwards."""
         import numpy as np
 
         n = len(self.line)

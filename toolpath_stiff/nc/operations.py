@@ -25,7 +25,7 @@ from toolpath_stiff.nc.moves import RAPID, Jump, Moves, Program
 NAMED, MARKED, TOOL = "named", "marked", "tool"
 
 COMMENTS = re.compile(r"\(([^()]*)\)?|;(.*)")
-NO_WORDS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?", re.IGNORECASE)  # a line number is no word
+NO_WORDS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?", re.IGNORECASE)  # a line number is not a word
 BEGINS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?[(;]", re.IGNORECASE)
 ACTIVE = re.compile(r"\s*(?:MSG|DEBUG|PRINT)\s*,", re.IGNORECASE)  # LinuxCNC shows what follows
 FRAME, DASHES = " *=#~|'\"", "-_."  # of dashes and points only two and more are a frame: -X SIDE, .5 CHAMFER
@@ -211,7 +211,7 @@ def find_operations(
         What the tool table says of tools, by number.
     marks
         (line, name) where operations begin, ascending, on the line of their first move or before it: of a language
-        whose text says so otherwise than by comment lines.
+        that marks them otherwise than by comment lines.
     jumps
         Where the run left the order of the lines; None: not known, then calls and loops are looked for in the text.
     """

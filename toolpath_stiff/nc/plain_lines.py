@@ -6,7 +6,7 @@ reads blocks; a line that it does not match as a whole is not plain and is left 
 The lines become moves by the codes' own rules (`codes`, `frames`) on arrays, digit for digit. Here is only what a mode
 does along lines: a word holds until the next one. What a number, a feed, a point, an arc means is decided by the
 functions that the interpreter calls. A line about which there is anything to say (a word that nothing takes, an arc
-that does not fit) ends the run before it: the interpreter then executes it and says so. mm, degrees, mm/min inside.
+that does not fit) ends the run before it: the interpreter then executes it and reports it. mm, degrees, mm/min inside.
 """
 
 from __future__ import annotations
@@ -292,7 +292,7 @@ class _Lines:
         return found
 
     def _feed_words(self) -> None:
-        """F in force on each line, and the line that said so (-1: a line before these)."""
+        """F in force on each line, and the line that set it (-1: a line before these)."""
         state = self.state
         first, last = self.feeds
         texts = (
@@ -391,7 +391,7 @@ class _Lines:
     ) -> tuple[geometry.Point2, float]:
         """Centre (program coordinates) and sweep of an arc from the words of its plane, nan where there is none.
 
-        Raises `ArcError` for what the interpreter has to look at.
+        Raises `ArcError` for what is left to the interpreter.
         """
         state = self.state
         scale = state.length_scale

@@ -91,8 +91,8 @@ def read_program(
     path
         The program.
     origin, default_origin
-        Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and unless
-        anyone says. Only moves in machine coordinates (G53, G28, G30) depend on it.
+        Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and
+        where neither the caller nor the program says so. Only moves in machine coordinates (G53, G28, G30) depend on it.
     offsets_file
         Work offsets: `G55 = [x, y, z, a, b, c, r]` (mm, degrees) or a LinuxCNC parameter file.
     tool_table
@@ -187,7 +187,7 @@ class _Request:
 
     @property
     def zero(self) -> tuple[ShopPose | None, ShopPose]:
-        """Where G54's zero sits, mm and degrees, as the caller says, and unless anyone says.
+        """Where G54's zero sits, mm and degrees, as the caller says, and by default.
 
         A program that was posted for another machine is read in that one's coordinates first.
         """

@@ -204,7 +204,7 @@ def set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
 
 
 def _set_parameter(offsets: Offsets, number: int, value: float) -> None:
-    """One line of a LinuxCNC parameter file; parameters that are no offset are none of ours."""
+    """One line of a LinuxCNC parameter file; other parameters are ignored."""
     for home, first in ((offsets.home_g28, HOME_G28), (offsets.home_g30, HOME_G30)):
         if 0 <= number - first < 6:
             home[number - first] = value

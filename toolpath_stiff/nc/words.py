@@ -18,7 +18,7 @@ from typing import NamedTuple
 from toolpath_stiff.errors import InputError
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
-# ASCII digits alone: the digits of other scripts are no numbers to any control.
+# ASCII digits alone: the digits of other scripts are not numbers to any control.
 WORD = re.compile(rf"([A-Z@^])({NUMBER})(E[+-]?\d+)?", re.ASCII)
 AXES = "XYZABC"
 POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
@@ -85,7 +85,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
 
 
 def _program_number(compact: str, column: int, line: int, name: str) -> Block:
-    """`O1234` alone is a program's number; any other O word steers subprograms or loops."""
+    """`O1234` alone is a program's number; any other O word controls subprograms or loops."""
     if compact[1:].isascii() and compact[1:].isdigit():
         return Block(line, (Word("O", float(compact[1:]), column, compact),))
     raise InputError(
@@ -157,7 +157,7 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
         letter, number, exponent = match.groups()
         end = match.end()
         if exponent:
-            # An exponent stands without blanks; `X1 E5` is two words, and not a hundred metres.
+            # An exponent stands without blanks; `X1 E5` is two words, not a hundred metres.
             begin = match.start(3)
             apart = columns[begin] - columns[begin - 1] > 1
             if letter in NO_EXPONENT or apart or HAS_E_WORD.search(compact):
@@ -210,7 +210,7 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
 
 
 def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...]:
-    """Have pygcode read the normalised words; what it does not hand back exactly is an error."""
+    """Let pygcode read the normalised words; what it does not return exactly is an error."""
     if not words:
         return ()
     from pygcode.exceptions import GCodeWordStrError

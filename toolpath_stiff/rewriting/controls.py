@@ -160,7 +160,7 @@ class Controls:
     trace
         The moves of that block as the untouched program makes them.
     notes
-        What the user should hear of, each once.
+        What the user should know, each once.
     """
 
     def __init__(self, source: State, out: State, turn: Turn, decimals: int | None, linearise: float | None) -> None:
@@ -232,7 +232,7 @@ class Controls:
         return plane
 
     def motion_word(self, current: CurrentBlock | None, edit: LineEdit, wanted: str) -> None:
-        """See to it that the block is executed in the motion mode wanted."""
+        """Make sure that the block is executed in the motion mode wanted."""
         given = None if current is None else current.code(MOTION)
         if given is None:
             if self.out.motion != wanted:

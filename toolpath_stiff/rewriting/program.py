@@ -34,7 +34,7 @@ from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import Pose, ShopPose, deg_from_rad, mm_from_m, pose_in_mm
 
 LINE_END = re.compile("\r\n|\n|\r")
-FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # 0.01 mm is no machining; beyond nine a double has no more to say
+FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # coarser than 0.01 mm is not machining; beyond nine a double has no more digits
 PLAIN_DIALECTS = ("generic", "linuxcnc")
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
@@ -48,7 +48,7 @@ class Rewritten:
     text, encoding
         The program with its line ends, and how the original was encoded.
     notes
-        What the user should hear of, sentences for people.
+        What the user should know, one sentence each.
     """
 
     text: str
@@ -131,7 +131,7 @@ def check_rewritable(program: Program) -> None:
         )
     if program.dialect == CUTTER_LOCATION:
         raise InputError(
-            "a cutter-location file is not rewritten: it is no program that a control runs",
+            "a cutter-location file is not rewritten: it is not a program that a control runs",
             hint="place it without --write, set the work so in the CAM system, or place the posted program",
             file=program.name,
         )

@@ -215,7 +215,7 @@ def difference(turn: Turn, wanted: Row, found: Row, unit: float) -> str:
         goal = turn.rotations(np.array([placed[3:]]))[0]
         angle = angle_between(goal, rotation_matrices(np.radians(written[3:])))
         if angle > END_UNITS * unit:
-            return f"leans {angle:.4g} degrees otherwise"
+            return f"has its tool axis {angle:.4g} degrees off"
     if wanted.arc is None or found.arc is None:
         return "" if wanted.arc is found.arc else "is another kind of move"
     return _arc_difference(turn, wanted.arc, found, unit)
@@ -234,5 +234,5 @@ def _arc_difference(turn: Turn, arc: Arc, found: Row, unit: float) -> str:
     radius = math.dist(found.start[:3], found.arc.center)
     swept = abs(arc.sweep - math.copysign(1.0, sense) * found.arc.sweep)
     if swept * radius > 4.0 * CENTER_UNITS * unit:
-        return f"turns {math.degrees(swept):.4g} degrees otherwise"
+        return f"has its sweep {math.degrees(swept):.4g} degrees off"
     return ""

@@ -24,7 +24,7 @@ M_SUBPROGRAM, M_OVERRIDES = "M subprogram", "M overrides"
 DWELL, FEED, SPEED, TOOL = "dwell", "F", "S", "T"  # steps of their own: G4, and words that act without a code
 
 # The order in which the codes and words of a block act; the moves come last. Units first, so that an F beside G20 is
-# in inches. `MODES` may be executed ahead of the rest of the block: to do so twice changes nothing but dwells.
+# in inches. `MODES` may be executed ahead of the rest of the block: doing so twice changes nothing but dwells.
 MODES = (
     UNITS, FEED_MODE, FEED, SPEED, TOOL, M_TOOL, DWELL, PLANE, POLAR, LENGTH, M_SUBPROGRAM, OFFSET,
     PATH_CONTROL, SPINDLE_MODE, DISTANCE, ARC_DISTANCE, RETRACT, CUTTER, DIAMETER, SCALING, M_SPINDLE, M_COOLANT,
@@ -53,7 +53,7 @@ class Code:
         What it does: a function of the state, the block in hand and the code's name. A motion code's is called for
         each block as long as its mode is in force.
     meaning
-        In words, for people.
+        In a few words.
     source
         The manual and section that it follows.
     controls
@@ -143,4 +143,4 @@ def m_codes(section: str) -> str:
 
 
 def holds_anyway(state: State, block: CurrentBlock, code: str) -> None:
-    """What the code asks for changes nothing of a path, or holds anyway."""
+    """What the code asks for does not affect a path, or holds anyway."""

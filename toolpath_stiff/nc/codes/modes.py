@@ -42,7 +42,9 @@ def units(state: State, block: CurrentBlock, code: str) -> None:
     inch = code == "G20"
     if inch != state.inch and state.frames.tool:
         raise block.fail(
-            block.codes[code], "while a tool length is in force: LinuxCNC would take its number anew", "G49 before it"
+            block.codes[code],
+            "while a tool length is in force: LinuxCNC would read its number in the new unit",
+            "G49 before it",
         )
     state.inch = inch
 
@@ -102,7 +104,7 @@ def feed_word(state: State, block: CurrentBlock, code: str) -> None:
         units = "inch" if state.inch else "mm"
         raise block.fail(
             word,
-            f"without a decimal point is a feed that hangs on the control's parameters ({state.dialect.name})",
+            f"without a decimal point is a feed that depends on the control's parameters ({state.dialect.name})",
             f"{word.text}. if it is that many {units} per {'revolution' if state.feed_mode == 'G95' else 'minute'}",
         )
     state.feed = feed * state.feed_scale if feed > 0.0 else None
@@ -221,7 +223,7 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
             hint="give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)",
         )
     if block.groups.get(ONCE) in ("G4", "G10"):
-        raise block.fail(word, "beside a code that wants the P word too", "two blocks")
+        raise block.fail(word, "beside a code that uses the P word too", "two blocks")
     number, repeats = block.whole("P", word), block.whole("L", word)
     if number is None:
         raise block.fail(word, "without P", "P with the number of what it calls")

@@ -90,7 +90,7 @@ def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> 
 
 
 def know_height(state: State, block: CurrentBlock, word: Word | None) -> None:
-    """Refuse what hangs on the present height, if that is lost."""
+    """Refuse what depends on the present height, if that is lost."""
     if state.height_lost:
         raise block.fail(
             word,
@@ -177,7 +177,7 @@ def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, wo
     if words and not words.keys() >= XY:
         know_place(state, block, word)
     if not words or XY & words.keys():
-        refuse_while_rotated(state, block, word, "moves X and Y by machine coordinates")
+        refuse_while_rotated(state, block, word, "moves X and Y in machine coordinates")
         forget_polar(state)
         if not words or words.keys() >= XY:
             state.unsettled = None
@@ -251,7 +251,7 @@ def _turns(block: CurrentBlock) -> int:
     if turns is None:
         return 1
     if turns != int(turns) or not 1 <= turns <= MOST_TURNS:
-        raise block.fail(block.values["P"], "is no number of turns", "a whole number from 1")
+        raise block.fail(block.values["P"], "is not a number of turns", "a whole number from 1")
     return int(turns)
 
 

@@ -21,7 +21,7 @@ def work_offset(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
-    """G54.1 P and G154 P: an additional offset; the controller file or G10 must have said where it is."""
+    """G54.1 P and G154 P: an additional offset; the controller file or G10 must have defined it."""
     word = block.codes[code]
     if code not in state.dialect.additional:
         known = " or ".join(state.dialect.additional)
@@ -341,7 +341,7 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
             word, "without H after M61: controls differ in whose length it takes", f"G43 H{tool}, or T and M6"
         )
     if number is not None and (number < 0 or number != int(number)):
-        raise block.fail(block.values["H"], "is no tool number", "a whole number")
+        raise block.fail(block.values["H"], "is not a tool number", "a whole number")
     if state.tools is None:
         raise block.fail(
             word, f"needs the length of tool {tool}, and there is no tool table", hint="give one with --tools FILE"

@@ -65,11 +65,11 @@ def read(
     lines, name, path
         The file's lines; its name for messages; where it lies.
     origin, default_origin
-        Where program zero sits, m and rad: as asked for, and unless anyone says.
+        Where program zero sits, m and rad: as asked for, and where neither the caller nor the program says so.
     tools
         Tool table; its lengths win over the file's.
     warnings
-        What the reader has to say beforehand.
+        Warnings of the reader, which come first.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def _comment(state: State, lines: tuple[str, ...], at: int) -> None:
 
 
 def _conclude(state: State) -> None:
-    """What is to say of the file as a whole."""
+    """Warnings about the file as a whole."""
     if not state.units_said and len(state.recorder):
         state.assume(NO_UNITS)
     for noted in state.doubtful.values():
@@ -188,7 +188,7 @@ def _conclude(state: State) -> None:
     if state.unsmooth and not state.smooth:
         state.warnings.append(
             f"line {state.first_unsmooth}: the tool turns back where this arc begins, and no arc of the file begins "
-            "smoothly: look whether the arcs turn the right way about their axes"
+            "smoothly: check that the arcs turn the right way about their axes"
         )
 
 
@@ -267,7 +267,7 @@ def in_force(state: State) -> dict[str, str]:
     return {
         "units": "mm" if state.scale == 1.0 else "inch",
         "tool axis": f"{i:g} {j:g} {k:g}",
-        "MULTAX": {None: "not said", True: "on", False: "off"}[state.multax],
+        "MULTAX": {None: "not given", True: "on", False: "off"}[state.multax],
         "feed": feed,
         "spindle": f"{state.speed:g} rpm",
         "tool": str(state.tool),

@@ -190,7 +190,7 @@ def _parse(pieces: list[tuple[int, int, str]], name: str) -> Statement | None:
     found = _WORD.match(joined)
     if found is None:
         raise InputError(
-            f"{joined.strip()[:40]!r} is no statement of a cutter-location file",
+            f"{joined.strip()[:40]!r} is not a statement of a cutter-location file",
             expected="a word, or a word and / and its arguments",
             hint="definitions and computations need APT's processor: give the file that it or the CAM system writes"
             if "=" in joined

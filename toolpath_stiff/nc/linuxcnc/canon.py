@@ -64,7 +64,7 @@ class Follower:
     rotation: float = 0.0
     tool_z: float = 0.0
     position: Vector = field(default_factory=lambda: [0.0] * 6)
-    feed: float = 0.0  # mm/min, mm/rev, or what is left of it for degrees
+    feed: float = 0.0  # mm/min or mm/rev; degrees/min where only rotary axes move
     feed_scale: float = 1.0
     feed_line: int = 0
     per_revolution: bool = False
@@ -224,7 +224,7 @@ class Follower:
             self._check_diameter()
 
     def _check_diameter(self) -> None:
-        """rs274 takes 0 for a diameter that its table does not give, and would compensate by nothing."""
+        """rs274 takes 0 for a diameter that its table does not give, and would compensate by zero."""
         words = self._words(self.reading)
         if "G41.1" in words or "G42.1" in words:
             return
@@ -291,7 +291,7 @@ class Follower:
             self._find_height(end)
         self.raised = 0.0
         start, self.position = self.position, end
-        if self.line == 0:  # a move of ours, before the program
+        if self.line == 0:  # one of the moves that the copy puts before the program
             self.frame_changed = False
             return
         if self.first_motion is None:

@@ -27,7 +27,7 @@ NAMED = re.compile(r"<[^<>]*>")
 ABORT = "abort,"
 NO_COMMENTS: tuple[tuple[int, str], ...] = ()
 # Where the line that asks for a move is not the one that rs274 is reading when it prints it (cutter compensation holds
-# moves back), or where more than the move is wanted from its line: cycles, machine coordinates, computed G codes.
+# moves back), or where more than the move is needed from its line: cycles, machine coordinates, computed G codes.
 NEEDS_TAGS = re.compile(r"G(?:4[12]|7[346]|8[1-9]|0*53|28|30|33|[\[#A-Z])")
 
 
@@ -126,7 +126,7 @@ def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, tags: bool
     """The text for `rs274`: after the `prefix`, one line for each of the program's.
 
     Text before a tape mark that follows words, and after it, is treated as by the built-in reader: the second `%`, or
-    one that follows words, ends the program. `M2` is added: LinuxCNC wants an end.
+    one that follows words, ends the program. `M2` is added: LinuxCNC requires an end.
     """
     copy = list(prefix)
     started = False
@@ -169,7 +169,7 @@ SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
 OPENS_OR_ENDS = re.compile(r"O(<[^<>]*>|\d+)(END)?(SUB|IF|WHILE|REPEAT)")
 M98 = re.compile(r"M[+]?0*98(?!\d)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
-# These would join the line number that the copy puts before them: `1O<x>CALL` would be N11 and a call that nobody saw.
+# These would join the line number that the copy puts before them: `1O<x>CALL` would be N11 and a call that this check did not see.
 BARE_NUMBER = tuple("0123456789.")
 
 
