@@ -122,7 +122,7 @@ class PostedKinematics:
         return " ".join([self.type, *(axis.letter for axis in self.axes)])
 
     def assumption(self, *, switched: bool = False) -> str:
-        """What was made of X Y Z A B C, in one sentence; `switched`: tool centre point control was switched on and off."""
+        """What was made of X Y Z A B C, in one sentence; `switched`: tool centre point control came and went."""
         axes = ", ".join(axis.describe() for axis in self.axes)
         where = "the tip on the part (tool centre point control)" if self.tcp else "the machine's axes"
         where += ", of the tip on the part from G43.4 on to G43 or G49" if switched and not self.tcp else ""

@@ -92,7 +92,8 @@ def read_program(
         The program.
     origin, default_origin
         Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and
-        where neither the caller nor the program says so. Only moves in machine coordinates (G53, G28, G30) depend on it.
+        where neither the caller nor the program says so. Only moves in machine coordinates (G53, G28, G30) depend on
+        it.
     offsets_file
         Work offsets: `G55 = [x, y, z, a, b, c, r]` (mm, degrees) or a LinuxCNC parameter file.
     tool_table

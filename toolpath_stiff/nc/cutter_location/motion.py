@@ -246,7 +246,8 @@ def from_(state: State, statement: Statement) -> None:
     axis = _axis_of(state, numbers)
     if len(state.recorder):
         state.warnings.append(
-            f"line {statement.line}: FROM within the path: the tool is taken to stand there; how it got there is not given"
+            f"line {statement.line}: FROM within the path: the tool is taken to stand there; "
+            "how it got there is not given"
         )
     state.no_circle("FROM/")
     stand(state, state.scaled(numbers[:3]), axis)

@@ -169,7 +169,8 @@ SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
 OPENS_OR_ENDS = re.compile(r"O(<[^<>]*>|\d+)(END)?(SUB|IF|WHILE|REPEAT)")
 M98 = re.compile(r"M[+]?0*98(?!\d)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
-# These would join the line number that the copy puts before them: `1O<x>CALL` would be N11 and a call that this check did not see.
+# These would join the line number that the copy puts before them: `1O<x>CALL` would be N11 and a call that the checks
+# below did not see.
 BARE_NUMBER = tuple("0123456789.")
 
 
