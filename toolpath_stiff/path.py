@@ -29,9 +29,9 @@ BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cac
 MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Samples:
-    """Columns over n samples along the true path, in machine coordinates.
+    r"""Columns over n samples along the true path, in machine coordinates.
 
     Every move has samples at both of its ends, so a corner appears twice: once as the end of a move, with
     that move's tangent, and once as the start of the next, with the next one's. This is the rule for the
@@ -60,6 +60,15 @@ class Samples:
         0 for rapids and for moves of the rotary axes alone.
     feed
         (n,) m/s; nan for rapids.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> samples = sample_moves(parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves, step=0.01)
+    >>> samples
+    <Samples: 9 samples, 50 mm of path>
+    >>> int(samples.cutting.sum()), round(float(samples.weight.sum()), 6)  # m that cut
+    (7, 0.045)
     """
 
     move: IntArray
@@ -78,6 +87,10 @@ class Samples:
     def __len__(self) -> int:
         return len(self.line)
 
+    def __repr__(self) -> str:
+        length = f", {mm_from_m(float(self.s[-1])):g} mm of path" if len(self) else ""
+        return f"<Samples: {len(self)} samples{length}>"
+
     @property
     def cutting(self) -> BoolArray:
         """(n,) samples that count in the statistics: not of a rapid."""
@@ -89,7 +102,7 @@ class Samples:
 
 
 def place(moves: Moves, origin: ArrayLike) -> Moves:
-    """Moves in machine coordinates, positions only.
+    r"""Moves in machine coordinates, positions only.
 
     `start`, `end`, arc centres and normals are turned; the rotary words stay as programmed, because a control
     interpolates them as such. `place_orientations` turns the sampled orientations.
@@ -100,6 +113,14 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
         In the set-up frame.
     origin
         (6,) x, y, z in m, A, B, C in rad: where program zero sits.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG1 X40\nM30\n").moves
+    >>> placed = place(moves, (0.1, 0.0, 0.8, 0.0, 0.0, np.pi / 2))
+    >>> placed.end[:, :3].round(9).tolist()  # m
+    [[0.1, 0.04, 0.8]]
     """
     at = np.asarray(origin, dtype=float)
     turn = rotation_matrices(at[3:])
@@ -121,7 +142,14 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
 
 
 def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
-    """Roll, pitch, yaw (n, 3) rad on the machine of programmed angles (n, 3) rad; unturned ones stay as they are."""
+    """Roll, pitch, yaw (n, 3) rad on the machine of programmed angles (n, 3) rad; unturned ones stay as they are.
+
+    Examples
+    --------
+    >>> tilted = place_orientations(np.radians([[10.0, 0.0, 0.0]]), (0.0, 0.0, 0.8, 0.0, 0.0, np.pi / 2))
+    >>> np.degrees(tilted).round(6).tolist()
+    [[0.0, 10.0, 0.0]]
+    """
     angles = np.asarray(origin, dtype=float)[3:]
     if not angles.any():
         return abc
@@ -132,7 +160,15 @@ def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
 
 
 def move_durations(moves: Moves, rapid_feed: float = RAPID_FEED) -> FloatArray:
-    """(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s."""
+    r"""(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves
+    >>> move_durations(moves).round(3).tolist()  # s; the rapid at 10 m/min
+    [0.03, 0.5, 4.0]
+    """
     return _durations(moves, move_lengths(moves), _turn(moves), rapid_feed)
 
 
@@ -142,7 +178,7 @@ def sample_moves(
     rapid_feed: float = RAPID_FEED,
     origin: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> Samples:
-    """Sample moves along their true path, both ends of every move included.
+    r"""Sample moves along their true path, both ends of every move included.
 
     Parameters
     ----------
@@ -159,6 +195,16 @@ def sample_moves(
     ------
     InputError
         The step gives more than `MOST_SAMPLES` samples.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG2 X20 Y0 I10 J0\nM30\n").moves
+    >>> samples = sample_moves(place(moves, (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)), step=0.016)
+    >>> (samples.position * 1e3).round(3).tolist()  # mm
+    [[0.0, 0.0, 800.0], [10.0, 10.0, 800.0], [20.0, 0.0, 800.0]]
+    >>> samples.t.round(3).tolist()  # s, 31.416 mm at 600 mm/min
+    [0.0, 1.571, 3.142]
     """
     length = move_lengths(moves)
     turn = _turn(moves)
@@ -292,7 +338,16 @@ PATH_COLUMNS: dict[str, int | None] = {
 
 
 def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
-    """Column of `PATH_COLUMNS` -> values, for some rows."""
+    r"""Column of `PATH_COLUMNS` -> values, for some rows.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> samples = sample_moves(parse_program("G21 G90 F600\nG1 X40\nM30\n").moves, step=0.02)
+    >>> columns = path_columns(samples)
+    >>> columns["x_mm"].tolist(), columns["motion"].tolist()
+    ([0.0, 20.0, 40.0], ['feed', 'feed', 'feed'])
+    """
     position, abc = mm_from_m(samples.position[rows]), deg_from_rad(samples.abc[rows])
     return {
         "line": samples.line[rows],

@@ -165,7 +165,18 @@ def check_lines(
     block_delete: Switches = False,
     controller: Controller = UNKNOWN_CONTROL,
 ) -> Checked:
-    """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone."""
+    """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone.
+
+    Examples
+    --------
+    >>> checked = check_lines(("G21 G90 F600", "G1 X10", "G41 D1", "M30"), "slot.nc")
+    >>> checked.complete
+    False
+    >>> [(code.code, code.text) for code in checked.used][-2:]
+    [('G41', 'cutter compensation: not supported'), ('M30', 'end')]
+    >>> checked.findings[0].line, checked.findings[0].severity
+    (3, 'error')
+    """
     if not any(line.strip() for line in lines):
         raise InputError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
@@ -350,6 +361,12 @@ def check_by(
 
     "auto" is the built-in check where that reads the whole program, or LinuxCNC's interpreter cannot. Raises
     `InputError` for an empty program, or where "linuxcnc" is asked for and cannot be had.
+
+    Examples
+    --------
+    >>> checked, reader = check_by("builtin", ("G21 G90 F600", "G1 X10", "M30"), "slot.nc")
+    >>> checked.complete, reader, checked.end["motion"]
+    (True, 'builtin', 'G1')
     """
     if interpreter not in INTERPRETERS:
         raise InputError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))

@@ -139,7 +139,13 @@ DIALECTS = {
 
 
 def dialect_named(name: str) -> Dialect:
-    """The dialect of a name. Raises `InputError`."""
+    """The dialect of a name. Raises `InputError`.
+
+    Examples
+    --------
+    >>> dialect_named("fanuc").increments
+    True
+    """
     if name not in DIALECTS:
         raise InputError(f"dialect {name!r}", expected=", ".join(DIALECTS))
     return DIALECTS[name]
@@ -194,7 +200,15 @@ Switches = bool | frozenset[int]  # block-delete switches that are on; True: all
 
 
 def switches_on(block_delete: Switches, controller: Controller) -> frozenset[int]:
-    """The block-delete switches that are on: those asked for, else the controller file's."""
+    """The block-delete switches that are on: those asked for, else the controller file's.
+
+    Examples
+    --------
+    >>> switches_on(frozenset({1, 3}), UNKNOWN_CONTROL) == {1, 3}
+    True
+    >>> len(switches_on(True, UNKNOWN_CONTROL))
+    9
+    """
     if isinstance(block_delete, bool):
         return ALL_SWITCHES if block_delete else controller.switches
     if not block_delete <= ALL_SWITCHES:
@@ -218,9 +232,20 @@ def check_plain(block_delete: Switches, controller: Controller) -> None:
 
 
 def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
-    """Read a controller file; .var and .tbl files are LinuxCNC's. `dialect`, if given, is in place of the file's.
+    r"""Read a controller file; .var and .tbl files are LinuxCNC's. `dialect`, if given, is in place of the file's.
 
     Raises `InputError` that names file and key.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "mill.toml"
+    ...     _ = file.write_text('dialect = "haas"\n[offsets]\nG54 = [100, 0, -20]\n')
+    ...     controller = read_controller(file)
+    >>> controller.label, controller.offsets.table[0].axes
+    ('haas', [100.0, 0.0, -20.0, 0.0, 0.0, 0.0])
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".var", ".tbl"):

@@ -287,6 +287,15 @@ def tool_poses(
     tip_held
         (n,) or one, whether tool centre point control is on where it is not for good (`kinematics.tcp`): X Y Z are the
         tip's on the part.
+
+    Examples
+    --------
+    >>> table = {"letter": "A", "axis": "x", "point_mm": [0, 0, 0]}
+    >>> axes = {"type": "table", "tcp": False, "points": "program", "table": table}
+    >>> kinematics = read_kinematics(axes, lambda found, expected="": ValueError(found, expected))
+    >>> poses = tool_poses(kinematics, np.array([[0.0, 0.0, 0.1]]), np.radians([[90.0, 0.0, 0.0]]), np.array([0.0]))
+    >>> poses.tip.round(9).tolist(), poses.axis.round(9).tolist()
+    ([[0.0, -0.1, 0.0]], [[0.0, -1.0, 0.0]])
     """
     held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(xyz),))
     axis = np.tile(Z, (len(xyz), 1))

@@ -34,9 +34,9 @@ CUTTER_LOCATION = "cutter-location file"
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Moves:
-    """Columns over n moves, in the set-up frame (program zero of G54 at the origin) unless placed.
+    r"""Columns over n moves, in the set-up frame (program zero of G54 at the origin) unless placed.
 
     A move of zero length in all six axes is not a move and has no row. `start[i]` is `end[i - 1]`,
     except where a coordinate system changed in between (then the tool stands still, the numbers change).
@@ -68,6 +68,17 @@ class Moves:
     from_machine
         (n, 2) whether start, end were given in machine coordinates (G53, G28, G30): these ends do
         not follow the work when it is placed elsewhere.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG0 Z5\nG1 Z-1\nX40\nM30\n").moves
+    >>> moves
+    <Moves: 3 moves of the lines 2 to 4>
+    >>> [MOTION_NAMES[motion] for motion in moves.motion]
+    ['rapid', 'feed', 'feed']
+    >>> moves.end[-1, :3].tolist()  # m
+    [0.04, 0.0, -0.001]
     """
 
     line: IntArray
@@ -85,6 +96,10 @@ class Moves:
 
     def __len__(self) -> int:
         return len(self.line)
+
+    def __repr__(self) -> str:
+        lines = f" of the lines {self.line.min()} to {self.line.max()}" if len(self) else ""
+        return f"<Moves: {len(self)} moves{lines}>"
 
     def take(self, index: IntArray | BoolArray | slice) -> Moves:
         """The moves at `index` (integers, a mask or a slice)."""
@@ -142,9 +157,9 @@ class ToolUse:
     material: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Program:
-    """A program that was read to its end.
+    r"""A program that was read to its end.
 
     Attributes
     ----------
@@ -178,6 +193,15 @@ class Program:
         lines; None: the comment lines of `source` mark them.
     jumps
         Where the run left the order of the lines, for a subprogram or back from it; None: not known.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
+    >>> program.name, len(program.moves), program.dialect
+    ('slot.nc', 1, 'generic')
+    >>> program.assumptions
+    ('before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes',)
     """
 
     name: str
@@ -195,6 +219,9 @@ class Program:
     kinematics: str = ""
     marks: tuple[tuple[int, str], ...] | None = None
     jumps: tuple[Jump, ...] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Program {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,13 @@ def split_comments(text: str) -> tuple[str, str]:
 
 
 def headings(lines: Sequence[str]) -> list[Heading]:
-    """Blocks of successive lines that hold comments alone, in order; those that name nothing are left out."""
+    """Blocks of successive lines that hold comments alone, in order; those that name nothing are left out.
+
+    Examples
+    --------
+    >>> [(heading.line, heading.name) for heading in headings(("G21", "(FACE)", "G1 X1"))]
+    [(2, 'FACE')]
+    """
     found: list[Heading] = []
     block: list[str] = []
     first = last = -1
@@ -184,7 +190,18 @@ class Operations:
 
 
 def operations(program: Program) -> Operations:
-    """The operations of a program that was read, by either interpreter."""
+    r"""The operations of a program that was read, by either interpreter.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("F600\n(FACE)\nG0 Z5\nG1 Z0\nX40\n(SLOT)\nG0 Z5\nG1 Z-1\nX0\nM30\n")
+    >>> found = operations(program)
+    >>> [(row.number, row.name, row.first_line, row.last_line) for row in found.rows]
+    [(1, 'FACE', 2, 5), (2, 'SLOT', 6, 9)]
+    >>> found.of_move.tolist()
+    [0, 0, 0, 1, 1, 1]
+    """
     remarks = {tool.number: tool.remark for tool in program.tools}
     return find_operations(program.source, program.moves, program.name, remarks, program.marks, program.jumps)
 

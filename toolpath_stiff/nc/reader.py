@@ -46,7 +46,14 @@ _PATTERNS = tuple((what, re.compile(r"\s*(?:N\d+\s+|\d+\s+)?(?:" + sign + ")", r
 
 
 def language_of(line: str) -> str | None:
-    """The other language that a line is written in, or None."""
+    """The other language that a line is written in, or None.
+
+    Examples
+    --------
+    >>> language_of("L X+10 Y+20 R0 F MAX")
+    "Heidenhain's conversational language"
+    >>> language_of("G1 X10 Y20")
+    """
     return next((what for what, pattern in _PATTERNS if pattern.match(line)), None)
 
 
@@ -113,6 +120,15 @@ def read_program(
     ------
     InputError
         With file, line and column, what was found and what was expected.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> program = read_program(files("toolpath_stiff") / "data" / "programs" / "case_study.nc")
+    >>> program
+    <Program case_study.nc: 7 moves, read as generic>
+    >>> [tool.number for tool in program.tools]
+    [1]
     """
     return _read(
         _Request(
@@ -144,7 +160,23 @@ def parse_program(
     rs274: str | None = None,
     controller: Controller = UNKNOWN_CONTROL,
 ) -> Program:
-    """Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`."""
+    r"""Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`.
+
+    Examples
+    --------
+    >>> program = parse_program("G21 G90 F600\nG0 Z5\nG1 Z-1\nG2 X20 Y0 I10 J0\nM8\nM30\n", "slot.nc")
+    >>> program
+    <Program slot.nc: 3 moves, read as generic>
+    >>> [(note.line, note.word, note.reason) for note in program.unsupported]
+    [(5, 'M8', 'coolant')]
+
+    What cannot be read is refused, with its place and what to do:
+
+    >>> parse_program("G21 G90\nG1 X10\n", "slot.nc")
+    Traceback (most recent call last):
+        ...
+    toolpath_stiff.errors.InputError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0
+    """
     return _read(
         _Request(
             lines=split_lines(text, name),

@@ -76,9 +76,20 @@ def _number(text: str, what: str, path: str | Path, line: int) -> float:
 
 
 def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
-    """Tool number -> tool, from a LinuxCNC table (`T1 P1 Z50 D6 ;end mill`) or CSV (`tool,length_mm,...`).
+    r"""Tool number -> tool, from a LinuxCNC table (`T1 P1 Z50 D6 ;end mill`) or CSV (`tool,length_mm,...`).
 
     Lengths are taken as mm in both. Raises `InputError` with the line.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "tool.tbl"
+    ...     _ = file.write_text("T1 P1 Z50 D6 ;end mill\n")
+    ...     tools = read_tool_table(file)
+    >>> tools[1].length, tools[1].diameter, tools[1].remark
+    (50.0, 6.0, 'end mill')
     """
     lines = _lines(path, "tool table")
     filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
@@ -145,16 +156,35 @@ def is_offset(name: str) -> bool:
 
 
 def additional_offset(name: str) -> int | None:
-    """The P of `G54.1 P3` or `G154 P3`, which name the same offset; None for any other name."""
+    """The P of `G54.1 P3` or `G154 P3`, which name the same offset; None for any other name.
+
+    Examples
+    --------
+    >>> additional_offset("G54.1 P3")
+    3
+    >>> additional_offset("G54") is None
+    True
+    """
     found = ADDITIONAL.fullmatch(name)
     return int(found[2]) if found and int(found[2]) <= ADDITIONAL_OFFSETS[found[1]] else None
 
 
 def read_offsets(path: str | Path) -> Offsets:
-    """Work offsets from a file. Raises `InputError` with the line.
+    r"""Work offsets from a file. Raises `InputError` with the line.
 
     Lines are `G55 = [x, y, z, a, b, c, r]` (mm and degrees, short lists allowed), or those of a LinuxCNC parameter
     file (`5221 12.5`).
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "offsets.txt"
+    ...     _ = file.write_text("G54 = [100, -50, 800]\n")
+    ...     offsets = read_offsets(file)
+    >>> offsets.at(0).axes
+    [100.0, -50.0, 800.0, 0.0, 0.0, 0.0]
     """
     lines = _lines(path, "offsets file")
     filled = [(number, line.split("#")[0].strip()) for number, line in enumerate(lines, 1)]
@@ -187,7 +217,15 @@ def read_offsets(path: str | Path) -> Offsets:
 
 
 def set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
-    """Set an offset (x, y, z, a, b, c, r) or a reference point, G28 or G30; missing numbers are 0."""
+    """Set an offset (x, y, z, a, b, c, r) or a reference point, G28 or G30; missing numbers are 0.
+
+    Examples
+    --------
+    >>> offsets = Offsets()
+    >>> set_offset(offsets, "G55", [100.0, 50.0])
+    >>> offsets.at(1)
+    WorkOffset(axes=[100.0, 50.0, 0.0, 0.0, 0.0, 0.0], rotation=0.0, given=True)
+    """
     axes = [*values[:6], *[0.0] * (6 - len(values[:6]))]
     if name == "G28":
         offsets.home_g28 = axes

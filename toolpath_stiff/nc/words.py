@@ -56,6 +56,12 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     """Read the words of one line. Raises `InputError` with line and column.
 
     `semicolon`: whether `;` begins a comment; else it ends the block, and nothing but blanks may follow it.
+
+    Examples
+    --------
+    >>> block = read_block("N10 G01 X 1.5 (to the edge) Y-2", 1, "part.nc")
+    >>> [(word.letter, word.value, word.column) for word in block.words]
+    [('G', 1.0, 5), ('X', 1.5, 9), ('Y', -2.0, 29)]
     """
     compact, columns = _strip(text, line, name, semicolon)
     if not compact:
@@ -283,7 +289,13 @@ def read_lines(path: str | Path) -> tuple[str, ...]:
 
 
 def split_lines(text: str, name: str) -> tuple[str, ...]:
-    """Split into lines; a byte that no text holds is an error with its line and column."""
+    r"""Split into lines; a byte that no text holds is an error with its line and column.
+
+    Examples
+    --------
+    >>> split_lines("G0 X1\r\nM30\r\n", "part.nc")
+    ('G0 X1', 'M30')
+    """
     joined = text.replace("\r\n", "\n").replace("\r", "\n")
     binary = BINARY.search(joined)
     if binary is not None:

@@ -72,7 +72,7 @@ def rewrite_program(
     tools: dict[int, ToolEntry] | None = None,
     block_delete: Switches = False,
 ) -> Rewritten:
-    """Write a program so that at the original origin it does what it does, untouched, at a placement.
+    r"""Write a program so that at the original origin it does what it does, untouched, at a placement.
 
     Parameters
     ----------
@@ -92,6 +92,19 @@ def rewrite_program(
     ------
     InputError
         A block cannot be expressed at the placement, with its line and the reason.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("G21 G90 F600 (slot)\nG0 X0 Y0 Z5\nG1 Z-1\nX40\nM30\n", "slot.nc")
+    >>> rewritten = rewrite_program(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
+    >>> print(rewritten.text, end="")
+    G21 G90 F600 (slot)
+    G0 X100 Y0 Z5
+    G1 Z-1
+    X100 Y40
+    M30
     """
     check_decimals(decimals)
     check_rewritable(program)
@@ -138,7 +151,16 @@ def check_rewritable(program: Program) -> None:
 
 
 def check_decimals(decimals: int | None) -> None:
-    """Raise `InputError` for a number of decimals that makes no program."""
+    """Raise `InputError` for a number of decimals that makes no program.
+
+    Examples
+    --------
+    >>> check_decimals(4)
+    >>> check_decimals(12)
+    Traceback (most recent call last):
+        ...
+    toolpath_stiff.errors.InputError: 12 decimals; expected 2 to 9
+    """
     if decimals is not None and not FEWEST_DECIMALS <= decimals <= MOST_DECIMALS:
         raise InputError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
 
@@ -210,7 +232,7 @@ class OffsetBlocks:
 
 
 def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> OffsetBlocks:
-    """Offset blocks that put a program at a placement.
+    r"""Offset blocks that put a program at a placement.
 
     Parameters
     ----------
@@ -226,6 +248,18 @@ def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> Of
     `G10 L2 P1 R` turns X and Y about G54's zero (LinuxCNC manual, "G10 L2"); it goes before the first motion. `G68 X0
     Y0 R` turns the G17 plane about program zero (Fanuc's manuals, "Coordinate system rotation"); it goes after G54 and
     G17, and holds until G69. The numbers of G54 are millimetres.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
+    >>> blocks = offset_blocks(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2))
+    >>> blocks.linuxcnc
+    'G21 G10 L2 P1 X100 Y0 Z800 R90'
+    >>> print(blocks.fanuc)
+    G54: X100 Y0 Z800
+    G17 G54 G68 X0 Y0 R90
     """
     reason = _not_here(program) or _not_about_z(program, placement) or _not_g54_alone(program)
     if reason:

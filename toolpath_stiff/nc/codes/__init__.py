@@ -128,7 +128,13 @@ class Alias:
 
 
 def code_name(letter: str, value: float) -> str:
-    """`G` and 59.3 to "G59.3", `G` and 1.0 to "G1"."""
+    """`G` and 59.3 to "G59.3", `G` and 1.0 to "G1".
+
+    Examples
+    --------
+    >>> code_name("G", 59.3), code_name("G", 1.0)
+    ('G59.3', 'G1')
+    """
     return f"{letter}{value:g}"
 
 

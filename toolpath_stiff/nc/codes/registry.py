@@ -169,7 +169,13 @@ CHANGES = (
 
 
 def code_meaning(name: str) -> str:
-    """What a code is taken for, in a few words."""
+    """What a code is taken for, in a few words.
+
+    Examples
+    --------
+    >>> code_meaning("G2"), code_meaning("M8"), code_meaning("G41")
+    ('clockwise arc', 'coolant: not acted upon', 'cutter compensation: not supported')
+    """
     if name in CODES:
         code = CODES[name]
         return f"{code.listed}: not acted upon" if code.listed else code.label or code.meaning
@@ -181,7 +187,13 @@ def code_meaning(name: str) -> str:
 
 
 def would_change(text: str) -> str:
-    """What the word at the beginning of `text` would change of the path or its time; "" if nothing is known."""
+    """What the word at the beginning of `text` would change of the path or its time; "" if nothing is known.
+
+    Examples
+    --------
+    >>> would_change("G41 D1")
+    "the whole path, by the tool's radius"
+    """
     for beginnings, changes in CHANGES:
         if (text + " ").startswith(beginnings):
             return changes
@@ -192,7 +204,15 @@ def would_change(text: str) -> str:
 
 
 def codes_table() -> str:
-    """The codes that are understood, their other names, and those that are refused, as Markdown tables."""
+    r"""The codes that are understood, their other names, and those that are refused, as Markdown tables.
+
+    Examples
+    --------
+    >>> print("\n".join(codes_table().splitlines()[:3]))
+    | code | group | meaning | function in `nc/codes` | dialects | source |
+    | --- | --- | --- | --- | --- | --- |
+    | G0 | motion | rapid | `motion.straight` | all | LinuxCNC, G-Codes, G0 |
+    """
     understood = [
         (code.name, code.group, _meaning(code), _function(code), _controls(code.controls), code.source)
         for code in CODES.values()

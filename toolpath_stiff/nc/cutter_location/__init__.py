@@ -75,6 +75,12 @@ def read(
     ------
     InputError
         With line and column, what was found and what was expected.
+
+    Examples
+    --------
+    >>> lines = ("UNITS/MM", "FEDRAT/600,MMPM", "FROM/0,0,50", "GOTO/0,0,0", "GOTO/40,0,0", "FINI")
+    >>> read(lines, "part.apt", "", None, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), None)
+    <Program part.apt: 2 moves, read as cutter-location file>
     """
     state = State(name, copy.deepcopy(tools))
     run(state, lines)

@@ -203,7 +203,15 @@ def _unknown(state: State, statement: Statement) -> None:
 
 
 def words_table() -> str:
-    """The words as a Markdown table, as it stands in docs/nc.md: neighbours with the same meaning share a row."""
+    r"""The words as a Markdown table, as it stands in docs/nc.md: neighbours with the same meaning share a row.
+
+    Examples
+    --------
+    >>> print("\n".join(words_table().splitlines()[:3]))
+    | words | taken for | | written by | source |
+    | --- | --- | --- | --- | --- |
+    | `GOTO/x,y,z[,i,j,k]` | the tool moves to a point | read | all | ISO 4343 |
+    """
     lines = ["| words | taken for | | written by | source |", "| --- | --- | --- | --- | --- |"]
     order = (READ, LISTED, DOUBTFUL, REFUSED)
     words = sorted(WORDS.values(), key=lambda word: order.index(word.kind))
