@@ -351,11 +351,11 @@ def check_by(
     lines: tuple[str, ...],
     name: str,
     *,
+    rs274: str | None = None,
     origin: Iterable[float] | None = None,
     default_origin: Iterable[float] = ZERO,
     block_delete: Switches = False,
     controller: Controller = UNKNOWN_CONTROL,
-    rs274: str | None = None,
 ) -> tuple[Checked, str]:
     """Check a program by an interpreter; parameters as in `read_program`. Returns who read it, too.
 

@@ -244,13 +244,13 @@ class MovesInMm:
     motion: IntArray
     start: FloatArray
     end: FloatArray
-    arc_rows: list[int]
-    arcs: list[Arc]
     feed: FloatArray
     dwell: FloatArray
     tool: IntArray
     tool_length: FloatArray
     from_machine: BoolArray
+    arc_rows: list[int]
+    arcs: list[Arc]
 
     def __len__(self) -> int:
         return len(self.line)
