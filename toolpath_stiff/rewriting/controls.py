@@ -20,7 +20,7 @@ from toolpath_stiff.nc.codes import MOTION, PLANE
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.state import CurrentBlock, Segment, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
-from toolpath_stiff.rewriting.turn import Turn, cutting_rows, differences
+from toolpath_stiff.rewriting.turn import AXIS, END, START, Turn, cutting_rows, differences
 from toolpath_stiff.units import MM_PER_INCH
 
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
@@ -297,14 +297,16 @@ class Controls:
             found = [found[0]._replace(end=found[-1].end)]
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.block.words if word.letter == "L"), 1.0)
-        what = differences(self.turn, wanted, found, unit * max(repeats, 1.0))
-        if what:
-            raise self.refusal(f"the block cannot be rewritten: its cutting move {what}", self._remedy(what))
+        difference = differences(self.turn, wanted, found, unit * max(repeats, 1.0))
+        if difference is not None:
+            raise self.refusal(
+                f"the block cannot be rewritten: its cutting move {difference.words}", self._remedy(difference.kind)
+            )
 
-    def _remedy(self, what: str) -> str:
+    def _remedy(self, kind: str) -> str:
         unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
         if unknown:
             return f"position {unknown} in rapid before the first cutting move"
-        if what.startswith(("starts", "leans")):
+        if kind in (START, AXIS):
             return "position X, Y, Z and the rotary axes in rapid before it"
-        return "" if what.startswith("ends") else "give more --decimals"
+        return "" if kind == END else "give more --decimals"
