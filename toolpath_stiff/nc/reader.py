@@ -130,21 +130,11 @@ def read_program(
     >>> [tool.number for tool in program.tools]
     [1]
     """
-    return _read(
-        _Request(
-            lines=read_lines(path),
-            name=Path(path).name,
-            path=str(path),
-            origin=None if origin is None else _six(origin),
-            default_origin=_six(default_origin),
-            offsets=read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets(),
-            tools=read_tool_table(tool_table) if tool_table else controller.tools,
-            block_delete=block_delete,
-            interpreter=interpreter,
-            rs274=rs274,
-            controller=controller,
-        )
-    )
+    lines, place = read_lines(path), None if origin is None else _six(origin)
+    offsets = read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets()
+    tools = read_tool_table(tool_table) if tool_table else controller.tools
+    options = (offsets, tools, block_delete, interpreter, rs274, controller)
+    return _read(_Request(lines, Path(path).name, str(path), place, _six(default_origin), *options))
 
 
 def parse_program(
@@ -177,21 +167,10 @@ def parse_program(
         ...
     toolpath_stiff.errors.InputError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0
     """
-    return _read(
-        _Request(
-            lines=split_lines(text, name),
-            name=name,
-            path="",
-            origin=None if origin is None else _six(origin),
-            default_origin=_six(default_origin),
-            offsets=offsets or controller.offsets or Offsets(),
-            tools=controller.tools if tools is None else tools,
-            block_delete=block_delete,
-            interpreter=interpreter,
-            rs274=rs274,
-            controller=controller,
-        )
-    )
+    lines, place = split_lines(text, name), None if origin is None else _six(origin)
+    offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools
+    options = (offsets, tools, block_delete, interpreter, rs274, controller)
+    return _read(_Request(lines, name, "", place, _six(default_origin), *options))
 
 
 @dataclass(frozen=True)

@@ -108,6 +108,22 @@ def rewrite_program(
     """
     check_decimals(decimals)
     check_rewritable(program)
+    _check_plain(program)
+    text, encoding = _text_of(program)
+    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    source, out = (_state(program.name, origin, offsets, tools) for origin in (placement, original))
+    tolerance = None if linearise is None else mm_from_m(linearise)
+    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
+    pieces = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
+    return Rewritten("".join(pieces), encoding, tuple(controls.notes))
+
+
+def _state(name: str, origin: ShopPose, offsets: Offsets | None, tools: dict[int, ToolEntry] | None) -> State:
+    """A control at its start, with the work at an origin, and offsets and tools of its own."""
+    return State(name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
+
+
+def _check_plain(program: Program) -> None:
     if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
         raise InputError(
             "a program is rewritten by the words of the built-in interpreter in the dialects "
@@ -115,22 +131,6 @@ def rewrite_program(
             hint="place it without --write",
             file=program.name,
         )
-    text, encoding = _text_of(program)
-    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
-
-    def frames(origin: ShopPose) -> Frames:
-        return Frames(copy.deepcopy(offsets or Offsets()), origin, origin)
-
-    controls = Controls(
-        State(program.name, frames(placement), copy.deepcopy(tools)),
-        State(program.name, frames(original), copy.deepcopy(tools)),
-        Turn(placement, original),
-        decimals,
-        None if linearise is None else mm_from_m(linearise),
-    )
-    switches = switches_on(block_delete, UNKNOWN_CONTROL)
-    pieces = list(_rewritten_lines(controls, text, program.name, switches))
-    return Rewritten("".join(pieces), encoding, tuple(controls.notes))
 
 
 def check_rewritable(program: Program) -> None:
