@@ -101,6 +101,9 @@ class Samples:
         return Samples(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
 
+# -- placing -----------------------------------------------------------------------------------------------------------
+
+
 def place(moves: Moves, origin: ArrayLike) -> Moves:
     r"""Moves in machine coordinates, positions only.
 
@@ -157,6 +160,9 @@ def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
         return abc  # a vertical platform never yaws
     turn, back = rotation_matrices(angles), rotation_about_z(-angles[2])
     return roll_pitch_yaw(turn @ rotation_matrices(abc) @ back)
+
+
+# -- sampling ----------------------------------------------------------------------------------------------------------
 
 
 def move_durations(moves: Moves, rapid_feed: float = RAPID_FEED) -> FloatArray:
@@ -318,6 +324,8 @@ def _durations(moves: Moves, length: FloatArray, turn: FloatArray, rapid_feed: f
     distance = np.where(length > 0.0, length, np.where(moves.motion == RAPID, 0.0, turn))
     return np.asarray(distance / np.where(feed > 0.0, feed, 1.0))
 
+
+# -- as a table --------------------------------------------------------------------------------------------------------
 
 # Column -> decimals; None: a whole number or a word. A millionth of a millimetre is finer than any machine and
 # lets sums over a long path keep their digits.

@@ -343,6 +343,8 @@ def modal_state(state: State) -> dict[str, str]:
     }
 
 
+# -- by LinuxCNC's interpreter -----------------------------------------------------------------------------------------
+
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
 
 

@@ -35,6 +35,8 @@ from toolpath_stiff.nc.tables import (
     set_offset,
 )
 
+# -- dialects ----------------------------------------------------------------------------------------------------------
+
 # IS-B, the increment system of nearly every Fanuc and Haas: what a number without a decimal point counts.
 INCREMENT_MM, INCREMENT_INCH, INCREMENT_DEGREE = 1e-3, 1e-4, 1e-3
 
@@ -150,6 +152,8 @@ def dialect_named(name: str) -> Dialect:
         raise InputError(f"dialect {name!r}", expected=", ".join(DIALECTS))
     return DIALECTS[name]
 
+
+# -- the controller file -----------------------------------------------------------------------------------------------
 
 ALL_SWITCHES = frozenset(range(1, 10))
 TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")

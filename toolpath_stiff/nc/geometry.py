@@ -37,6 +37,9 @@ SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the 
 MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
 
 
+# -- arcs --------------------------------------------------------------------------------------------------------------
+
+
 class ArcError(Exception):
     """What is wrong with an arc: found, expected."""
 
@@ -117,6 +120,9 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
     return -sweep if clockwise else sweep
 
 
+# -- tool axes ---------------------------------------------------------------------------------------------------------
+
+
 def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     """Roll and pitch in degrees that turn the spindle's z onto a tool axis, at a yaw of 0.
 
@@ -137,6 +143,9 @@ def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     across = math.hypot(i, k)
     pitch = math.degrees(math.atan2(i, k)) if across else 0.0
     return math.degrees(math.atan2(-j, across)), pitch
+
+
+# -- the curves of moves -----------------------------------------------------------------------------------------------
 
 
 def move_lengths(moves: Moves) -> FloatArray:
@@ -215,6 +224,9 @@ def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray
     position = frame.center[arc] + radius * outward + height * normal
     velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
     return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
+
+
+# -- strokes of drilling cycles ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -202,6 +202,8 @@ def _move(state: State, block: CurrentBlock) -> None:
         CODES[mode].act(state, block, mode)
 
 
+# -- the blocks of a file ----------------------------------------------------------------------------------------------
+
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
 MOST_REPEATS = 9999

@@ -253,6 +253,9 @@ def _check_pair(axes: tuple[RotaryAxis, ...], parts: tuple[tuple[str, str], ...]
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+
+# -- where the tool stands ---------------------------------------------------------------------------------------------
+
 UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
 Z = np.array([0.0, 0.0, 1.0])
 

@@ -224,6 +224,9 @@ class Program:
         return f"<Program {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
 
 
+# -- recording ---------------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
 class Arc:
     """An arc of a move: centre (set-up frame, mm), unit normal, signed sweep (rad)."""

@@ -141,6 +141,8 @@ def _last_dash(frame: str) -> str:
     return frame[-1:] if frame and frame[-1] in DASHES and frame[-2:-1] not in tuple(DASHES) else ""
 
 
+# -- operations --------------------------------------------------------------------------------------------------------
+
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 

@@ -131,6 +131,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+
+# -- words to moves ----------------------------------------------------------------------------------------------------
+
 FEWEST = 8  # lines; below, one by one is as fast
 MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_lines` reads
 MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}

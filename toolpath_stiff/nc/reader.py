@@ -24,6 +24,8 @@ from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool
 from toolpath_stiff.nc.words import read_lines, split_lines
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm, pose_in_si
 
+# -- other languages ---------------------------------------------------------------------------------------------------
+
 _HEIDENHAIN = "Heidenhain's conversational language"
 _SIEMENS = "Siemens' own language (Sinumerik)"
 HINTS = {
@@ -74,6 +76,8 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
             )
     return None
 
+
+# -- programs ----------------------------------------------------------------------------------------------------------
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

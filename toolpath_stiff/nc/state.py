@@ -111,6 +111,8 @@ class CurrentBlock:
         return InputError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)
 
 
+# -- what a control keeps ----------------------------------------------------------------------------------------------
+
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
 

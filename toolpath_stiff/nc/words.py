@@ -264,6 +264,8 @@ def _expected(letter: str) -> str:
     return "a decimal number"
 
 
+# -- text to lines -----------------------------------------------------------------------------------------------------
+
 # Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
 # end-of-file mark of CP/M and DOS (0x1A), which some posts still append.
 BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")

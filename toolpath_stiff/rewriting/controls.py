@@ -30,6 +30,9 @@ ORDER = ("G", "X", "Y", "Z", "A", "B", "C", "I", "J", "K", "R", "Q", "P", "L", "
 NUMBERS = frozenset("XYZABCIJKR")
 
 
+# -- a line ------------------------------------------------------------------------------------------------------------
+
+
 class LineEdit:
     """A line, cut into its words and what stands between them (blanks, comments, the N word).
 
@@ -140,6 +143,8 @@ class LineEdit:
             text = "0."
         return text if self._points else text.removesuffix(".")
 
+
+# -- the controls ------------------------------------------------------------------------------------------------------
 
 FloatArray = NDArray[np.float64]
 

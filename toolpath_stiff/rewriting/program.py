@@ -215,6 +215,8 @@ def _text_of(program: Program) -> tuple[str, str]:
         return content.decode("latin-1"), "latin-1"
 
 
+# -- offset blocks -----------------------------------------------------------------------------------------------------
+
 OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
 NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"

@@ -150,6 +150,8 @@ def angle_between(first: FloatArray, second: FloatArray) -> float:
     return 2.0 * math.degrees(math.asin(min(chord, 1.0)))
 
 
+# -- comparing ---------------------------------------------------------------------------------------------------------
+
 # In units of the last decimal written. Ends: half a unit per axis, three axes, and the same of the start; a centre
 # given by I, J, K adds that of its own words, one given by R what `blocks.NEAR` allows.
 END_UNITS, CENTER_UNITS = 2.0, 6.0

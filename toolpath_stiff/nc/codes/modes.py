@@ -36,6 +36,8 @@ from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, State
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
+# -- units, plane, distance modes --------------------------------------------------------------------------------------
+
 
 def units(state: State, block: CurrentBlock, code: str) -> None:
     """G20: lengths and feeds in inches; G21: in millimetres."""
@@ -84,6 +86,9 @@ MODE_ALIASES = (
     Alias("G70", "G20", "inch", _FANUC, ("fanuc",)),
     Alias("G71", "G21", "mm", _FANUC, ("fanuc",)),
 )
+
+
+# -- feed and spindle --------------------------------------------------------------------------------------------------
 
 
 def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
@@ -211,6 +216,9 @@ FEED_CODES = (
     ),
     Code("G97", SPINDLE_MODE, holds_anyway, "spindle speed in revolutions", _SPINDLE, label=SPINDLE_MODE),
 )  # fmt: skip
+
+
+# -- calls and the end -------------------------------------------------------------------------------------------------
 
 
 def call(state: State, block: CurrentBlock, code: str) -> None:

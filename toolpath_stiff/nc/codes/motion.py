@@ -30,6 +30,8 @@ from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import m_from_mm
 
+# -- a move recorded ---------------------------------------------------------------------------------------------------
+
 STILL = 1e-12  # of a coordinate, or of 1 mm if that is more: what frames' sums leave of an axis that stands
 
 
@@ -106,6 +108,9 @@ def know_position(state: State, block: CurrentBlock, word: Word, axes: Collectio
         know_height(state, block, word)
     if XY & set(axes):
         know_place(state, block, word)
+
+
+# -- straight moves ----------------------------------------------------------------------------------------------------
 
 
 def straight(state: State, block: CurrentBlock, code: str) -> None:
@@ -195,6 +200,8 @@ STRAIGHT_CODES = (
     Code("G30.1", ONCE, set_home, "set the second reference point", _G30, label=ONCE),
 )
 
+
+# -- arcs --------------------------------------------------------------------------------------------------------------
 
 ARCS = ("G2", "G3")
 MOST_TURNS = 10_000

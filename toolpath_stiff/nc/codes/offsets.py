@@ -14,6 +14,8 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, ToolEntry, WorkOffset
 from toolpath_stiff.nc.words import Word
 
+# -- work offsets ------------------------------------------------------------------------------------------------------
+
 
 def work_offset(state: State, block: CurrentBlock, code: str) -> None:
     """G54 to G59.3: that work offset from here on."""
@@ -227,6 +229,8 @@ OFFSET_CODES = (
     Code("G92.3", ONCE, shift_state, "shift restored", g_codes("G92.3"), label=ONCE),
 )  # fmt: skip
 
+
+# -- tools and their lengths -------------------------------------------------------------------------------------------
 
 HOLDS_TIP = "G43.4"  # tool centre point control
 HOLDS_HINT = (

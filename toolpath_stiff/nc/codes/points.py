@@ -22,6 +22,9 @@ SAME_PLACE_MM = 1e-9
 XY = frozenset((0, 1))
 
 
+# -- G68, G69 ----------------------------------------------------------------------------------------------------------
+
+
 def rotation(state: State, block: CurrentBlock, code: str) -> None:
     """G68 X Y R: programmed points turn about X, Y (absolute; without them about the present point). G69: rotation off.
 
@@ -124,6 +127,8 @@ ROTATION_CODES = (
     Code("G69", ROTATION, rotation, "rotation off", _FANUC_ROTATION),
 )
 
+
+# -- axis words --------------------------------------------------------------------------------------------------------
 
 LINEAR = frozenset("XYZ")
 
@@ -270,6 +275,8 @@ POLAR_CODES = (
     Code("G16", POLAR, polar_mode, "polar words", _FANUC_POLAR),
 )
 
+
+# -- numbers without a decimal point -----------------------------------------------------------------------------------
 
 ANGLES = frozenset("ABC")
 LENGTHS = frozenset("XYZIJKRQ")

@@ -35,6 +35,8 @@ from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_COD
 from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 
+# -- codes that leave the path alone, and refused ones -----------------------------------------------------------------
+
 
 def path_control(state: State, block: CurrentBlock, code: str) -> None:
     """G61, G61.1, G64: P and Q are tolerances of the blending, which does not enter."""
@@ -127,6 +129,8 @@ REFUSED_CODES = (
 )  # fmt: skip
 
 
+# -- the table ---------------------------------------------------------------------------------------------------------
+
 UNDERSTOOD = (
     *STRAIGHT_CODES, *ARC_CODES, *DRILLING_CODES, *MODE_CODES, *POLAR_CODES, *ROTATION_CODES, *OFFSET_CODES,
     *FEED_CODES, *TOOL_CODES, *FLOW_CODES, *PASSIVE_CODES,
@@ -201,6 +205,9 @@ def would_change(text: str) -> str:
     if word.startswith("M") and word[1:].isdigit() and f"M{int(word[1:])}" not in CODES:
         return "what is not known: it may run anything on its control"
     return ""
+
+
+# -- the table as Markdown ---------------------------------------------------------------------------------------------
 
 
 def codes_table() -> str:

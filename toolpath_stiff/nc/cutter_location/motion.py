@@ -41,6 +41,8 @@ from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling, Vector
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.units import SECONDS_PER_DAY
 
+# -- cycles ------------------------------------------------------------------------------------------------------------
+
 # The first word, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip breaking).
 KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73"}
 PAIRS = ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL")

@@ -196,6 +196,8 @@ class Word:
     kind: str = READ
 
 
+# -- moves of the tool tip ---------------------------------------------------------------------------------------------
+
 FIRST_POINT = "the path begins at the file's first point; where the tool comes from is not given (no FROM)"
 FREE_YAW = "the turn of the tool about its own axis (yaw) is free in a cutter-location file; it is 0"
 TURN_FEED = "where the tool turns about its standing tip, a feed of 1 mm/min counts as 1 degree per minute"

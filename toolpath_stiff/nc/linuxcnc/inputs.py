@@ -160,6 +160,8 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
     return text
 
 
+# -- the fence ---------------------------------------------------------------------------------------------------------
+
 # `py,`, `pyrun`, `pyreload`, and `py` alone or before anything but a letter or digit, whatever blanks are in between;
 # a comment within a comment counts, though LinuxCNC does not look there.
 PYTHON = re.compile(r"[\s(;]*p\s*y(?:\s*(?:[^\w\s]|$|r\s*u\s*n|r\s*e\s*l\s*o\s*a\s*d)|\s)", re.IGNORECASE)
@@ -265,6 +267,8 @@ def unclosed(lines: Iterable[Line]) -> int | None:
 def _key(name: str) -> str:
     return name if name.startswith("<") else str(int(name))
 
+
+# -- tool table and parameters -----------------------------------------------------------------------------------------
 
 # LinuxCNC's manual, "Parameters": the persistent ones must all be there, in order.
 G92_ENABLED, G92_FIRST, ACTIVE_SYSTEM = 5210, 5211, 5220
