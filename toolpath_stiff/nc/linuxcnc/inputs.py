@@ -23,6 +23,9 @@ from toolpath_stiff.units import MM_PER_INCH
 
 LONGEST_LINE = 250  # rs274 reads at most 255 characters (LINELEN, interp_internal.hh)
 LINE_NUMBER = re.compile(r"N[0-9]+(\.[0-9]+)?")
+# What must not follow the line number of the copy, because it would join it: `1O<x>CALL` would become N11 and a call
+# that no check has seen.
+BARE_NUMBER = tuple("0123456789.")
 NAMED = re.compile(r"<[^<>]*>")
 ABORT = "abort,"
 NO_COMMENTS: tuple[tuple[int, str], ...] = ()
@@ -146,6 +149,13 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
     aborts = any("".join(text.split()).lower().startswith(ABORT) for _, text in line.comments)
     if not line.words and not aborts:
         return ""
+    if line.words.startswith(BARE_NUMBER):
+        raise InputError(
+            f"a block that begins with a number: {line.words[:20]!r}",
+            expected="a letter before each number",
+            file=name,
+            line=line.number,
+        )
     comment = f"({ABORT}stopped by the program)" if aborts else f"({line.number})" if tags else ""
     if line.words.startswith("O") and not aborts:  # after an O word some forms take no comment
         comment = ""
@@ -171,9 +181,6 @@ SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
 OPENS_OR_ENDS = re.compile(r"O(<[^<>]*>|\d+)(END)?(SUB|IF|WHILE|REPEAT)")
 M98 = re.compile(r"M[+]?0*98(?!\d)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
-# These would join the line number that the copy puts before them: `1O<x>CALL` would be N11 and a call that the checks
-# below did not see.
-BARE_NUMBER = tuple("0123456789.")
 
 
 def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
@@ -183,13 +190,6 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
         for column, text in line.comments:
             if PYTHON.match(text):
                 raise _refused("a comment that runs Python", name, line.number, column)
-        if line.words.startswith(BARE_NUMBER):
-            raise InputError(
-                f"a block that begins with a number: {line.words[:20]!r}",
-                expected="a letter before each number",
-                file=name,
-                line=line.number,
-            )
         if "M" in line.words:
             _check_m_codes(line, name)
     _check_calls(lines, name)
