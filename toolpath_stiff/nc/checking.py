@@ -32,7 +32,7 @@ from toolpath_stiff.units import Pose, m_from_mm, pose_in_mm, pose_in_si
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 NO_CHANGE = "nothing of the path"
-MOST_ERRORS = 100  # beyond, a file is no program for this reader
+MOST_ERRORS = 100  # beyond, a file is not a program for this reader
 
 
 @dataclass(frozen=True)

@@ -428,7 +428,7 @@ class ProgramRun:
         return known[0]
 
     def _heads(self) -> dict[int, int]:
-        """Program number -> line (from 0) of its O word; what follows the last tape mark is no program."""
+        """Program number -> line (from 0) of its O word; what follows the last tape mark is not part of one."""
         if self._programs is None:
             self._programs = {}
             started = False

@@ -1,4 +1,4 @@
-"""The state of the interpreter: the block in hand, and all that a control keeps from block to block.
+"""The state of the interpreter: the current block, and all that a control keeps from block to block.
 
 mm, degrees, mm/min.
 """
@@ -177,7 +177,7 @@ class State:
     bare, pointed
         The first length without a decimal point, with its line; whether any length ends with its point, as `X10.`.
     trace
-        Each move of the block in hand, for whoever starts the list.
+        Each move of the current block, for whoever starts the list.
     """
 
     name: str

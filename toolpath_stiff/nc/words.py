@@ -192,7 +192,7 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
 
 
 def _unreadable(compact: str, position: int, column: int, line: int, name: str) -> InputError:
-    """The error for text that is no word, with the reason if it is a known one."""
+    """The error for text that is not a word, with the reason if it is a known one."""
     character = compact[position]
     tail = compact[position : position + 12]
     follower = compact[position + 1 : position + 3].lstrip("+-")[:1]  # `X-[...]` and `X-#1` too

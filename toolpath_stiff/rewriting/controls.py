@@ -161,7 +161,7 @@ class Controls:
     known
         Axes that the program has put somewhere; of the others only the control knows where they stand.
     block
-        The one in hand.
+        The current one.
     trace
         The moves of that block as the untouched program makes them.
     notes
@@ -184,7 +184,7 @@ class Controls:
             self.notes.append(sentence)
 
     def refusal(self, found: str, hint: str = "") -> InputError:
-        """Why the block in hand cannot be rewritten."""
+        """Why the current block cannot be rewritten."""
         return InputError(found, hint=hint, file=self.source.name, line=self.block.line)
 
     # -- units and axes --------------------------------------------------------------------------------------------

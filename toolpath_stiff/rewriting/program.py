@@ -134,7 +134,7 @@ def _check_plain(program: Program) -> None:
 
 
 def check_rewritable(program: Program) -> None:
-    """Raise `InputError` for a file that is no program of a control, or one of another machine's."""
+    """Raise `InputError` for a file that is not a program of a control, or is one of another machine's."""
     if program.kinematics:
         raise InputError(
             f"a program posted for another kinematics ({program.kinematics}) is not rewritten: its words are those of "

@@ -50,7 +50,7 @@ class Code:
     group
         Its modal group; two codes of one are an error.
     act
-        What it does: a function of the state, the block in hand and the code's name. A motion code's is called for
+        What it does: a function of the state, the current block and the code's name. A motion code's is called for
         each block as long as its mode is in force.
     meaning
         In a few words.
@@ -84,11 +84,11 @@ class Code:
 
     def __post_init__(self) -> None:
         if NAME.fullmatch(self.name) is None:
-            raise ValueError(f"{self.name!r} is no name of a code: expected G1, G59.3, M6, F, S or T")
+            raise ValueError(f"{self.name!r} is not the name of a code: expected G1, G59.3, M6, F, S or T")
         if not callable(self.act):
             raise TypeError(f"{self.name} has no function that acts")
         if self.when not in STEPS:
-            raise ValueError(f"{self.name} acts at {self.when!r}, which is no step of the order of execution")
+            raise ValueError(f"{self.name} acts at {self.when!r}, which is not a step of the order of execution")
         if not self.meaning or not self.source:
             raise ValueError(f"{self.name} needs its meaning and its source")
         if not self.controls or not set(self.controls) <= set(EVERYWHERE):
