@@ -338,7 +338,7 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
     if number == 0:
         if state.dialect.increments:
             return math.nan
-        raise block.fail(block.values["H"], "is no offset on some controls, and on LinuxCNC that of the tool", "H or G49")
+        raise block.fail(block.values["H"], "is no offset on some controls, on LinuxCNC that of the tool", "H or G49")
     tool = state.tool if number is None else int(number)
     if number is None and state.renamed:
         raise block.fail(

@@ -84,7 +84,7 @@ class Follower:
     from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
 
     def follow(self, text: str) -> None:
-        """Take every command. Raises `InputError` for what gives no path: probing, splines, a tool without its length."""
+        """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
         for match in CALL.finditer(text):
             number, name, inner = match.groups()
             action = COMMANDS.get(name)
