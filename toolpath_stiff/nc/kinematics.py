@@ -293,10 +293,9 @@ def tool_poses(
 
     Examples
     --------
-    >>> table = {"letter": "A", "axis": "x", "point_mm": [0, 0, 0]}
-    >>> axes = {"type": "table", "tcp": False, "points": "program", "table": table}
-    >>> kinematics = read_kinematics(axes, lambda found, expected="": ValueError(found, expected))
-    >>> poses = tool_poses(kinematics, np.array([[0.0, 0.0, 0.1]]), np.radians([[90.0, 0.0, 0.0]]), np.array([0.0]))
+    >>> tilting = RotaryAxis("A", TABLE, direction=(1.0, 0.0, 0.0), point=(0.0, 0.0, 0.0))
+    >>> kinematics = PostedKinematics("table", (tilting,), tcp=False)
+    >>> poses = tool_poses(kinematics, np.array([[0.0, 0.0, 0.1]]), np.radians([[90.0, 0.0, 0.0]]))
     >>> poses.tip.round(9).tolist(), poses.axis.round(9).tolist()
     ([[0.0, -0.1, 0.0]], [[0.0, -1.0, 0.0]])
     """
