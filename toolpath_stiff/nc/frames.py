@@ -193,7 +193,7 @@ def _about(rotation: Rotation, point: list[float], degrees: float) -> list[float
 
 
 def _matrix(origin: ShopPose) -> list[list[float]]:
-    """Q = Rz(C) Ry(B) Rx(A) of a placement; plain floats, so that reading a program needs no numpy."""
+    """Q = Rz(C) Ry(B) Rx(A) of a placement; plain floats, faster than arrays for one matrix."""
     (ca, sa), (cb, sb), (cc, sc) = (
         (math.cos(math.radians(v)), math.sin(math.radians(v))) if v else (1.0, 0.0) for v in origin[3:]
     )
