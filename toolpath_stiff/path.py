@@ -17,16 +17,21 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
+from toolpath_stiff.units import deg_from_rad, m_per_s_from_mm_per_min, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+RAPID_FEED = m_per_s_from_mm_per_min(10_000.0)  # assumed where no machine says otherwise
+ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
+BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
+MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Samples:
-    """Columns over n samples along the true path, in machine coordinates.
+    r"""Columns over n samples along the true path, in machine coordinates.
 
     Every move has samples at both of its ends, so a corner appears twice: once as the end of a move, with
     that move's tangent, and once as the start of the next, with the next one's. This is the rule for the
@@ -55,6 +60,15 @@ class Samples:
         0 for rapids and for moves of the rotary axes alone.
     feed
         (n,) m/s; nan for rapids.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> samples = sample_moves(parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves, step=0.01)
+    >>> samples
+    <Samples: 9 samples, 50 mm of path>
+    >>> int(samples.cutting.sum()), round(float(samples.weight.sum()), 6)  # m that cut
+    (7, 0.045)
     """
 
     move: IntArray
@@ -73,6 +87,10 @@ class Samples:
     def __len__(self) -> int:
         return len(self.line)
 
+    def __repr__(self) -> str:
+        length = f", {mm_from_m(float(self.s[-1])):g} mm of path" if len(self) else ""
+        return f"<Samples: {len(self)} samples{length}>"
+
     @property
     def cutting(self) -> BoolArray:
         """(n,) samples that count in the statistics: not of a rapid."""
@@ -83,8 +101,11 @@ class Samples:
         return Samples(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
 
+# -- placing -----------------------------------------------------------------------------------------------------------
+
+
 def place(moves: Moves, origin: ArrayLike) -> Moves:
-    """Moves in machine coordinates, positions only.
+    r"""Moves in machine coordinates, positions only.
 
     `start`, `end`, arc centres and normals are turned; the rotary words stay as programmed, because a control
     interpolates them as such. `place_orientations` turns the sampled orientations.
@@ -95,6 +116,14 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
         In the set-up frame.
     origin
         (6,) x, y, z in m, A, B, C in rad: where program zero sits.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG1 X40\nM30\n").moves
+    >>> placed = place(moves, (0.1, 0.0, 0.8, 0.0, 0.0, np.pi / 2))
+    >>> placed.end[:, :3].round(9).tolist()  # m
+    [[0.1, 0.04, 0.8]]
     """
     at = np.asarray(origin, dtype=float)
     turn = rotation_matrices(at[3:])
@@ -116,7 +145,14 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
 
 
 def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
-    """Roll, pitch, yaw (n, 3) rad on the machine of programmed angles (n, 3) rad; unturned ones stay as they are."""
+    """Roll, pitch, yaw (n, 3) rad on the machine of programmed angles (n, 3) rad; unturned ones stay as they are.
+
+    Examples
+    --------
+    >>> tilted = place_orientations(np.radians([[10.0, 0.0, 0.0]]), (0.0, 0.0, 0.8, 0.0, 0.0, np.pi / 2))
+    >>> np.degrees(tilted).round(6).tolist()
+    [[0.0, 10.0, 0.0]]
+    """
     angles = np.asarray(origin, dtype=float)[3:]
     if not angles.any():
         return abc
@@ -126,16 +162,20 @@ def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
     return roll_pitch_yaw(turn @ rotation_matrices(abc) @ back)
 
 
-RAPID_FEED = 10.0 / 60.0  # m/s, assumed where no machine says otherwise
-ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
-BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
-MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
+# -- sampling ----------------------------------------------------------------------------------------------------------
 
 
 def move_durations(moves: Moves, rapid_feed: float = RAPID_FEED) -> FloatArray:
-    """(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s."""
-    turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0)
-    return _durations(moves, move_lengths(moves), turn, rapid_feed)
+    r"""(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves
+    >>> move_durations(moves).round(3).tolist()  # s; the rapid at 10 m/min
+    [0.03, 0.5, 4.0]
+    """
+    return _durations(moves, move_lengths(moves), _turn(moves), rapid_feed)
 
 
 def sample_moves(
@@ -144,7 +184,7 @@ def sample_moves(
     rapid_feed: float = RAPID_FEED,
     origin: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> Samples:
-    """Sample moves along their true path, both ends of every move included.
+    r"""Sample moves along their true path, both ends of every move included.
 
     Parameters
     ----------
@@ -161,22 +201,20 @@ def sample_moves(
     ------
     InputError
         The step gives more than `MOST_SAMPLES` samples.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG2 X20 Y0 I10 J0\nM30\n").moves
+    >>> samples = sample_moves(place(moves, (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)), step=0.016)
+    >>> (samples.position * 1e3).round(3).tolist()  # mm
+    [[0.0, 0.0, 800.0], [10.0, 10.0, 800.0], [20.0, 0.0, 800.0]]
+    >>> samples.t.round(3).tolist()  # s, 31.416 mm at 600 mm/min
+    [0.0, 1.571, 3.142]
     """
     length = move_lengths(moves)
-    turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0)
-    # A length that is a whole number of steps up to rounding must not gain a step.
-    pieces = np.maximum(
-        np.ceil(length * _fastest_part(moves) / step - 1e-9),
-        np.ceil(turn / ANGULAR_STEP - 1e-9),
-    )
-    pieces = np.maximum(pieces, 1.0)
-    total = float(pieces.sum()) + len(moves)
-    if total > MOST_SAMPLES:
-        raise InputError(
-            f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
-            expected=f"at most {MOST_SAMPLES}",
-            hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
-        )
+    turn = _turn(moves)
+    pieces = _pieces(moves, length, turn, step)
     counts = pieces.astype(np.int64) + 1
     duration = _durations(moves, length, turn, rapid_feed)
     cutting = moves.motion != RAPID
@@ -200,6 +238,29 @@ def sample_moves(
         _sample_block(moves.take(block), counts[block], some, first_move, origin, samples.take(rows))
         first_move, first_sample = end, rows.stop
     return samples
+
+
+def _turn(moves: Moves) -> FloatArray:
+    """(n,) rad, the largest turn of a rotary axis in each move."""
+    return np.asarray(np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0))
+
+
+def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> FloatArray:
+    """(n,) whole numbers from 1, into how many pieces the samples divide each move. Raises `InputError`."""
+    # A length that is a whole number of steps up to rounding must not gain a step.
+    pieces = np.maximum(
+        np.ceil(length * _fastest_part(moves) / step - 1e-9),
+        np.ceil(turn / ANGULAR_STEP - 1e-9),
+    )
+    pieces = np.maximum(pieces, 1.0)
+    total = float(pieces.sum()) + len(moves)
+    if total > MOST_SAMPLES:
+        raise InputError(
+            f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
+            expected=f"at most {MOST_SAMPLES}",
+            hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
+        )
+    return np.asarray(pieces)
 
 
 def _empty_samples(n: int) -> Samples:
@@ -264,6 +325,8 @@ def _durations(moves: Moves, length: FloatArray, turn: FloatArray, rapid_feed: f
     return np.asarray(distance / np.where(feed > 0.0, feed, 1.0))
 
 
+# -- as a table --------------------------------------------------------------------------------------------------------
+
 # Column -> decimals; None: a whole number or a word. A millionth of a millimetre is finer than any machine and
 # lets sums over a long path keep their digits.
 PATH_COLUMNS: dict[str, int | None] = {
@@ -283,7 +346,16 @@ PATH_COLUMNS: dict[str, int | None] = {
 
 
 def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
-    """Column of `PATH_COLUMNS` -> values, for some rows."""
+    r"""Column of `PATH_COLUMNS` -> values, for some rows.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> samples = sample_moves(parse_program("G21 G90 F600\nG1 X40\nM30\n").moves, step=0.02)
+    >>> columns = path_columns(samples)
+    >>> columns["x_mm"].tolist(), columns["motion"].tolist()
+    ([0.0, 20.0, 40.0], ['feed', 'feed', 'feed'])
+    """
     position, abc = mm_from_m(samples.position[rows]), deg_from_rad(samples.abc[rows])
     return {
         "line": samples.line[rows],

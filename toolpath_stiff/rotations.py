@@ -23,6 +23,11 @@ def rotation_matrices(abc: ArrayLike) -> FloatArray:
     Returns
     -------
     (..., 3, 3) rotation matrices, R = Rz(c) Ry(b) Rx(a).
+
+    Examples
+    --------
+    >>> rotation_matrices([0.0, 0.0, np.pi / 2]).round(9)[:2, 0].tolist()  # x turns onto y
+    [0.0, 1.0]
     """
     angles = np.asarray(abc, dtype=float)
     ca, cb, cc = np.moveaxis(np.cos(angles), -1, 0)
@@ -52,6 +57,11 @@ def roll_pitch_yaw(rotation: ArrayLike) -> FloatArray:
     -------
     (..., 3) a, b, c in rad; b in [-pi/2, pi/2]. At b = +-pi/2, where roll and yaw turn about the same
     axis, yaw is set to 0.
+
+    Examples
+    --------
+    >>> roll_pitch_yaw(rotation_matrices([0.1, -0.2, 0.3])).round(9).tolist()
+    [0.1, -0.2, 0.3]
     """
     matrix = np.asarray(rotation, dtype=float)
     cos_b = np.hypot(matrix[..., 0, 0], matrix[..., 1, 0])
@@ -67,7 +77,13 @@ def roll_pitch_yaw(rotation: ArrayLike) -> FloatArray:
 
 
 def rotation_about_z(angle: ArrayLike) -> FloatArray:
-    """Rotation matrices about z, (..., 3, 3), of angles (...) in rad."""
+    """Rotation matrices about z, (..., 3, 3), of angles (...) in rad.
+
+    Examples
+    --------
+    >>> rotation_about_z([0.0, np.pi / 2]).shape
+    (2, 3, 3)
+    """
     value = np.asarray(angle, dtype=float)
     zeros = np.zeros_like(value)
     return rotation_matrices(np.stack([zeros, zeros, value], axis=-1))

@@ -22,6 +22,8 @@ ShopPose = tuple[float, float, float, float, float, float]  # the same in mm and
 MM_PER_INCH = 25.4  # exact: international inch, 1959
 PI = 3.141592653589793
 RAD_PER_DEG = PI / 180.0
+SECONDS_PER_MINUTE = 60.0
+SECONDS_PER_DAY = 86_400.0
 
 
 def m_from_mm(mm: T) -> T:
@@ -67,6 +69,11 @@ def n_per_mm_from_n_per_m(k: T) -> T:
 def m_per_s_from_mm_per_min(feed: T) -> T:
     """m/s from mm/min."""
     return feed / 60e3
+
+
+def rad_per_s_from_deg_per_min(feed: T) -> T:
+    """rad/s from degrees per minute."""
+    return rad_from_deg(feed) / SECONDS_PER_MINUTE
 
 
 def mm_per_min_from_m_per_s(feed: T) -> T:

@@ -52,9 +52,9 @@ def test_a_code_without_a_function_is_refused():
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        (("G01", MOTION, holds_anyway, "feed", "LinuxCNC"), "no name of a code"),
-        (("X", MOTION, holds_anyway, "feed", "LinuxCNC"), "no name of a code"),
-        (("G1", "no such group", holds_anyway, "feed", "LinuxCNC"), "no step"),
+        (("G01", MOTION, holds_anyway, "feed", "LinuxCNC"), "not the name of a code"),
+        (("X", MOTION, holds_anyway, "feed", "LinuxCNC"), "not the name of a code"),
+        (("G1", "no such group", holds_anyway, "feed", "LinuxCNC"), "not a step"),
         (("G1", MOTION, holds_anyway, "", "LinuxCNC"), "its meaning and its source"),
         (("G1", MOTION, holds_anyway, "feed", ""), "its meaning and its source"),
         (("G1", MOTION, holds_anyway, "feed", "LinuxCNC", ()), "controls"),

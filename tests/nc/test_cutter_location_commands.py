@@ -87,7 +87,7 @@ def test_a_placement_is_not_written_into_it(tmp_path, capsys):
     program.write_text(SLOT)
     out = tmp_path / "out"
     assert main(["place", str(program), "--rotate", "30", "--out", str(out), "--write", str(written)]) == 2
-    assert "no program that a control runs" in capsys.readouterr().err
+    assert "not a program that a control runs" in capsys.readouterr().err
     assert not written.exists() and not out.exists()
     blocks = offset_blocks(read_program(program), (0.1, 0, 0.8, 0, 0, 0.5))
     assert not blocks.linuxcnc and "posted from it" in blocks.linuxcnc_reason

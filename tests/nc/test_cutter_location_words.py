@@ -123,7 +123,7 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("TLRGT,GORGT/L1", 3, "TLRGT"),
         ("RETRCT", 3, "retracts"),
         ("CYCLE/TAP,10,IPM,2", 3, "CYCLE/TAP"),
-        ("CYCLE/DRILL, 126.0, 85.0, 1.0,MMPR", 3, "order hangs on"),
+        ("CYCLE/DRILL, 126.0, 85.0, 1.0,MMPR", 3, "order depends on"),
         ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2,RAPTO,1", 3, "RAPTO"),
         ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2,RETURN,0", 3, "RETURN,0"),
         ("CYCLE/DRILL,DEEP,STEP,20,CLEAR,3,FEDTO,-72,RTRCTO,AUTO,MMPM,250", 3, "AUTO"),
@@ -137,7 +137,7 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("GOTO/1,2,3,0,0,0", 3, "length 0"),
         ("GOTO/1,2,3,0,0,1.01", 3, "length 1.01"),
         ("GOTO/0,0,0,0,0,1\nGOTO/0,0,1,0,0,-1", 4, "turns over"),
-        ("1,2,3", 3, "no statement"),
+        ("1,2,3", 3, "not a statement"),
         ("GOTO/1,2,$", 3, "continues"),
         ("GOTO/1,2,$\nGOTO/3,4,5", 3, "continues"),
         ("GOTO/1,2 $ 3", 3, "after a \\$"),
@@ -179,8 +179,8 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("STRANGE/1,2,3", 3, "may move the tool"),
         ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2\nRAPID", 4, "is the next point a hole"),
         ("ZERO/1\nGOTO/0,0,0\nZERO/2", 5, "another coordinate system"),
-        ("G1 X10 Y5", 3, "no statement"),
-        ("%", 3, "no statement"),
+        ("G1 X10 Y5", 3, "not a statement"),
+        ("%", 3, "not a statement"),
     ],
 )
 def test_refusals_name_word_and_line(text, line, words):

@@ -53,7 +53,7 @@ def test_an_offsets_file_may_hold_them(tmp_path):
         ("G54.1 G1 X1. F9.", "fanuc", "needs the number of its offset"),
         ("G54.1 P301 X1.", "fanuc", "P1 to P300"),
         ("G154 P100 X1.", "haas", "P1 to P99"),
-        ("G54.1 P1.5", "generic", "no count"),
+        ("G54.1 P1.5", "generic", "not a count"),
         ("G54.1 P3", "linuxcnc", "is not a code of the dialect linuxcnc"),
         ("G154 P3", "fanuc", "is not a code of the dialect fanuc"),
         ("G54 G54.1 P1", "generic", "work offset"),

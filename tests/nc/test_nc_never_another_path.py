@@ -13,7 +13,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import read_program
 
 REFUSED = {
-    "G43.1 moves to its Z too": ("F100\nG43.1 Z5 G1\nX1", "both want the axis words"),
+    "G43.1 moves to its Z too": ("F100\nG43.1 Z5 G1\nX1", "both use the axis words"),
     "a cycle's heights in the other unit": ("F100 G0 Z30\nG99 G81 X1 Y1 Z-5 R14\nG20 X1", "between G20 and G21"),
     "the level of a run in the other unit": (
         "F100 G0 Z30\nG98 G81 X1 Y1 Z-5 R14\nG20 F10 G82 X1 Z-.1 R.2 P1",

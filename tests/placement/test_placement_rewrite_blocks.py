@@ -169,6 +169,13 @@ def test_a_first_cut_from_nowhere_is_refused():
     assert caught.value.line == 2
 
 
+def test_a_first_cut_whose_tool_axis_is_nowhere_given_names_the_rotary_axes():
+    """X, Y and Z stand where the program put them; the tilt of the set-up has no A, B, C word to go into."""
+    program = parse_program("G53 G0 X10 Z50\nG1 X1 Y1 Z0 F100\n", origin=at(10, 0, 700, 17, a=6, b=-11))
+    with pytest.raises(InputError, match=r"tool axis .* degrees off.*osition X, Y, Z and the rotary axes in rapid"):
+        rewrite_program(program, at(10, 0, 700, 17, a=6, b=-11), HERE, linearise=1e-4)
+
+
 def test_no_axis_is_moved_that_the_program_left_alone():
     """`G0 X Y` before Z is known must not plunge to where Z 0 would be."""
     assert rewrite("G0 X1 Y1\nZ5\nG1 Z-1 F100\n", at(1, 1, -50, 30))[0] == "G0 X1.366 Y2.366"

@@ -1,7 +1,20 @@
 """A sampled path on a machine: loads, reach, stiffness, statistics."""
 
+from typing import TYPE_CHECKING
+
 from toolpath_stiff.analysis.loads import LOADS, Load, parse_load
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
-from toolpath_stiff.analysis.results import Analysis, analyse
+
+if TYPE_CHECKING:
+    from toolpath_stiff.analysis.results import Analysis, analyse
 
 __all__ = ["LOADS", "Analysis", "Load", "PoseStiffness", "analyse", "evaluate", "parse_load"]
+
+
+def __getattr__(name: str) -> object:
+    """`Analysis` and `analyse` on first use: they need NC programs, which single poses do without."""
+    if name in ("Analysis", "analyse"):
+        from toolpath_stiff.analysis import results
+
+        return getattr(results, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

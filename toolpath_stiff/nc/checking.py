@@ -32,12 +32,12 @@ from toolpath_stiff.units import Pose, m_from_mm, pose_in_mm, pose_in_si
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 NO_CHANGE = "nothing of the path"
-MOST_ERRORS = 100  # beyond, a file is no program for this reader
+MOST_ERRORS = 100  # beyond, a file is not a program for this reader
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing to say of a program.
+    """One finding about a program.
 
     Attributes
     ----------
@@ -46,9 +46,9 @@ class Finding:
     code
         What kind of finding it is, a short word; of used and unsupported words the word itself.
     text
-        A sentence for people.
+        One sentence.
     severity
-        "error": the program is refused for it; "warning": have a look; "note": for the record.
+        "error": the program is refused for it; "warning": to be checked; "note": for the record.
     """
 
     line: int
@@ -165,7 +165,18 @@ def check_lines(
     block_delete: Switches = False,
     controller: Controller = UNKNOWN_CONTROL,
 ) -> Checked:
-    """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone."""
+    """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone.
+
+    Examples
+    --------
+    >>> checked = check_lines(("G21 G90 F600", "G1 X10", "G41 D1", "M30"), "slot.nc")
+    >>> checked.complete
+    False
+    >>> [(code.code, code.text) for code in checked.used][-2:]
+    [('G41', 'cutter compensation: not supported'), ('M30', 'end')]
+    >>> checked.findings[0].line, checked.findings[0].severity
+    (3, 'error')
+    """
     if not any(line.strip() for line in lines):
         raise InputError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
@@ -272,7 +283,7 @@ def _check_cutter_location(
 def findings_of(
     errors: Iterable[InputError], warnings: Iterable[str], assumptions: Iterable[str]
 ) -> tuple[Finding, ...]:
-    """All that is to be said of a program, in the order of lines."""
+    """All findings about a program, in the order of lines."""
     return in_order(
         [
             *(finding_of(error) for error in errors),
@@ -332,6 +343,8 @@ def modal_state(state: State) -> dict[str, str]:
     }
 
 
+# -- by LinuxCNC's interpreter -----------------------------------------------------------------------------------------
+
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
 
 
@@ -340,16 +353,22 @@ def check_by(
     lines: tuple[str, ...],
     name: str,
     *,
+    rs274: str | None = None,
     origin: Iterable[float] | None = None,
     default_origin: Iterable[float] = ZERO,
     block_delete: Switches = False,
     controller: Controller = UNKNOWN_CONTROL,
-    rs274: str | None = None,
 ) -> tuple[Checked, str]:
     """Check a program by an interpreter; parameters as in `read_program`. Returns who read it, too.
 
     "auto" is the built-in check where that reads the whole program, or LinuxCNC's interpreter cannot. Raises
     `InputError` for an empty program, or where "linuxcnc" is asked for and cannot be had.
+
+    Examples
+    --------
+    >>> checked, reader = check_by("builtin", ("G21 G90 F600", "G1 X10", "M30"), "slot.nc")
+    >>> checked.complete, reader, checked.end["motion"]
+    (True, 'builtin', 'G1')
     """
     if interpreter not in INTERPRETERS:
         raise InputError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))

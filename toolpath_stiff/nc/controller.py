@@ -35,6 +35,8 @@ from toolpath_stiff.nc.tables import (
     set_offset,
 )
 
+# -- dialects ----------------------------------------------------------------------------------------------------------
+
 # IS-B, the increment system of nearly every Fanuc and Haas: what a number without a decimal point counts.
 INCREMENT_MM, INCREMENT_INCH, INCREMENT_DEGREE = 1e-3, 1e-4, 1e-3
 
@@ -60,9 +62,9 @@ class Dialect:
     dwell
         What the P of G4 and of cycles counts; with milliseconds, G4 X is a time too.
     retract
-        G98 or G99 at the start; None: nobody says, LinuxCNC's habit (G99) is assumed and listed.
+        G98 or G99 at the start; None: not defined, LinuxCNC's G99 is assumed and listed.
     keeps_heights
-        Whether a drilling cycle's hole keeps its depth when G90 or G91 follows, or Z and R are read anew (LinuxCNC);
+        Whether a drilling cycle's hole keeps its depth when G90 or G91 follows, or Z and R are read again (LinuxCNC);
         None: refused.
     repeats_in_p
         `M98 P21000` is two runs of O1000 (True), O21000 (False), or whichever the file has (None).
@@ -79,7 +81,7 @@ class Dialect:
     local_calls
         Whether M97 calls a block by its N number.
     feed_needs_point
-        Units in which F without a decimal point hangs on a parameter, and is refused.
+        Units in which F without a decimal point depends on a parameter, and is refused.
     holds_tip
         Its code for tool centre point control.
     """
@@ -139,11 +141,19 @@ DIALECTS = {
 
 
 def dialect_named(name: str) -> Dialect:
-    """The dialect of a name. Raises `InputError`."""
+    """The dialect of a name. Raises `InputError`.
+
+    Examples
+    --------
+    >>> dialect_named("fanuc").increments
+    True
+    """
     if name not in DIALECTS:
         raise InputError(f"dialect {name!r}", expected=", ".join(DIALECTS))
     return DIALECTS[name]
 
+
+# -- the controller file -----------------------------------------------------------------------------------------------
 
 ALL_SWITCHES = frozenset(range(1, 10))
 TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")
@@ -194,7 +204,15 @@ Switches = bool | frozenset[int]  # block-delete switches that are on; True: all
 
 
 def switches_on(block_delete: Switches, controller: Controller) -> frozenset[int]:
-    """The block-delete switches that are on: those asked for, else the controller file's."""
+    """The block-delete switches that are on: those asked for, else the controller file's.
+
+    Examples
+    --------
+    >>> switches_on(frozenset({1, 3}), UNKNOWN_CONTROL) == {1, 3}
+    True
+    >>> len(switches_on(True, UNKNOWN_CONTROL))
+    9
+    """
     if isinstance(block_delete, bool):
         return ALL_SWITCHES if block_delete else controller.switches
     if not block_delete <= ALL_SWITCHES:
@@ -208,7 +226,7 @@ def plain(block_delete: Switches, controller: Controller) -> bool:
 
 
 def check_plain(block_delete: Switches, controller: Controller) -> None:
-    """Raise `InputError` if LinuxCNC's interpreter would read the program otherwise than the control."""
+    """Raise `InputError` if LinuxCNC's interpreter would read the program differently from the control."""
     if not plain(block_delete, controller):
         raise InputError(
             f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {controller.dialect.name!r}, "
@@ -218,9 +236,20 @@ def check_plain(block_delete: Switches, controller: Controller) -> None:
 
 
 def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
-    """Read a controller file; .var and .tbl files are LinuxCNC's. `dialect`, if given, is in place of the file's.
+    r"""Read a controller file; .var and .tbl files are LinuxCNC's. `dialect`, if given, is in place of the file's.
 
     Raises `InputError` that names file and key.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "mill.toml"
+    ...     _ = file.write_text('dialect = "haas"\n[offsets]\nG54 = [100, 0, -20]\n')
+    ...     controller = read_controller(file)
+    >>> controller.label, controller.offsets.table[0].axes
+    ('haas', [100.0, 0.0, -20.0, 0.0, 0.0, 0.0])
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".var", ".tbl"):
@@ -323,7 +352,7 @@ class _Reader:
             return read_tool_table(self.path.parent / given)
         if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
             raise self.fail(
-                "tools is no list of tables", "[[tools]] with number, length_mm, ..., or the name of a file"
+                "tools is not a list of tables", "[[tools]] with number, length_mm, ..., or the name of a file"
             )
         tools: dict[int, ToolEntry] = {}
         for place, tool in enumerate(given, 1):

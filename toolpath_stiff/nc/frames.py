@@ -33,7 +33,7 @@ class Frames:
     offsets
         Work offsets and reference points.
     option, default
-        Where G54's zero sits on the machine as the caller says, and unless anyone says; mm and degrees.
+        Where G54's zero sits on the machine as the caller says, and by default; mm and degrees.
     active
         Index of the work offset in force, as `Offsets.at` counts.
     g92
@@ -193,7 +193,7 @@ def _about(rotation: Rotation, point: list[float], degrees: float) -> list[float
 
 
 def _matrix(origin: ShopPose) -> list[list[float]]:
-    """Q = Rz(C) Ry(B) Rx(A) of a placement; plain floats, so that reading a program needs no numpy."""
+    """Q = Rz(C) Ry(B) Rx(A) of a placement; plain floats, faster than arrays for one matrix."""
     (ca, sa), (cb, sb), (cc, sc) = (
         (math.cos(math.radians(v)), math.sin(math.radians(v))) if v else (1.0, 0.0) for v in origin[3:]
     )

@@ -15,6 +15,11 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.nc.moves import Moves
 
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Point2 = tuple[float, float]
+Vector = tuple[float, float, float]
+
 # LinuxCNC's defaults (manual, "INI configuration", CENTER_ARC_RADIUS_TOLERANCE_MM; interp_arc.cc): start and end radius
 # may differ by a thousandth of the radius, or by 0.00127 mm if that is more, and never by more than 0.127 mm.
 RELATIVE_TOLERANCE = 1e-3
@@ -27,7 +32,12 @@ PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}  # first, second
 CENTER_WORDS = ("I", "J", "K")
 CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
-Point2 = tuple[float, float]
+PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
+SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
+MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
+
+
+# -- arcs --------------------------------------------------------------------------------------------------------------
 
 
 class ArcError(Exception):
@@ -39,7 +49,13 @@ class ArcError(Exception):
 
 
 def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: bool) -> Point2:
-    """Centre of an arc given by R; a negative radius takes the longer way. Raises `ArcError`."""
+    """Centre of an arc given by R; a negative radius takes the longer way. Raises `ArcError`.
+
+    Examples
+    --------
+    >>> center_from_radius((0.0, 0.0), (20.0, 0.0), 10.0, clockwise=False)
+    (10.0, 0.0)
+    """
     if start == end:
         raise ArcError("an arc with R that ends where it starts", "another end point, or I, J, K for a full circle")
     if radius == 0.0:
@@ -60,7 +76,16 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
 
 
 def check_radii(start: Point2, end: Point2, center: Point2) -> None:
-    """Raise `ArcError` if start and end do not lie on one circle about the centre within LinuxCNC's tolerance."""
+    """Raise `ArcError` if start and end do not lie on one circle about the centre within LinuxCNC's tolerance.
+
+    Examples
+    --------
+    >>> check_radii((10.0, 0.0), (0.0, 10.001), (0.0, 0.0))
+    >>> check_radii((10.0, 0.0), (10.0, 0.0), (10.0, 0.0))
+    Traceback (most recent call last):
+        ...
+    toolpath_stiff.nc.geometry.ArcError: an arc of radius 0
+    """
     first, last = math.dist(start, center), math.dist(end, center)
     if first < SAME_POINT or last < SAME_POINT:
         raise ArcError("an arc of radius 0", "a centre apart from the start and the end point")
@@ -76,7 +101,15 @@ def check_radii(start: Point2, end: Point2, center: Point2) -> None:
 
 
 def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns: int) -> float:
-    """Signed angle in rad (counter-clockwise positive); start = end is a full circle; P words add whole turns."""
+    """Signed angle in rad (counter-clockwise positive); start = end is a full circle; P words add whole turns.
+
+    Examples
+    --------
+    >>> math.degrees(arc_sweep((10.0, 0.0), (0.0, 10.0), (0.0, 0.0), clockwise=False, turns=1))
+    90.0
+    >>> math.degrees(arc_sweep((10.0, 0.0), (0.0, 10.0), (0.0, 0.0), clockwise=True, turns=1))
+    -270.0
+    """
     first = math.atan2(start[1] - center[1], start[0] - center[0])
     last = math.atan2(end[1] - center[1], end[0] - center[0])
     sweep = (first - last if clockwise else last - first) % math.tau
@@ -85,6 +118,9 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
         sweep = math.tau
     sweep += math.tau * (turns - 1)
     return -sweep if clockwise else sweep
+
+
+# -- tool axes ---------------------------------------------------------------------------------------------------------
 
 
 def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
@@ -97,21 +133,33 @@ def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     ----------
     i, j, k
         The tool axis from tip to spindle, of any length above 0.
+
+    Examples
+    --------
+    >>> roll, pitch = roll_pitch_of_axis(0.0, 0.5, math.sqrt(0.75))
+    >>> round(roll, 9), pitch
+    (-30.0, 0.0)
     """
     across = math.hypot(i, k)
     pitch = math.degrees(math.atan2(i, k)) if across else 0.0
     return math.degrees(math.atan2(-j, across)), pitch
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+# -- the curves of moves -----------------------------------------------------------------------------------------------
 
 
 def move_lengths(moves: Moves) -> FloatArray:
-    """(n,) m, length of the tip's path in each move.
+    r"""(n,) m, length of the tip's path in each move.
 
     An arc's is sqrt((r sweep)^2 + climb^2); where start and end radius differ (a control's tolerance, or a spiral)
     r is their mean, which is exact to second order in the difference.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG1 X30 Y40\nG2 X50 Y40 I10 J0\nM30\n").moves
+    >>> (move_lengths(moves) * 1e3).round(3).tolist()  # mm
+    [50.0, 31.416]
     """
     chord = np.linalg.norm(moves.end[:, :3] - moves.start[:, :3], axis=1)
     arc = moves.arc_sweep != 0.0
@@ -178,9 +226,7 @@ def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray
     return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
 
 
-PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
-
-SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
+# -- strokes of drilling cycles ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -205,7 +251,14 @@ class Stroke:
 
 
 def strokes(hole: Drilling) -> Iterator[Stroke]:
-    """Moves of one hole, from the R plane."""
+    """Moves of one hole, from the R plane.
+
+    Examples
+    --------
+    >>> hole = Drilling("G83", bottom=-5.0, retract=2.0, clear=10.0, peck=4.0, dwell=0.0)
+    >>> [(stroke.height, "feed" if stroke.feed else "rapid") for stroke in strokes(hole)]
+    [(-2.0, 'feed'), (2.0, 'rapid'), (-1.746, 'rapid'), (-5.0, 'feed'), (10.0, 'rapid')]
+    """
     if hole.code in ("G73", "G83"):
         yield from _pecks(hole)
     dwell = hole.dwell if hole.code in ("G82", "G89") else 0.0

@@ -34,7 +34,8 @@ from toolpath_stiff.nc.codes.offsets import HOLDS_TIP
 from toolpath_stiff.nc.codes.points import read_numbers
 from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
 from toolpath_stiff.nc.moves import Jump
-from toolpath_stiff.nc.state import FARTHEST_MM, POINT_WORDS, Call, CurrentBlock, Flow, State
+from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, State
+from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def execute(state: State, block: Block) -> Flow | Call:
 
 
 def begin(state: State, block: Block) -> CurrentBlock:
-    """Take a block's codes and set its modes, not moving yet; to do so twice changes nothing but dwells."""
+    """Take a block's codes and set its modes, not moving yet; doing so twice changes nothing but dwells."""
     current = sort_words(state, block)
     read_numbers(state, current)
     for code in _in_order(current, ahead=True):
@@ -103,8 +104,8 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
         if letter in current.values:
             raise current.fail(current.values[letter], "moves an axis that this machine does not have", "X Y Z A B C")
     for letter in (*AXES, "@"):
-        if letter in current.values and abs(current.values[letter].value) > FARTHEST_MM:
-            raise current.fail(current.values[letter], "is beyond 100 m", f"at most {FARTHEST_MM:g}")
+        if letter in current.values and abs(current.values[letter].value) > LARGEST_MM:
+            raise current.fail(current.values[letter], "is beyond 100 m", f"at most {LARGEST_MM:g}")
     return current
 
 
@@ -164,21 +165,21 @@ def _same_group(block: CurrentBlock, word: Word, other: str, group: str) -> Exce
 
 
 def _check_axis_words(block: CurrentBlock) -> None:
-    """Two codes that want the axis words of their block are an error."""
+    """Two codes that use the axis words of their block are an error."""
     present = [name for group in (ONCE, ROTATION, LENGTH) if (name := block.groups.get(group)) is not None]
     takers = [name for name in present if CODES[name].takes_axes]
     moving = block.groups.get(MOTION)
     if len(takers) > 1 or (takers and moving and moving != "G80"):
         other = moving if moving and len(takers) == 1 else takers[0]
         word = block.codes[takers[-1]]
-        raise block.fail(word, f"and {other} both want the axis words of their block", "two blocks")
+        raise block.fail(word, f"and {other} both use the axis words of their block", "two blocks")
 
 
 # -- the moves of a block --------------------------------------------------------------------------------------------
 
 
 def _move(state: State, block: CurrentBlock) -> None:
-    """Change the motion mode, and have it move if the block says so."""
+    """Change the motion mode, and move as the block asks."""
     given = block.groups.get(MOTION)
     if given is not None:
         if given in CYCLES:
@@ -200,6 +201,8 @@ def _move(state: State, block: CurrentBlock) -> None:
         mode = instead or state.motion
         CODES[mode].act(state, block, mode)
 
+
+# -- the blocks of a file ----------------------------------------------------------------------------------------------
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
@@ -425,7 +428,7 @@ class ProgramRun:
         return known[0]
 
     def _heads(self) -> dict[int, int]:
-        """Program number -> line (from 0) of its O word; what follows the last tape mark is no program."""
+        """Program number -> line (from 0) of its O word; what follows the last tape mark is not part of one."""
         if self._programs is None:
             self._programs = {}
             started = False

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.geometry import Vector
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import m_from_mm, mm_from_m
 
@@ -45,7 +46,6 @@ PLACE_KEYS = {TABLE: "point_mm", HEAD: "pivot_mm"}
 TOLERANCE_MM, LEAST_TOLERANCE_MM, LARGEST_TOLERANCE_MM = 1e-3, 1e-5, 1.0
 PARALLEL = 1e-6  # sine of the angle between two axes that are one
 
-Vector = tuple[float, float, float]
 Fail = Callable[[str, str], InputError]
 
 
@@ -122,7 +122,7 @@ class PostedKinematics:
         return " ".join([self.type, *(axis.letter for axis in self.axes)])
 
     def assumption(self, *, switched: bool = False) -> str:
-        """What was made of X Y Z A B C, a sentence for people; `switched`: tool centre point control came and went."""
+        """What was made of X Y Z A B C, in one sentence; `switched`: tool centre point control came and went."""
         axes = ", ".join(axis.describe() for axis in self.axes)
         where = "the tip on the part (tool centre point control)" if self.tcp else "the machine's axes"
         where += ", of the tip on the part from G43.4 on to G43 or G49" if switched and not self.tcp else ""
@@ -253,6 +253,9 @@ def _check_pair(axes: tuple[RotaryAxis, ...], parts: tuple[tuple[str, str], ...]
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+
+# -- where the tool stands ---------------------------------------------------------------------------------------------
+
 UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -287,6 +290,14 @@ def tool_poses(
     tip_held
         (n,) or one, whether tool centre point control is on where it is not for good (`kinematics.tcp`): X Y Z are the
         tip's on the part.
+
+    Examples
+    --------
+    >>> tilting = RotaryAxis("A", TABLE, direction=(1.0, 0.0, 0.0), point=(0.0, 0.0, 0.0))
+    >>> kinematics = PostedKinematics("table", (tilting,), tcp=False)
+    >>> poses = tool_poses(kinematics, np.array([[0.0, 0.0, 0.1]]), np.radians([[90.0, 0.0, 0.0]]))
+    >>> poses.tip.round(9).tolist(), poses.axis.round(9).tolist()
+    ([[0.0, -0.1, 0.0]], [[0.0, -1.0, 0.0]])
     """
     held = np.broadcast_to(np.asarray(tip_held) | kinematics.tcp, (len(xyz),))
     axis = np.tile(Z, (len(xyz), 1))

@@ -17,6 +17,7 @@ from toolpath_stiff.units import (
     mm_from_m,
     mm_per_min_from_m_per_s,
     rad_from_deg,
+    rad_per_s_from_deg_per_min,
 )
 
 if TYPE_CHECKING:
@@ -33,9 +34,9 @@ CUTTER_LOCATION = "cutter-location file"
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Moves:
-    """Columns over n moves, in the set-up frame (program zero of G54 at the origin) unless placed.
+    r"""Columns over n moves, in the set-up frame (program zero of G54 at the origin) unless placed.
 
     A move of zero length in all six axes is not a move and has no row. `start[i]` is `end[i - 1]`,
     except where a coordinate system changed in between (then the tool stands still, the numbers change).
@@ -67,6 +68,17 @@ class Moves:
     from_machine
         (n, 2) whether start, end were given in machine coordinates (G53, G28, G30): these ends do
         not follow the work when it is placed elsewhere.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> moves = parse_program("G21 G90 F600\nG0 Z5\nG1 Z-1\nX40\nM30\n").moves
+    >>> moves
+    <Moves: 3 moves of the lines 2 to 4>
+    >>> [MOTION_NAMES[motion] for motion in moves.motion]
+    ['rapid', 'feed', 'feed']
+    >>> moves.end[-1, :3].tolist()  # m
+    [0.04, 0.0, -0.001]
     """
 
     line: IntArray
@@ -84,6 +96,10 @@ class Moves:
 
     def __len__(self) -> int:
         return len(self.line)
+
+    def __repr__(self) -> str:
+        lines = f" of the lines {self.line.min()} to {self.line.max()}" if len(self) else ""
+        return f"<Moves: {len(self)} moves{lines}>"
 
     def take(self, index: IntArray | BoolArray | slice) -> Moves:
         """The moves at `index` (integers, a mask or a slice)."""
@@ -141,9 +157,9 @@ class ToolUse:
     material: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Program:
-    """A program that was read to its end.
+    r"""A program that was read to its end.
 
     Attributes
     ----------
@@ -159,9 +175,9 @@ class Program:
         Where program zero (G54) sits in machine coordinates: x, y, z in m, A, B, C in rad. The moves do
         not depend on it, except those that were given in machine coordinates.
     origin_source
-        Who says so: "option" (the caller), "program" (`G10 L2 P1` or an offsets file) or "default".
+        Where that comes from: "option" (the caller), "program" (`G10 L2 P1` or an offsets file) or "default".
     unsupported, warnings, assumptions
-        What was read but not acted upon; what deserves a look; what was assumed. Sentences for people.
+        What was read but not acted upon; what should be checked; what was assumed; each one sentence.
     tools
         The tools that the program used.
     interpreter
@@ -173,10 +189,19 @@ class Program:
         The kinematics that it was posted for ("table-table A C"), from which the moves were recovered; "": A, B, C are
         roll, pitch, yaw of the platform.
     marks
-        (line, name) where operations begin, ascending, in a language whose text says so otherwise than by comment
-        lines; None: the comment lines of `source` say it.
+        (line, name) where operations begin, ascending, in a language that marks them otherwise than by comment
+        lines; None: the comment lines of `source` mark them.
     jumps
         Where the run left the order of the lines, for a subprogram or back from it; None: not known.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
+    >>> program.name, len(program.moves), program.dialect
+    ('slot.nc', 1, 'generic')
+    >>> program.assumptions
+    ('before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes',)
     """
 
     name: str
@@ -194,6 +219,12 @@ class Program:
     kinematics: str = ""
     marks: tuple[tuple[int, str], ...] | None = None
     jumps: tuple[Jump, ...] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Program {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
+
+
+# -- recording ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -216,13 +247,13 @@ class MovesInMm:
     motion: IntArray
     start: FloatArray
     end: FloatArray
-    arc_rows: list[int]
-    arcs: list[Arc]
     feed: FloatArray
     dwell: FloatArray
     tool: IntArray
     tool_length: FloatArray
     from_machine: BoolArray
+    arc_rows: list[int]
+    arcs: list[Arc]
 
     def __len__(self) -> int:
         return len(self.line)
@@ -297,13 +328,13 @@ class Recorder:
             self.parts[-1].dwell[-1] += seconds
 
     def moves(self) -> Moves:
-        """The moves as arrays, SI; they are thereby taken."""
+        """The moves as arrays, SI; the recorder is empty afterwards."""
         self.parts.append(self._close())
         parts, self.parts = self.parts[::-1], []
         return _joined(parts)
 
     def _close(self) -> MovesInMm:
-        """The lists as a part; they are empty thereafter."""
+        """The lists as a part; they are empty afterwards."""
         import numpy as np
 
         n = len(self.line)
@@ -368,7 +399,7 @@ def _copy(part: MovesInMm, into: Moves) -> None:
     # The feed of a move of the rotary axes alone is in degrees per minute.
     rotary = (into.start[:, :3] == into.end[:, :3]).all(axis=1)
     rotary[part.arc_rows] = False
-    speed = np.where(rotary, rad_from_deg(part.feed) / 60.0, m_per_s_from_mm_per_min(part.feed))
+    speed = np.where(rotary, rad_per_s_from_deg_per_min(part.feed), m_per_s_from_mm_per_min(part.feed))
     into.feed[:] = np.where(part.motion == RAPID, math.nan, speed)
     into.line[:], into.motion[:], into.dwell[:] = part.line, part.motion, part.dwell
     into.tool[:], into.tool_length[:] = part.tool, m_from_mm(part.tool_length)

@@ -25,7 +25,7 @@ from toolpath_stiff.nc.moves import RAPID, Jump, Moves, Program
 NAMED, MARKED, TOOL = "named", "marked", "tool"
 
 COMMENTS = re.compile(r"\(([^()]*)\)?|;(.*)")
-NO_WORDS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?", re.IGNORECASE)  # a line number is no word
+NO_WORDS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?", re.IGNORECASE)  # a line number is not a word
 BEGINS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?[(;]", re.IGNORECASE)
 ACTIVE = re.compile(r"\s*(?:MSG|DEBUG|PRINT)\s*,", re.IGNORECASE)  # LinuxCNC shows what follows
 FRAME, DASHES = " *=#~|'\"", "-_."  # of dashes and points only two and more are a frame: -X SIDE, .5 CHAMFER
@@ -66,7 +66,13 @@ def split_comments(text: str) -> tuple[str, str]:
 
 
 def headings(lines: Sequence[str]) -> list[Heading]:
-    """Blocks of successive lines that hold comments alone, in order; those that name nothing are left out."""
+    """Blocks of successive lines that hold comments alone, in order; those that name nothing are left out.
+
+    Examples
+    --------
+    >>> [(heading.line, heading.name) for heading in headings(("G21", "(FACE)", "G1 X1"))]
+    [(2, 'FACE')]
+    """
     found: list[Heading] = []
     block: list[str] = []
     first = last = -1
@@ -135,6 +141,8 @@ def _last_dash(frame: str) -> str:
     return frame[-1:] if frame and frame[-1] in DASHES and frame[-2:-1] not in tuple(DASHES) else ""
 
 
+# -- operations --------------------------------------------------------------------------------------------------------
+
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
@@ -184,7 +192,18 @@ class Operations:
 
 
 def operations(program: Program) -> Operations:
-    """The operations of a program that was read, by either interpreter."""
+    r"""The operations of a program that was read, by either interpreter.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("F600\n(FACE)\nG0 Z5\nG1 Z0\nX40\n(SLOT)\nG0 Z5\nG1 Z-1\nX0\nM30\n")
+    >>> found = operations(program)
+    >>> [(row.number, row.name, row.first_line, row.last_line) for row in found.rows]
+    [(1, 'FACE', 2, 5), (2, 'SLOT', 6, 9)]
+    >>> found.of_move.tolist()
+    [0, 0, 0, 1, 1, 1]
+    """
     remarks = {tool.number: tool.remark for tool in program.tools}
     return find_operations(program.source, program.moves, program.name, remarks, program.marks, program.jumps)
 
@@ -211,7 +230,7 @@ def find_operations(
         What the tool table says of tools, by number.
     marks
         (line, name) where operations begin, ascending, on the line of their first move or before it: of a language
-        whose text says so otherwise than by comment lines.
+        that marks them otherwise than by comment lines.
     jumps
         Where the run left the order of the lines; None: not known, then calls and loops are looked for in the text.
     """

@@ -6,7 +6,7 @@ reads blocks; a line that it does not match as a whole is not plain and is left 
 The lines become moves by the codes' own rules (`codes`, `frames`) on arrays, digit for digit. Here is only what a mode
 does along lines: a word holds until the next one. What a number, a feed, a point, an arc means is decided by the
 functions that the interpreter calls. A line about which there is anything to say (a word that nothing takes, an arc
-that does not fit) ends the run before it: the interpreter then executes it and says so. mm, degrees, mm/min inside.
+that does not fit) ends the run before it: the interpreter then executes it and reports it. mm, degrees, mm/min inside.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ from toolpath_stiff.nc.codes.points import (
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, MovesInMm
-from toolpath_stiff.nc.state import FARTHEST_MM, State
+from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, read_block
 
 CHUNK = 8192  # lines: their words fit into a processor's cache
@@ -130,6 +131,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+
+# -- words to moves ----------------------------------------------------------------------------------------------------
+
 FEWEST = 8  # lines; below, one by one is as fast
 MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_lines` reads
 MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
@@ -209,7 +213,7 @@ class _Lines:
         self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
         for letter in AXES:
             if letter in self.values:
-                self._stop(np.abs(self.values[letter]) > FARTHEST_MM)
+                self._stop(np.abs(self.values[letter]) > LARGEST_MM)
         if state.dialect.increments:
             self._count_increments()
 
@@ -291,7 +295,7 @@ class _Lines:
         return found
 
     def _feed_words(self) -> None:
-        """F in force on each line, and the line that said so (-1: a line before these)."""
+        """F in force on each line, and the line that set it (-1: a line before these)."""
         state = self.state
         first, last = self.feeds
         texts = (
@@ -390,7 +394,7 @@ class _Lines:
     ) -> tuple[geometry.Point2, float]:
         """Centre (program coordinates) and sweep of an arc from the words of its plane, nan where there is none.
 
-        Raises `ArcError` for what the interpreter has to look at.
+        Raises `ArcError` for what is left to the interpreter.
         """
         state = self.state
         scale = state.length_scale

@@ -51,7 +51,7 @@ def recovered(
     tip_held
         Numbers of moves before which tool centre point control was switched on or off.
     origin, source
-        Where the work sits on this machine, m and rad, and who says so.
+        Where the work sits on this machine, m and rad, and where that comes from.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def on_the_part(
         warnings.append(
             f"line {line}: {letter} turns by {degrees:.0f} degrees within one cut"
             + (f", and {len(far) - 1} more cuts turn as far" if far[1:] else "")
-            + f"; if the control takes the shorter way, say rollover = true for {letter} in the controller file"
+            + f"; if the control takes the shorter way, set rollover = true for {letter} in the controller file"
         )
     lengths = {tool.number: tool.length for tool in tools}
     return OnThePart(recover_moves(kept, placed, lengths, name, held[known]), tuple(warnings), tuple(assumptions))

@@ -14,7 +14,7 @@ from pathlib import Path
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import cutter_location
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
-from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
+from toolpath_stiff.nc.cutter_location.statements import HEAD_LINES, looks_like_cutter_location
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
@@ -24,7 +24,7 @@ from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool
 from toolpath_stiff.nc.words import read_lines, split_lines
 from toolpath_stiff.units import Pose, ShopPose, pose_in_mm, pose_in_si
 
-HEAD_LINES = 50  # a file says what it is at its beginning
+# -- other languages ---------------------------------------------------------------------------------------------------
 
 _HEIDENHAIN = "Heidenhain's conversational language"
 _SIEMENS = "Siemens' own language (Sinumerik)"
@@ -48,7 +48,14 @@ _PATTERNS = tuple((what, re.compile(r"\s*(?:N\d+\s+|\d+\s+)?(?:" + sign + ")", r
 
 
 def language_of(line: str) -> str | None:
-    """The other language that a line is written in, or None."""
+    """The other language that a line is written in, or None.
+
+    Examples
+    --------
+    >>> language_of("L X+10 Y+20 R0 F MAX")
+    "Heidenhain's conversational language"
+    >>> language_of("G1 X10 Y20")
+    """
     return next((what for what, pattern in _PATTERNS if pattern.match(line)), None)
 
 
@@ -69,6 +76,8 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
             )
     return None
 
+
+# -- programs ----------------------------------------------------------------------------------------------------------
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -93,8 +102,9 @@ def read_program(
     path
         The program.
     origin, default_origin
-        Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and unless
-        anyone says. Only moves in machine coordinates (G53, G28, G30) depend on it.
+        Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and
+        where neither the caller nor the program says so. Only moves in machine coordinates (G53, G28, G30) depend on
+        it.
     offsets_file
         Work offsets: `G55 = [x, y, z, a, b, c, r]` (mm, degrees) or a LinuxCNC parameter file.
     tool_table
@@ -114,22 +124,21 @@ def read_program(
     ------
     InputError
         With file, line and column, what was found and what was expected.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> program = read_program(files("toolpath_stiff") / "data" / "programs" / "case_study.nc")
+    >>> program
+    <Program case_study.nc: 7 moves, read as generic>
+    >>> [tool.number for tool in program.tools]
+    [1]
     """
-    return _read(
-        _Request(
-            lines=read_lines(path),
-            name=Path(path).name,
-            path=str(path),
-            origin=None if origin is None else _six(origin),
-            default_origin=_six(default_origin),
-            offsets=read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets(),
-            tools=read_tool_table(tool_table) if tool_table else controller.tools,
-            block_delete=block_delete,
-            interpreter=interpreter,
-            rs274=rs274,
-            controller=controller,
-        )
-    )
+    lines, place = read_lines(path), None if origin is None else _six(origin)
+    offsets = read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets()
+    tools = read_tool_table(tool_table) if tool_table else controller.tools
+    options = (offsets, tools, block_delete, interpreter, rs274, controller)
+    return _read(_Request(lines, Path(path).name, str(path), place, _six(default_origin), *options))
 
 
 def parse_program(
@@ -145,22 +154,27 @@ def parse_program(
     rs274: str | None = None,
     controller: Controller = UNKNOWN_CONTROL,
 ) -> Program:
-    """Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`."""
-    return _read(
-        _Request(
-            lines=split_lines(text, name),
-            name=name,
-            path="",
-            origin=None if origin is None else _six(origin),
-            default_origin=_six(default_origin),
-            offsets=offsets or controller.offsets or Offsets(),
-            tools=controller.tools if tools is None else tools,
-            block_delete=block_delete,
-            interpreter=interpreter,
-            rs274=rs274,
-            controller=controller,
-        )
-    )
+    r"""Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`.
+
+    Examples
+    --------
+    >>> program = parse_program("G21 G90 F600\nG0 Z5\nG1 Z-1\nG2 X20 Y0 I10 J0\nM8\nM30\n", "slot.nc")
+    >>> program
+    <Program slot.nc: 3 moves, read as generic>
+    >>> [(note.line, note.word, note.reason) for note in program.unsupported]
+    [(5, 'M8', 'coolant')]
+
+    What cannot be read is refused, with its place and what to do:
+
+    >>> parse_program("G21 G90\nG1 X10\n", "slot.nc")
+    Traceback (most recent call last):
+        ...
+    toolpath_stiff.errors.InputError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0
+    """
+    lines, place = split_lines(text, name), None if origin is None else _six(origin)
+    offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools
+    options = (offsets, tools, block_delete, interpreter, rs274, controller)
+    return _read(_Request(lines, name, "", place, _six(default_origin), *options))
 
 
 @dataclass(frozen=True)
@@ -189,7 +203,7 @@ class _Request:
 
     @property
     def zero(self) -> tuple[ShopPose | None, ShopPose]:
-        """Where G54's zero sits, mm and degrees, as the caller says, and unless anyone says.
+        """Where G54's zero sits, mm and degrees, as the caller says, and by default.
 
         A program that was posted for another machine is read in that one's coordinates first.
         """

@@ -73,16 +73,7 @@ def recover_moves(
     length = _lengths_at_heads(moves, kinematics, held, tool_lengths, name)
     some = [slice(first, first + MOVES_AT_A_TIME) for first in range(0, len(moves), MOVES_AT_A_TIME)]
     count = np.concatenate([_pieces(moves.take(rows), kinematics, held[rows], length[rows]) for rows in some])
-    if count.sum() > MOST_PIECES:
-        worst = int(moves.line[np.argmax(count)])
-        raise InputError(
-            f"dividing moves with turning axes within {mm_from_m(kinematics.tolerance):g} mm gives "
-            f"{float(count.sum()):.0f} pieces",
-            expected=f"at most {MOST_PIECES}",
-            hint="give a larger kinematics.tolerance_mm in the controller file",
-            file=name,
-            line=worst,
-        )
+    _check_pieces(count, moves, kinematics, name)
     found, filled = _room(moves, int(count.sum())), 0
     before: FloatArray | None = None
     for rows in some:
@@ -93,6 +84,18 @@ def recover_moves(
             getattr(found, column.name)[filled : filled + len(part)] = getattr(part, column.name)
         filled += len(part)
     return found.take(slice(0, filled))
+
+
+def _check_pieces(count: IntArray, moves: Moves, kinematics: PostedKinematics, name: str) -> None:
+    if count.sum() > MOST_PIECES:
+        raise InputError(
+            f"dividing moves with turning axes within {mm_from_m(kinematics.tolerance):g} mm gives "
+            f"{float(count.sum()):.0f} pieces",
+            expected=f"at most {MOST_PIECES}",
+            hint="give a larger kinematics.tolerance_mm in the controller file",
+            file=name,
+            line=int(moves.line[np.argmax(count)]),
+        )
 
 
 def _divided(

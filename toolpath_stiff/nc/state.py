@@ -1,4 +1,4 @@
-"""The state of the interpreter: the block in hand, and all that a control keeps from block to block.
+"""The state of the interpreter: the current block, and all that a control keeps from block to block.
 
 mm, degrees, mm/min.
 """
@@ -19,7 +19,6 @@ from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
 from toolpath_stiff.units import MM_PER_INCH
 
 POINT_WORDS = (*AXES, *POLAR)
-FARTHEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
 
 
 class Flow(Enum):
@@ -56,7 +55,7 @@ class CurrentBlock:
         Modal group -> code; no two codes of a group are in one block.
     values
         Letter -> word, of the other words; `free` are the letters that nothing has taken yet.
-    spoke
+    polar_words
         Its polar words (@, ^): the first one, radius and angle.
     flow
         What it asks of whoever runs the blocks, once its own moves are made.
@@ -68,7 +67,7 @@ class CurrentBlock:
     groups: dict[str, str] = field(default_factory=dict)
     values: dict[str, Word] = field(default_factory=dict)
     free: set[str] = field(default_factory=set)
-    spoke: tuple[Word, float | None, float | None] | None = None
+    polar_words: tuple[Word, float | None, float | None] | None = None
     flow: Flow | Call = Flow.NEXT
 
     @property
@@ -86,14 +85,14 @@ class CurrentBlock:
         return letter in self.free
 
     def take(self, letter: str) -> float | None:
-        """The value of a word, which is thereby used; None if the block has none."""
+        """The value of a word, which then counts as used; None if the block has none."""
         if letter not in self.free:
             return None
         self.free.discard(letter)
         return self.values[letter].value
 
     def as_written(self, letter: str) -> Word:
-        """A word with the number of its text, whatever the decimal-point rule made of it."""
+        """A word with the number as written, before the decimal-point rule."""
         return next(word for word in self.block.words if word.letter == letter)
 
     def whole(self, letter: str, word: Word) -> int | None:
@@ -102,7 +101,7 @@ class CurrentBlock:
         if value is None:
             return None
         if value != int(value) or value < 1:
-            raise self.fail(self.values[letter], f"beside {word.text} is no count", "a whole number from 1")
+            raise self.fail(self.values[letter], f"beside {word.text} is not a count", "a whole number from 1")
         return int(value)
 
     def fail(self, word: Word | None, found: str, expected: str = "", hint: str = "") -> InputError:
@@ -111,6 +110,8 @@ class CurrentBlock:
         column = word.column if word else self.block.words[0].column
         return InputError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)
 
+
+# -- what a control keeps ----------------------------------------------------------------------------------------------
 
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
@@ -176,7 +177,7 @@ class State:
     bare, pointed
         The first length without a decimal point, with its line; whether any length ends with its point, as `X10.`.
     trace
-        Each move of the block in hand, for whoever starts the list.
+        Each move of the current block, for whoever starts the list.
     """
 
     name: str
@@ -231,6 +232,6 @@ class State:
         self.unsupported.append(Unsupported(line, word.column, word.text, reason))
 
     def assume(self, sentence: str) -> None:
-        """Note what is taken for granted, once."""
+        """Note an assumption, once."""
         if sentence not in self.assumptions:
             self.assumptions.append(sentence)

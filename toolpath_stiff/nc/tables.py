@@ -12,7 +12,7 @@ from toolpath_stiff.errors import InputError
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
-LARGEST_MM = 1e5
+LARGEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
 # LinuxCNC's parameter file (manual, "Parameters"): G54 is 5221 to 5230, each further offset 20 on; X Y Z A B C U V W R.
 FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
 HOME_G28, HOME_G30 = 5161, 5181
@@ -76,9 +76,20 @@ def _number(text: str, what: str, path: str | Path, line: int) -> float:
 
 
 def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
-    """Tool number -> tool, from a LinuxCNC table (`T1 P1 Z50 D6 ;end mill`) or CSV (`tool,length_mm,...`).
+    r"""Tool number -> tool, from a LinuxCNC table (`T1 P1 Z50 D6 ;end mill`) or CSV (`tool,length_mm,...`).
 
     Lengths are taken as mm in both. Raises `InputError` with the line.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "tool.tbl"
+    ...     _ = file.write_text("T1 P1 Z50 D6 ;end mill\n")
+    ...     tools = read_tool_table(file)
+    >>> tools[1].length, tools[1].diameter, tools[1].remark
+    (50.0, 6.0, 'end mill')
     """
     lines = _lines(path, "tool table")
     filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
@@ -145,16 +156,35 @@ def is_offset(name: str) -> bool:
 
 
 def additional_offset(name: str) -> int | None:
-    """The P of `G54.1 P3` or `G154 P3`, which name the same offset; None for any other name."""
+    """The P of `G54.1 P3` or `G154 P3`, which name the same offset; None for any other name.
+
+    Examples
+    --------
+    >>> additional_offset("G54.1 P3")
+    3
+    >>> additional_offset("G54") is None
+    True
+    """
     found = ADDITIONAL.fullmatch(name)
     return int(found[2]) if found and int(found[2]) <= ADDITIONAL_OFFSETS[found[1]] else None
 
 
 def read_offsets(path: str | Path) -> Offsets:
-    """Work offsets from a file. Raises `InputError` with the line.
+    r"""Work offsets from a file. Raises `InputError` with the line.
 
     Lines are `G55 = [x, y, z, a, b, c, r]` (mm and degrees, short lists allowed), or those of a LinuxCNC parameter
     file (`5221 12.5`).
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "offsets.txt"
+    ...     _ = file.write_text("G54 = [100, -50, 800]\n")
+    ...     offsets = read_offsets(file)
+    >>> offsets.at(0).axes
+    [100.0, -50.0, 800.0, 0.0, 0.0, 0.0]
     """
     lines = _lines(path, "offsets file")
     filled = [(number, line.split("#")[0].strip()) for number, line in enumerate(lines, 1)]
@@ -187,7 +217,15 @@ def read_offsets(path: str | Path) -> Offsets:
 
 
 def set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
-    """Set an offset (x, y, z, a, b, c, r) or a reference point, G28 or G30; missing numbers are 0."""
+    """Set an offset (x, y, z, a, b, c, r) or a reference point, G28 or G30; missing numbers are 0.
+
+    Examples
+    --------
+    >>> offsets = Offsets()
+    >>> set_offset(offsets, "G55", [100.0, 50.0])
+    >>> offsets.at(1)
+    WorkOffset(axes=[100.0, 50.0, 0.0, 0.0, 0.0, 0.0], rotation=0.0, given=True)
+    """
     axes = [*values[:6], *[0.0] * (6 - len(values[:6]))]
     if name == "G28":
         offsets.home_g28 = axes
@@ -204,7 +242,7 @@ def set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
 
 
 def _set_parameter(offsets: Offsets, number: int, value: float) -> None:
-    """One line of a LinuxCNC parameter file; parameters that are no offset are none of ours."""
+    """One line of a LinuxCNC parameter file; other parameters are ignored."""
     for home, first in ((offsets.home_g28, HOME_G28), (offsets.home_g30, HOME_G30)):
         if 0 <= number - first < 6:
             home[number - first] = value

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from toolpath_stiff.errors import InputError
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
-# ASCII digits alone: the digits of other scripts are no numbers to any control.
+# ASCII digits alone: the digits of other scripts are not numbers to any control.
 WORD = re.compile(rf"([A-Z@^])({NUMBER})(E[+-]?\d+)?", re.ASCII)
 AXES = "XYZABC"
 POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
@@ -56,6 +56,12 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     """Read the words of one line. Raises `InputError` with line and column.
 
     `semicolon`: whether `;` begins a comment; else it ends the block, and nothing but blanks may follow it.
+
+    Examples
+    --------
+    >>> block = read_block("N10 G01 X 1.5 (to the edge) Y-2", 1, "part.nc")
+    >>> [(word.letter, word.value, word.column) for word in block.words]
+    [('G', 1.0, 5), ('X', 1.5, 9), ('Y', -2.0, 29)]
     """
     compact, columns = _strip(text, line, name, semicolon)
     if not compact:
@@ -85,7 +91,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
 
 
 def _program_number(compact: str, column: int, line: int, name: str) -> Block:
-    """`O1234` alone is a program's number; any other O word steers subprograms or loops."""
+    """`O1234` alone is a program's number; any other O word controls subprograms or loops."""
     if compact[1:].isascii() and compact[1:].isdigit():
         return Block(line, (Word("O", float(compact[1:]), column, compact),))
     raise InputError(
@@ -157,7 +163,7 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
         letter, number, exponent = match.groups()
         end = match.end()
         if exponent:
-            # An exponent stands without blanks; `X1 E5` is two words, and not a hundred metres.
+            # An exponent stands without blanks; `X1 E5` is two words, not a hundred metres.
             begin = match.start(3)
             apart = columns[begin] - columns[begin - 1] > 1
             if letter in NO_EXPONENT or apart or HAS_E_WORD.search(compact):
@@ -186,7 +192,7 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
 
 
 def _unreadable(compact: str, position: int, column: int, line: int, name: str) -> InputError:
-    """The error for text that is no word, with the reason if it is a known one."""
+    """The error for text that is not a word, with the reason if it is a known one."""
     character = compact[position]
     tail = compact[position : position + 12]
     follower = compact[position + 1 : position + 3].lstrip("+-")[:1]  # `X-[...]` and `X-#1` too
@@ -210,7 +216,7 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
 
 
 def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...]:
-    """Have pygcode read the normalised words; what it does not hand back exactly is an error."""
+    """Let pygcode read the normalised words; what it does not return exactly is an error."""
     if not words:
         return ()
     from pygcode.exceptions import GCodeWordStrError
@@ -258,6 +264,8 @@ def _expected(letter: str) -> str:
     return "a decimal number"
 
 
+# -- text to lines -----------------------------------------------------------------------------------------------------
+
 # Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
 # end-of-file mark of CP/M and DOS (0x1A), which some posts still append.
 BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
@@ -283,7 +291,13 @@ def read_lines(path: str | Path) -> tuple[str, ...]:
 
 
 def split_lines(text: str, name: str) -> tuple[str, ...]:
-    """Split into lines; a byte that no text holds is an error with its line and column."""
+    r"""Split into lines; a byte that no text holds is an error with its line and column.
+
+    Examples
+    --------
+    >>> split_lines("G0 X1\r\nM30\r\n", "part.nc")
+    ('G0 X1', 'M30')
+    """
     joined = text.replace("\r\n", "\n").replace("\r", "\n")
     binary = BINARY.search(joined)
     if binary is not None:

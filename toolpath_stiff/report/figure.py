@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.statistics import class_figures
 from toolpath_stiff.report.words import headline_text, plain, shortened
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
@@ -119,6 +118,8 @@ def drawn(draw: Callable[P, Figure]) -> Picture[P, Drawing]:
 
 def add_heading(figure: Figure, analysis: Analysis) -> None:
     """Program, machine, load, mean and range, and those of the plunges, above everything."""
+    from toolpath_stiff.analysis.statistics import class_figures
+
     width, height = figure.get_size_inches()
     figures = class_figures(analysis, np.arange(len(analysis.samples)))
     figure.text(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.checks import MachineCheck, neutral_words, symmetry_words
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Machine
@@ -23,6 +22,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from toolpath_stiff.analysis.checks import MachineCheck
     from toolpath_stiff.analysis.poses import PoseReport
     from toolpath_stiff.machine.limits import Reach
     from toolpath_stiff.stiffness.model import StiffnessModel
@@ -261,6 +261,8 @@ def text(machine: Machine, stand: Reach) -> str:
 
 def check_text(file: str, model: StiffnessModel, found: MachineCheck) -> str:
     """What is wrong or doubtful in a machine file, what acts, how stiff it is."""
+    from toolpath_stiff.analysis.checks import neutral_words, symmetry_words
+
     machine = model.machine
     verdict = "the file is good" if found.good else f"{len(found.wrong)} things cannot be right"
     if len(found.wrong) == 1:

@@ -36,7 +36,7 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     if current.flow is not Flow.NEXT:
         raise controls.refusal(
             "a subprogram (M98, M99) cannot be rewritten: it may run at several places",
-            "expand subprograms before",
+            "expand the subprograms first",
         )
     axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane
@@ -280,7 +280,7 @@ def _refuse_to_cut(controls: Controls, off_plane: bool, leaning: float) -> None:
         )
     if leaning > LEAN:
         raise controls.refusal(
-            f"between its ends the tool would lean {leaning:.3g} degrees otherwise than placed, as a control "
+            f"between its ends the tool would lean {leaning:.3g} degrees away from its placed direction, as a control "
             "interpolates A, B and C",
             LINEARISE,
         )

@@ -20,7 +20,7 @@ from toolpath_stiff.nc.codes import MOTION, PLANE
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.state import CurrentBlock, Segment, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
-from toolpath_stiff.rewriting.turn import Turn, cutting_rows, differences
+from toolpath_stiff.rewriting.turn import AXIS, END, START, Turn, cutting_rows, differences
 from toolpath_stiff.units import MM_PER_INCH
 
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
@@ -28,6 +28,9 @@ FEED_DECIMALS = 6
 # Added words go behind the last word present of those that come before them here.
 ORDER = ("G", "X", "Y", "Z", "A", "B", "C", "I", "J", "K", "R", "Q", "P", "L", "F")
 NUMBERS = frozenset("XYZABCIJKR")
+
+
+# -- a line ------------------------------------------------------------------------------------------------------------
 
 
 class LineEdit:
@@ -141,6 +144,8 @@ class LineEdit:
         return text if self._points else text.removesuffix(".")
 
 
+# -- the controls ------------------------------------------------------------------------------------------------------
+
 FloatArray = NDArray[np.float64]
 
 DECIMALS_MM, DECIMALS_INCH = 4, 5
@@ -156,11 +161,11 @@ class Controls:
     known
         Axes that the program has put somewhere; of the others only the control knows where they stand.
     block
-        The one in hand.
+        The current one.
     trace
         The moves of that block as the untouched program makes them.
     notes
-        What the user should hear of, each once.
+        What the user should know, each once.
     """
 
     def __init__(self, source: State, out: State, turn: Turn, decimals: int | None, linearise: float | None) -> None:
@@ -179,7 +184,7 @@ class Controls:
             self.notes.append(sentence)
 
     def refusal(self, found: str, hint: str = "") -> InputError:
-        """Why the block in hand cannot be rewritten."""
+        """Why the current block cannot be rewritten."""
         return InputError(found, hint=hint, file=self.source.name, line=self.block.line)
 
     # -- units and axes --------------------------------------------------------------------------------------------
@@ -232,7 +237,7 @@ class Controls:
         return plane
 
     def motion_word(self, current: CurrentBlock | None, edit: LineEdit, wanted: str) -> None:
-        """See to it that the block is executed in the motion mode wanted."""
+        """Make sure that the block is executed in the motion mode wanted."""
         given = None if current is None else current.code(MOTION)
         if given is None:
             if self.out.motion != wanted:
@@ -297,14 +302,16 @@ class Controls:
             found = [found[0]._replace(end=found[-1].end)]
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.block.words if word.letter == "L"), 1.0)
-        what = differences(self.turn, wanted, found, unit * max(repeats, 1.0))
-        if what:
-            raise self.refusal(f"the block cannot be rewritten: its cutting move {what}", self._remedy(what))
+        difference = differences(self.turn, wanted, found, unit * max(repeats, 1.0))
+        if difference is not None:
+            raise self.refusal(
+                f"the block cannot be rewritten: its cutting move {difference.words}", self._remedy(difference.kind)
+            )
 
-    def _remedy(self, what: str) -> str:
+    def _remedy(self, kind: str) -> str:
         unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
         if unknown:
             return f"position {unknown} in rapid before the first cutting move"
-        if what.startswith(("starts", "leans")):
+        if kind in (START, AXIS):
             return "position X, Y, Z and the rotary axes in rapid before it"
-        return "" if what.startswith("ends") else "give more --decimals"
+        return "" if kind == END else "give more --decimals"

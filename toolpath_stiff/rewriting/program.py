@@ -34,7 +34,7 @@ from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import Pose, ShopPose, deg_from_rad, mm_from_m, pose_in_mm
 
 LINE_END = re.compile("\r\n|\n|\r")
-FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # 0.01 mm is no machining; beyond nine a double has no more to say
+FEWEST_DECIMALS, MOST_DECIMALS = 2, 9  # coarser than 0.01 mm is not machining; beyond nine a double has no more digits
 PLAIN_DIALECTS = ("generic", "linuxcnc")
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
@@ -48,7 +48,7 @@ class Rewritten:
     text, encoding
         The program with its line ends, and how the original was encoded.
     notes
-        What the user should hear of, sentences for people.
+        What the user should know, one sentence each.
     """
 
     text: str
@@ -72,7 +72,7 @@ def rewrite_program(
     tools: dict[int, ToolEntry] | None = None,
     block_delete: Switches = False,
 ) -> Rewritten:
-    """Write a program so that at the original origin it does what it does, untouched, at a placement.
+    r"""Write a program so that at the original origin it does what it does, untouched, at a placement.
 
     Parameters
     ----------
@@ -92,9 +92,38 @@ def rewrite_program(
     ------
     InputError
         A block cannot be expressed at the placement, with its line and the reason.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("G21 G90 F600 (slot)\nG0 X0 Y0 Z5\nG1 Z-1\nX40\nM30\n", "slot.nc")
+    >>> rewritten = rewrite_program(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
+    >>> print(rewritten.text, end="")
+    G21 G90 F600 (slot)
+    G0 X100 Y0 Z5
+    G1 Z-1
+    X100 Y40
+    M30
     """
     check_decimals(decimals)
     check_rewritable(program)
+    _check_plain(program)
+    text, encoding = _text_of(program)
+    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    source, out = (_state(program.name, origin, offsets, tools) for origin in (placement, original))
+    tolerance = None if linearise is None else mm_from_m(linearise)
+    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
+    pieces = list(_rewritten_lines(controls, text, program.name, switches_on(block_delete, UNKNOWN_CONTROL)))
+    return Rewritten("".join(pieces), encoding, tuple(controls.notes))
+
+
+def _state(name: str, origin: ShopPose, offsets: Offsets | None, tools: dict[int, ToolEntry] | None) -> State:
+    """A control at its start, with the work at an origin, and offsets and tools of its own."""
+    return State(name, Frames(copy.deepcopy(offsets or Offsets()), origin, origin), copy.deepcopy(tools))
+
+
+def _check_plain(program: Program) -> None:
     if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
         raise InputError(
             "a program is rewritten by the words of the built-in interpreter in the dialects "
@@ -102,26 +131,10 @@ def rewrite_program(
             hint="place it without --write",
             file=program.name,
         )
-    text, encoding = _text_of(program)
-    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
-
-    def frames(origin: ShopPose) -> Frames:
-        return Frames(copy.deepcopy(offsets or Offsets()), origin, origin)
-
-    controls = Controls(
-        State(program.name, frames(placement), copy.deepcopy(tools)),
-        State(program.name, frames(original), copy.deepcopy(tools)),
-        Turn(placement, original),
-        decimals,
-        None if linearise is None else mm_from_m(linearise),
-    )
-    switches = switches_on(block_delete, UNKNOWN_CONTROL)
-    pieces = list(_rewritten_lines(controls, text, program.name, switches))
-    return Rewritten("".join(pieces), encoding, tuple(controls.notes))
 
 
 def check_rewritable(program: Program) -> None:
-    """Raise `InputError` for a file that is no program of a control, or one of another machine's."""
+    """Raise `InputError` for a file that is not a program of a control, or is one of another machine's."""
     if program.kinematics:
         raise InputError(
             f"a program posted for another kinematics ({program.kinematics}) is not rewritten: its words are those of "
@@ -131,14 +144,23 @@ def check_rewritable(program: Program) -> None:
         )
     if program.dialect == CUTTER_LOCATION:
         raise InputError(
-            "a cutter-location file is not rewritten: it is no program that a control runs",
+            "a cutter-location file is not rewritten: it is not a program that a control runs",
             hint="place it without --write, set the work so in the CAM system, or place the posted program",
             file=program.name,
         )
 
 
 def check_decimals(decimals: int | None) -> None:
-    """Raise `InputError` for a number of decimals that makes no program."""
+    """Raise `InputError` for a number of decimals that makes no program.
+
+    Examples
+    --------
+    >>> check_decimals(4)
+    >>> check_decimals(12)
+    Traceback (most recent call last):
+        ...
+    toolpath_stiff.errors.InputError: 12 decimals; expected 2 to 9
+    """
     if decimals is not None and not FEWEST_DECIMALS <= decimals <= MOST_DECIMALS:
         raise InputError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
 
@@ -193,6 +215,8 @@ def _text_of(program: Program) -> tuple[str, str]:
         return content.decode("latin-1"), "latin-1"
 
 
+# -- offset blocks -----------------------------------------------------------------------------------------------------
+
 OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
 NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
@@ -210,7 +234,7 @@ class OffsetBlocks:
 
 
 def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> OffsetBlocks:
-    """Offset blocks that put a program at a placement.
+    r"""Offset blocks that put a program at a placement.
 
     Parameters
     ----------
@@ -226,6 +250,18 @@ def offset_blocks(program: Program, placement: Pose, *, decimals: int = 4) -> Of
     `G10 L2 P1 R` turns X and Y about G54's zero (LinuxCNC manual, "G10 L2"); it goes before the first motion. `G68 X0
     Y0 R` turns the G17 plane about program zero (Fanuc's manuals, "Coordinate system rotation"); it goes after G54 and
     G17, and holds until G69. The numbers of G54 are millimetres.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from toolpath_stiff.nc import parse_program
+    >>> program = parse_program("G21 G90 F600\nG1 X40\nM30\n", "slot.nc")
+    >>> blocks = offset_blocks(program, (0.1, 0.0, 0.8, 0.0, 0.0, pi / 2))
+    >>> blocks.linuxcnc
+    'G21 G10 L2 P1 X100 Y0 Z800 R90'
+    >>> print(blocks.fanuc)
+    G54: X100 Y0 Z800
+    G17 G54 G68 X0 Y0 R90
     """
     reason = _not_here(program) or _not_about_z(program, placement) or _not_g54_alone(program)
     if reason:

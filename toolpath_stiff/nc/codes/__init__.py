@@ -24,7 +24,7 @@ M_SUBPROGRAM, M_OVERRIDES = "M subprogram", "M overrides"
 DWELL, FEED, SPEED, TOOL = "dwell", "F", "S", "T"  # steps of their own: G4, and words that act without a code
 
 # The order in which the codes and words of a block act; the moves come last. Units first, so that an F beside G20 is
-# in inches. `MODES` may be executed ahead of the rest of the block: to do so twice changes nothing but dwells.
+# in inches. `MODES` may be executed ahead of the rest of the block: doing so twice changes nothing but dwells.
 MODES = (
     UNITS, FEED_MODE, FEED, SPEED, TOOL, M_TOOL, DWELL, PLANE, POLAR, LENGTH, M_SUBPROGRAM, OFFSET,
     PATH_CONTROL, SPINDLE_MODE, DISTANCE, ARC_DISTANCE, RETRACT, CUTTER, DIAMETER, SCALING, M_SPINDLE, M_COOLANT,
@@ -50,10 +50,10 @@ class Code:
     group
         Its modal group; two codes of one are an error.
     act
-        What it does: a function of the state, the block in hand and the code's name. A motion code's is called for
+        What it does: a function of the state, the current block and the code's name. A motion code's is called for
         each block as long as its mode is in force.
     meaning
-        In words, for people.
+        In a few words.
     source
         The manual and section that it follows.
     controls
@@ -84,11 +84,11 @@ class Code:
 
     def __post_init__(self) -> None:
         if NAME.fullmatch(self.name) is None:
-            raise ValueError(f"{self.name!r} is no name of a code: expected G1, G59.3, M6, F, S or T")
+            raise ValueError(f"{self.name!r} is not the name of a code: expected G1, G59.3, M6, F, S or T")
         if not callable(self.act):
             raise TypeError(f"{self.name} has no function that acts")
         if self.when not in STEPS:
-            raise ValueError(f"{self.name} acts at {self.when!r}, which is no step of the order of execution")
+            raise ValueError(f"{self.name} acts at {self.when!r}, which is not a step of the order of execution")
         if not self.meaning or not self.source:
             raise ValueError(f"{self.name} needs its meaning and its source")
         if not self.controls or not set(self.controls) <= set(EVERYWHERE):
@@ -128,7 +128,13 @@ class Alias:
 
 
 def code_name(letter: str, value: float) -> str:
-    """`G` and 59.3 to "G59.3", `G` and 1.0 to "G1"."""
+    """`G` and 59.3 to "G59.3", `G` and 1.0 to "G1".
+
+    Examples
+    --------
+    >>> code_name("G", 59.3), code_name("G", 1.0)
+    ('G59.3', 'G1')
+    """
     return f"{letter}{value:g}"
 
 
@@ -143,4 +149,4 @@ def m_codes(section: str) -> str:
 
 
 def holds_anyway(state: State, block: CurrentBlock, code: str) -> None:
-    """What the code asks for changes nothing of a path, or holds anyway."""
+    """What the code asks for does not affect a path, or holds anyway."""

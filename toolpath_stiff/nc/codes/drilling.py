@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes import MOTION, RETRACT, Code, g_codes
-from toolpath_stiff.nc.codes.modes import SECONDS_PER_DAY, time_word
+from toolpath_stiff.nc.codes.modes import time_word
 from toolpath_stiff.nc.codes.motion import record
-from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_spoke
-from toolpath_stiff.nc.geometry import SAME_HEIGHT_MM, Drilling, strokes
+from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_polar_words
+from toolpath_stiff.nc.geometry import MOST_STROKES, SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.moves import CYCLE, RAPID
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
+from toolpath_stiff.units import SECONDS_PER_DAY
 
 CYCLES = ("G73", "G81", "G82", "G83", "G85", "G89")
 PECKS, DWELLS = ("G73", "G83"), ("G82", "G89")
-MOST_STROKES = 100_000  # of one block; beyond, Q or L is a slip
 MOST_REPEATS = 10_000
 RENEWED = ("level", "unit")  # what one cycle leaves to another one of its run
 
@@ -59,8 +59,8 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     _check_pecks(state, block, code, retract - bottom, repeats)
     hole = Drilling(code, bottom, retract, clear, state.sticky.get("Q", 0.0), state.sticky.get("P", 0.0))
     for number in range(repeats):
-        if number and block.spoke is not None:  # each hole's polar words count from the one before
-            words |= xy_of_spoke(state, block)
+        if number and block.polar_words is not None:  # each hole's polar words count from the one before
+            words |= xy_of_polar_words(state, block)
         place = destination(state, block, frames.to_program(frames.position), words)
         place[normal] = level
         record(state, block, RAPID, frames.to_control(place), words)
@@ -94,12 +94,12 @@ def _repeats(state: State, block: CurrentBlock) -> int:
     block.take(letter)
     word = block.as_written(letter)  # a count, whatever a bare K length is
     if word.value != int(word.value) or not 1 <= word.value <= MOST_REPEATS:
-        raise block.fail(word, "is no number of repeats", "a whole number from 1")
+        raise block.fail(word, "is not a number of repeats", "a whole number from 1")
     return int(word.value)
 
 
 def _keep_heights(state: State, block: CurrentBlock, code: str, normal: int) -> None:
-    """G90 or G91 since Z and R were given: Fanuc's hole stays where it is, LinuxCNC reads the numbers anew."""
+    """G90 or G91 since Z and R were given: Fanuc's hole stays where it is, LinuxCNC reads the numbers again."""
     absolute, retract, bottom = state.heights
     if absolute == state.absolute or not {"R", "Z", "level"} <= state.sticky.keys():
         return
@@ -153,7 +153,7 @@ def _check_cycle(state: State, block: CurrentBlock, code: str, normal: int) -> N
         raise block.fail(
             None,
             f"{code} after a change between G20 and G21: controls differ in whether the run keeps its heights",
-            "G80 before it, and R and Z anew",
+            "G80 before it, and R and Z again",
         )
 
 

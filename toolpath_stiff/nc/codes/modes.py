@@ -34,7 +34,9 @@ from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, State
 from toolpath_stiff.nc.words import Word
-from toolpath_stiff.units import MM_PER_INCH
+from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
+
+# -- units, plane, distance modes --------------------------------------------------------------------------------------
 
 
 def units(state: State, block: CurrentBlock, code: str) -> None:
@@ -42,7 +44,9 @@ def units(state: State, block: CurrentBlock, code: str) -> None:
     inch = code == "G20"
     if inch != state.inch and state.frames.tool:
         raise block.fail(
-            block.codes[code], "while a tool length is in force: LinuxCNC would take its number anew", "G49 before it"
+            block.codes[code],
+            "while a tool length is in force: LinuxCNC would read its number in the new unit",
+            "G49 before it",
         )
     state.inch = inch
 
@@ -84,7 +88,7 @@ MODE_ALIASES = (
 )
 
 
-SECONDS_PER_DAY = 86400.0
+# -- feed and spindle --------------------------------------------------------------------------------------------------
 
 
 def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
@@ -105,7 +109,7 @@ def feed_word(state: State, block: CurrentBlock, code: str) -> None:
         units = "inch" if state.inch else "mm"
         raise block.fail(
             word,
-            f"without a decimal point is a feed that hangs on the control's parameters ({state.dialect.name})",
+            f"without a decimal point is a feed that depends on the control's parameters ({state.dialect.name})",
             f"{word.text}. if it is that many {units} per {'revolution' if state.feed_mode == 'G95' else 'minute'}",
         )
     state.feed = feed * state.feed_scale if feed > 0.0 else None
@@ -214,6 +218,9 @@ FEED_CODES = (
 )  # fmt: skip
 
 
+# -- calls and the end -------------------------------------------------------------------------------------------------
+
+
 def call(state: State, block: CurrentBlock, code: str) -> None:
     """M98 P L: run a subprogram; M97 P L (Haas): run from the block with that N number. After the block's own moves."""
     word = block.codes[code]
@@ -224,7 +231,7 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
             hint="give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)",
         )
     if block.groups.get(ONCE) in ("G4", "G10"):
-        raise block.fail(word, "beside a code that wants the P word too", "two blocks")
+        raise block.fail(word, "beside a code that uses the P word too", "two blocks")
     number, repeats = block.whole("P", word), block.whole("L", word)
     if number is None:
         raise block.fail(word, "without P", "P with the number of what it calls")

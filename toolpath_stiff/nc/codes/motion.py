@@ -30,6 +30,8 @@ from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import m_from_mm
 
+# -- a move recorded ---------------------------------------------------------------------------------------------------
+
 STILL = 1e-12  # of a coordinate, or of 1 mm if that is more: what frames' sums leave of an axis that stands
 
 
@@ -90,7 +92,7 @@ def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> 
 
 
 def know_height(state: State, block: CurrentBlock, word: Word | None) -> None:
-    """Refuse what hangs on the present height, if that is lost."""
+    """Refuse what depends on the present height, if that is lost."""
     if state.height_lost:
         raise block.fail(
             word,
@@ -106,6 +108,9 @@ def know_position(state: State, block: CurrentBlock, word: Word, axes: Collectio
         know_height(state, block, word)
     if XY & set(axes):
         know_place(state, block, word)
+
+
+# -- straight moves ----------------------------------------------------------------------------------------------------
 
 
 def straight(state: State, block: CurrentBlock, code: str) -> None:
@@ -177,7 +182,7 @@ def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, wo
     if words and not words.keys() >= XY:
         know_place(state, block, word)
     if not words or XY & words.keys():
-        refuse_while_rotated(state, block, word, "moves X and Y by machine coordinates")
+        refuse_while_rotated(state, block, word, "moves X and Y in machine coordinates")
         forget_polar(state)
         if not words or words.keys() >= XY:
             state.unsettled = None
@@ -195,6 +200,8 @@ STRAIGHT_CODES = (
     Code("G30.1", ONCE, set_home, "set the second reference point", _G30, label=ONCE),
 )
 
+
+# -- arcs --------------------------------------------------------------------------------------------------------------
 
 ARCS = ("G2", "G3")
 MOST_TURNS = 10_000
@@ -251,7 +258,7 @@ def _turns(block: CurrentBlock) -> int:
     if turns is None:
         return 1
     if turns != int(turns) or not 1 <= turns <= MOST_TURNS:
-        raise block.fail(block.values["P"], "is no number of turns", "a whole number from 1")
+        raise block.fail(block.values["P"], "is not a number of turns", "a whole number from 1")
     return int(turns)
 
 

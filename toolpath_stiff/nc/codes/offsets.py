@@ -14,6 +14,8 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, ToolEntry, WorkOffset
 from toolpath_stiff.nc.words import Word
 
+# -- work offsets ------------------------------------------------------------------------------------------------------
+
 
 def work_offset(state: State, block: CurrentBlock, code: str) -> None:
     """G54 to G59.3: that work offset from here on."""
@@ -21,7 +23,7 @@ def work_offset(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
-    """G54.1 P and G154 P: an additional offset; the controller file or G10 must have said where it is."""
+    """G54.1 P and G154 P: an additional offset; the controller file or G10 must have defined it."""
     word = block.codes[code]
     if code not in state.dialect.additional:
         known = " or ".join(state.dialect.additional)
@@ -228,6 +230,8 @@ OFFSET_CODES = (
 )  # fmt: skip
 
 
+# -- tools and their lengths -------------------------------------------------------------------------------------------
+
 HOLDS_TIP = "G43.4"  # tool centre point control
 HOLDS_HINT = (
     "post X, Y, Z, A, B, C of the tip, or name the machine it is posted for ([kinematics] of a controller file)"
@@ -334,14 +338,14 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
     if number == 0:
         if state.dialect.increments:
             return math.nan
-        raise block.fail(block.values["H"], "is no offset on some controls, on LinuxCNC that of its tool", "H or G49")
+        raise block.fail(block.values["H"], "is no offset on some controls, on LinuxCNC that of the tool", "H or G49")
     tool = state.tool if number is None else int(number)
     if number is None and state.renamed:
         raise block.fail(
             word, "without H after M61: controls differ in whose length it takes", f"G43 H{tool}, or T and M6"
         )
     if number is not None and (number < 0 or number != int(number)):
-        raise block.fail(block.values["H"], "is no tool number", "a whole number")
+        raise block.fail(block.values["H"], "is not a tool number", "a whole number")
     if state.tools is None:
         raise block.fail(
             word, f"needs the length of tool {tool}, and there is no tool table", hint="give one with --tools FILE"

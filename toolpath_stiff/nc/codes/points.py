@@ -22,8 +22,11 @@ SAME_PLACE_MM = 1e-9
 XY = frozenset((0, 1))
 
 
+# -- G68, G69 ----------------------------------------------------------------------------------------------------------
+
+
 def rotation(state: State, block: CurrentBlock, code: str) -> None:
-    """G68 X Y R: programmed points turn about X, Y (absolute; without them about the present point). G69: no more.
+    """G68 X Y R: programmed points turn about X, Y (absolute; without them about the present point). G69: rotation off.
 
     On Fanuc's controls incremental words between G68 and the first absolute ones turn about the tool's place at
     G68: from there on they are turned steps, as they are here.
@@ -75,30 +78,30 @@ def refuse_while_rotated(state: State, block: CurrentBlock, word: Word, what: st
 
 
 def forget_polar(state: State) -> None:
-    """The tool went, or the zero moved, otherwise than by polar words: the next ones must name both."""
+    """The tool or the zero moved by other than polar words: the next ones must name both."""
     if state.polar is not None:
         state.polar = [math.nan, math.nan]
 
 
 def zero_moved(state: State) -> None:
-    """Note that the zero of turned coordinates moved: LinuxCNC's rs274 forgets that at the next M6."""
+    """Note that the zero of turned coordinates moved: LinuxCNC's rs274 forgets it at the next M6."""
     if state.frames.offsets.at(state.frames.active).rotation:
         state.rotation_changed = True
 
 
 def know_place(state: State, block: CurrentBlock, word: Word) -> None:
-    """Refuse what hangs on the present X and Y, after a G10 that turned the offset in force."""
+    """Refuse what depends on the present X and Y, after a G10 that turned the offset in force."""
     if state.unsettled == "G10":
         raise block.fail(
             word,
-            "hangs on the present X and Y after G10, or another work offset and M6, turned the coordinates: "
+            "depends on the present X and Y after G10, or another work offset and M6, turned the coordinates: "
             "LinuxCNC's interpreter may have other ones",
             "a move with both X and Y before it",
         )
 
 
 def settle(state: State, block: CurrentBlock, words: dict[int, float]) -> None:
-    """Refuse what a control may take for another point: X and Y had other numbers before the rotation changed."""
+    """Refuse what a control may read as another point: X and Y had other numbers before the rotation changed."""
     named = XY & words.keys()
     if state.unsettled == "G10" and not (state.absolute and named == XY):
         raise block.fail(
@@ -125,11 +128,13 @@ ROTATION_CODES = (
 )
 
 
+# -- axis words --------------------------------------------------------------------------------------------------------
+
 LINEAR = frozenset("XYZ")
 
 
 def axis_words(state: State, block: CurrentBlock) -> dict[int, float]:
-    """Axis index -> value of the block's axis words in mm and degrees; they are thereby used."""
+    """Axis index -> value of the block's axis words in mm and degrees; they then count as used."""
     found = {}
     for index, letter in enumerate(AXES):
         value = block.take(letter)
@@ -140,7 +145,7 @@ def axis_words(state: State, block: CurrentBlock) -> dict[int, float]:
 
 def point_words(state: State, block: CurrentBlock) -> dict[int, float]:
     """As `axis_words`, of a block that moves in program coordinates: under G16 the second one is an angle."""
-    block.spoke = None
+    block.polar_words = None
     if block.has("@") or block.has("^"):
         return _at_radius_and_angle(state, block)
     if state.polar is None:
@@ -211,14 +216,14 @@ def _at_radius_and_angle(state: State, block: CurrentBlock) -> dict[int, float]:
         raise block.fail(word, "is a polar word outside of G17, or under G16 or a rotation", "X and Y")
     if block.has("X") or block.has("Y"):
         raise block.fail(word, "is a polar word beside X or Y", "either")
-    block.spoke = (word, block.take("@"), block.take("^"))
-    return {**axis_words(state, block), **xy_of_spoke(state, block)}
+    block.polar_words = (word, block.take("@"), block.take("^"))
+    return {**axis_words(state, block), **xy_of_polar_words(state, block)}
 
 
-def xy_of_spoke(state: State, block: CurrentBlock) -> dict[int, float]:
+def xy_of_polar_words(state: State, block: CurrentBlock) -> dict[int, float]:
     """X and Y, as words in the distance mode in force, of the block's polar words at the present point."""
-    assert block.spoke is not None
-    word, radius, angle = block.spoke
+    assert block.polar_words is not None
+    word, radius, angle = block.polar_words
     here = state.frames.to_program(state.frames.position)
     present, turn = math.hypot(here[0], here[1]), math.atan2(here[1], here[0])
     if present < SAME_PLACE_MM and (radius is None or angle is None or not state.absolute):
@@ -256,7 +261,7 @@ def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle:
     if math.isnan(polar[0]) or math.isnan(polar[1]):
         raise block.fail(
             block.values[second if radius is None else first],
-            "is half of a polar point, and nothing before says the other half",
+            "is half of a polar point, and nothing before it gives the other half",
             f"{first} (radius) and {second} (angle), absolute",
         )
     state.unsettled = None
@@ -271,11 +276,13 @@ POLAR_CODES = (
 )
 
 
+# -- numbers without a decimal point -----------------------------------------------------------------------------------
+
 ANGLES = frozenset("ABC")
 LENGTHS = frozenset("XYZIJKRQ")
 INCREMENTS = (
     "lengths and angles without a decimal point count least increments (0.001 mm, 0.0001 inch, 0.001 degrees: IS-B), "
-    "as the dialect {} has it"
+    "as in the dialect {}"
 )
 MIXED = (
     "some lengths end with their decimal point (X10.), and {} in line {} has none: Fanuc's and Haas' controls count "
@@ -314,7 +321,7 @@ def assume_increments(state: State) -> None:
 
 
 def watches_points(state: State) -> bool:
-    """Whether the dialect leaves it open what such numbers count, and nothing was said yet."""
+    """Whether the dialect leaves open what such numbers count, and no warning was given yet."""
     return state.dialect.name == GENERIC.name and (state.bare is None or not state.pointed)
 
 

@@ -35,6 +35,8 @@ from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_COD
 from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 
+# -- codes that leave the path alone, and refused ones -----------------------------------------------------------------
+
 
 def path_control(state: State, block: CurrentBlock, code: str) -> None:
     """G61, G61.1, G64: P and Q are tolerances of the blending, which does not enter."""
@@ -127,6 +129,8 @@ REFUSED_CODES = (
 )  # fmt: skip
 
 
+# -- the table ---------------------------------------------------------------------------------------------------------
+
 UNDERSTOOD = (
     *STRAIGHT_CODES, *ARC_CODES, *DRILLING_CODES, *MODE_CODES, *POLAR_CODES, *ROTATION_CODES, *OFFSET_CODES,
     *FEED_CODES, *TOOL_CODES, *FLOW_CODES, *PASSIVE_CODES,
@@ -169,7 +173,13 @@ CHANGES = (
 
 
 def code_meaning(name: str) -> str:
-    """What a code is taken for, in a few words."""
+    """What a code is taken for, in a few words.
+
+    Examples
+    --------
+    >>> code_meaning("G2"), code_meaning("M8"), code_meaning("G41")
+    ('clockwise arc', 'coolant: not acted upon', 'cutter compensation: not supported')
+    """
     if name in CODES:
         code = CODES[name]
         return f"{code.listed}: not acted upon" if code.listed else code.label or code.meaning
@@ -181,7 +191,13 @@ def code_meaning(name: str) -> str:
 
 
 def would_change(text: str) -> str:
-    """What the word at the beginning of `text` would change of the path or its time; "" if nothing is known."""
+    """What the word at the beginning of `text` would change of the path or its time; "" if nothing is known.
+
+    Examples
+    --------
+    >>> would_change("G41 D1")
+    "the whole path, by the tool's radius"
+    """
     for beginnings, changes in CHANGES:
         if (text + " ").startswith(beginnings):
             return changes
@@ -191,8 +207,19 @@ def would_change(text: str) -> str:
     return ""
 
 
+# -- the table as Markdown ---------------------------------------------------------------------------------------------
+
+
 def codes_table() -> str:
-    """The codes that are understood, their other names, and those that are refused, as Markdown tables."""
+    r"""The codes that are understood, their other names, and those that are refused, as Markdown tables.
+
+    Examples
+    --------
+    >>> print("\n".join(codes_table().splitlines()[:3]))
+    | code | group | meaning | function in `nc/codes` | dialects | source |
+    | --- | --- | --- | --- | --- | --- |
+    | G0 | motion | rapid | `motion.straight` | all | LinuxCNC, G-Codes, G0 |
+    """
     understood = [
         (code.name, code.group, _meaning(code), _function(code), _controls(code.controls), code.source)
         for code in CODES.values()

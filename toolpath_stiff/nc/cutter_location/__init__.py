@@ -65,16 +65,22 @@ def read(
     lines, name, path
         The file's lines; its name for messages; where it lies.
     origin, default_origin
-        Where program zero sits, m and rad: as asked for, and unless anyone says.
+        Where program zero sits, m and rad: as asked for, and where neither the caller nor the program says so.
     tools
         Tool table; its lengths win over the file's.
     warnings
-        What the reader has to say beforehand.
+        Warnings of the reader, which come first.
 
     Raises
     ------
     InputError
         With line and column, what was found and what was expected.
+
+    Examples
+    --------
+    >>> lines = ("UNITS/MM", "FEDRAT/600,MMPM", "FROM/0,0,50", "GOTO/0,0,0", "GOTO/40,0,0", "FINI")
+    >>> read(lines, "part.apt", "", None, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), None)
+    <Program part.apt: 2 moves, read as cutter-location file>
     """
     state = State(name, copy.deepcopy(tools))
     run(state, lines)
@@ -179,7 +185,7 @@ def _comment(state: State, lines: tuple[str, ...], at: int) -> None:
 
 
 def _conclude(state: State) -> None:
-    """What is to say of the file as a whole."""
+    """Warnings about the file as a whole."""
     if not state.units_said and len(state.recorder):
         state.assume(NO_UNITS)
     for noted in state.doubtful.values():
@@ -188,7 +194,7 @@ def _conclude(state: State) -> None:
     if state.unsmooth and not state.smooth:
         state.warnings.append(
             f"line {state.first_unsmooth}: the tool turns back where this arc begins, and no arc of the file begins "
-            "smoothly: look whether the arcs turn the right way about their axes"
+            "smoothly: check that the arcs turn the right way about their axes"
         )
 
 
@@ -267,7 +273,7 @@ def in_force(state: State) -> dict[str, str]:
     return {
         "units": "mm" if state.scale == 1.0 else "inch",
         "tool axis": f"{i:g} {j:g} {k:g}",
-        "MULTAX": {None: "not said", True: "on", False: "off"}[state.multax],
+        "MULTAX": {None: "not given", True: "on", False: "off"}[state.multax],
         "feed": feed,
         "spindle": f"{state.speed:g} rpm",
         "tool": str(state.tool),

@@ -29,12 +29,12 @@ from toolpath_stiff.nc.geometry import (
     SAME_POINT,
     ArcError,
     Point2,
+    Vector,
     roll_pitch_of_axis,
 )
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 
-Vector = tuple[float, float, float]
 VERTICAL: Vector = (0.0, 0.0, 1.0)
 SAME_POINT_MM = 5e-4  # start and end closer than this are one point: a whole turn
 # Radii may differ as LinuxCNC allows, or by what two points rounded to 0.0001 inch in each axis make of them.

@@ -24,9 +24,8 @@ from toolpath_stiff.nc.cutter_location.state import (
 )
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, is_number
 from toolpath_stiff.nc.moves import ToolUse
-from toolpath_stiff.units import MM_PER_INCH
+from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUTE
 
-SECONDS_PER_DAY = 86400.0
 MM_PER_FOOT = 12.0 * MM_PER_INCH
 # FEDRAT: mm of its unit (None: the file's length unit), and whether per revolution.
 FEED_UNITS: dict[str, tuple[float | None, bool]] = {
@@ -63,7 +62,7 @@ def units(state: State, statement: Statement) -> None:
     if len(words) != 1 or words[0] not in LENGTH_UNITS:
         raise state.fail(statement.shown, "UNITS/MM or UNITS/INCHES")
     if state.circle is not None:
-        raise state.fail("UNITS/ amid an arc", "UNITS/ before CIRCLE/")
+        raise state.fail("UNITS/ within an arc", "UNITS/ before CIRCLE/")
     if not state.units_said and len(state.recorder) and LENGTH_UNITS[words[0]] != 1.0:
         raise state.fail("UNITS/ after the first points, which were taken as mm", "UNITS/ before any point")
     state.scale, state.units_said = LENGTH_UNITS[words[0]], True
@@ -115,7 +114,7 @@ def spindl(state: State, statement: Statement) -> None:
     found = [place for place, word in enumerate(words) if is_number(word)]
     speeds = [place for place in found if place == 0 or words[place - 1] in before]
     if "SFM" in words or "SMM" in words or (found and not speeds):
-        state.note(state.noted, "a speed that is no number of revolutions")
+        state.note(state.noted, "a speed that is not a number of revolutions")
         state.revolutions = 0.0
     elif speeds:
         state.revolutions = abs(state.number(statement.arguments[speeds[0]]))
@@ -131,7 +130,7 @@ def delay(state: State, statement: Statement) -> None:
     if words[1:]:
         if not state.speed > 0.0:
             raise state.fail("a pause in revolutions without a spindle speed", "SPINDL/ with RPM before it")
-        time *= 60.0 / state.speed
+        time *= SECONDS_PER_MINUTE / state.speed
     if not 0.0 <= time <= SECONDS_PER_DAY:
         raise state.fail(statement.shown, "the seconds, 0 or more")
     state.recorder.add_dwell(time)
@@ -141,7 +140,7 @@ def delay(state: State, statement: Statement) -> None:
 
 
 def multax(state: State, statement: Statement) -> None:
-    """Points carry a tool axis; after MULTAX/OFF a tilted tool must be said again."""
+    """Points carry a tool axis; after MULTAX/OFF a tilted tool must be given again."""
     words = statement.words
     if words not in ([], ["ON"], ["OFF"]):
         raise state.fail(statement.shown, "MULTAX, MULTAX/ON or MULTAX/OFF")
@@ -181,7 +180,7 @@ def shift(state: State, statement: Statement) -> None:
     if statement.arguments and all(is_number(word) for word in statement.words):
         numbers = [state.number(argument) for argument in statement.arguments]
         if len(numbers) == 3 and not any(numbers):
-            state.note(state.noted, "a shift by nothing")
+            state.note(state.noted, "a shift of zero")
             return
     hint = "have the CAM system write the points where they are cut"
     raise state.fail(f"{statement.shown} {SHIFTS}, which is not supported", "0,0,0", hint)
@@ -240,7 +239,7 @@ def _length_of(state: State, number: int, said: float) -> float:
     entry = (state.tools or {}).get(number)
     if entry is None or math.isnan(entry.length):
         if not math.isnan(said):
-            state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools wins over it")
+            state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools takes precedence")
         return said
     if abs(said - entry.length) > SAME_LENGTH_MM:
         state.assume(f"tool {number}: the tool table's length {entry.length:g} mm, not LOADTL's {said:g} mm")

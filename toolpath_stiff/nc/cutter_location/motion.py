@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location import geometry
-from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, AxisError, Circle, Vector, unit_axis
-from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS, SECONDS_PER_DAY
+from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, AxisError, Circle, unit_axis
+from toolpath_stiff.nc.cutter_location.modes import FEED_UNITS
 from toolpath_stiff.nc.cutter_location.state import (
     ALL,
     APT,
@@ -37,15 +37,17 @@ from toolpath_stiff.nc.cutter_location.state import (
 )
 from toolpath_stiff.nc.cutter_location.state import drill as drill_hole
 from toolpath_stiff.nc.cutter_location.statements import Argument, Nested, Statement, is_number, nested
-from toolpath_stiff.nc.geometry import Drilling
+from toolpath_stiff.nc.geometry import MOST_STROKES, Drilling, Vector
 from toolpath_stiff.nc.moves import FEED, RAPID
+from toolpath_stiff.units import SECONDS_PER_DAY
+
+# -- cycles ------------------------------------------------------------------------------------------------------------
 
 # The first word, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip breaking).
 KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73"}
 PAIRS = ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL")
 ALIASES = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}
 EXPAND = "have the CAM system write the moves of the cycle"
-MOST_PECKS = 100_000
 
 
 @dataclass
@@ -111,7 +113,10 @@ def _take_pair(state: State, given: _Given, key: Argument, value: Argument) -> N
     name = ALIASES.get(name, name)
     if is_number(name):
         raise _refusal(
-            state, "a cycle of numbers without words: their order hangs on the CAM system", "pairs, as DEPTH,5", at=key
+            state,
+            "a cycle of numbers without words: their order depends on the CAM system",
+            "pairs, as DEPTH,5",
+            at=key,
         )
     if name in FEED_UNITS:
         given.unit, name = name, "feed"
@@ -125,7 +130,7 @@ def _take_pair(state: State, given: _Given, key: Argument, value: Argument) -> N
 
 
 def _hole(state: State, given: _Given) -> Drilling:
-    """The hole in mm, as it is said."""
+    """The hole in mm, as the statement gives it."""
     values, scale = given.values, state.scale
     dwell = values.get("DWELL", 0.0)
     return Drilling(
@@ -154,7 +159,7 @@ def _check(state: State, given: _Given, hole: Drilling) -> None:
         )
     if hole.peck and not pecks:
         raise state.fail("STEP without DEEP or BRKCHP", "CYCLE/DEEP or CYCLE/BRKCHP")
-    if pecks and (not hole.peck > 0.0 or (clear - hole.bottom) / hole.peck > MOST_PECKS):
+    if pecks and (not hole.peck > 0.0 or (clear - hole.bottom) / hole.peck > MOST_STROKES):
         raise state.fail(f"{shown} without its STEP, or with one too small", "STEP above 0")
     if hole.dwell and pecks:
         raise _refusal(state, "DWELL in a cycle with pecks", "no DWELL")
@@ -189,7 +194,7 @@ def goto(state: State, statement: Statement) -> None:
 def more_points(state: State, statement: Statement) -> None:
     """A line of numbers alone after GOTO: the next point (Creo writes arcs so)."""
     if state.last_word != "GOTO":
-        raise state.fail(f"{statement.text[:30]!r} is no statement", "a word, / and its arguments")
+        raise state.fail(f"{statement.text[:30]!r} is not a statement", "a word, / and its arguments")
     state.circle = state.followed
     to_point(state, state.numbers(statement, 3, 6))
 
@@ -243,14 +248,15 @@ def from_(state: State, statement: Statement) -> None:
     axis = _axis_of(state, numbers)
     if len(state.recorder):
         state.warnings.append(
-            f"line {statement.line}: FROM amid the path: the tool is taken to stand there; how it came is not said"
+            f"line {statement.line}: FROM within the path: the tool is taken to stand there; "
+            "how it got there is not given"
         )
     state.no_circle("FROM/")
     stand(state, state.scaled(numbers[:3]), axis)
 
 
 def gohome(state: State, statement: Statement) -> None:
-    """NX says where home is; without a point it is the control's."""
+    """NX gives the point of home; without one it is the control's."""
     if statement.arguments:
         to_point(state, state.numbers(statement, 3, 6))
         return
@@ -369,7 +375,7 @@ def _arc_through(state: State, targets: list[Vector], axis: Vector) -> None:
     state.circle, state.followed = None, circle
     for target in targets:
         if state.swept and circle.sweep is not None:
-            raise state.fail("a second point of an arc whose ANGLE is said", "one point")
+            raise state.fail("a second point of an arc whose ANGLE is given", "one point")
         state.swept += circular(state, circle, target, axis)
         if circle.sweep is None and state.swept > math.tau * circle.turns + ROUNDING:
             raise state.fail(

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location import geometry
-from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle, Vector
+from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, number_of
-from toolpath_stiff.nc.geometry import Drilling, strokes
+from toolpath_stiff.nc.geometry import Drilling, Vector, strokes
 from toolpath_stiff.nc.moves import ARC, CYCLE, RAPID, Arc, Recorder, ToolUse
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry
 from toolpath_stiff.units import m_from_mm
@@ -40,7 +40,7 @@ class Noted:
 
     @property
     def times(self) -> str:
-        """How often, for a message; nothing if once."""
+        """How often, for a message; empty if once."""
         return f" ({self.count} times)" if self.count > 1 else ""
 
 
@@ -182,7 +182,7 @@ class Word:
     written_by, source
         Which CAM systems write it, "" where that is not known; where it is described.
     form
-        The arguments that are read, for people.
+        The arguments that are read, as the documentation shows them.
     kind
         READ, LISTED, DOUBTFUL or REFUSED: what becomes of it.
     """
@@ -196,7 +196,9 @@ class Word:
     kind: str = READ
 
 
-FIRST_POINT = "the path begins at the file's first point; where the tool comes from is not said (no FROM)"
+# -- moves of the tool tip ---------------------------------------------------------------------------------------------
+
+FIRST_POINT = "the path begins at the file's first point; where the tool comes from is not given (no FROM)"
 FREE_YAW = "the turn of the tool about its own axis (yaw) is free in a cutter-location file; it is 0"
 TURN_FEED = "where the tool turns about its standing tip, a feed of 1 mm/min counts as 1 degree per minute"
 PECKS = "a drilling cycle with STEP or INCR ends its rapids 0.254 mm above the last depth, as LinuxCNC does"

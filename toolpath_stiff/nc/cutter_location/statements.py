@@ -72,7 +72,15 @@ class Statement:
 
 
 def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
-    """Whether a file is a cutter-location file, by its extension or by how it begins."""
+    """Whether a file is a cutter-location file, by its extension or by how it begins.
+
+    Examples
+    --------
+    >>> looks_like_cutter_location(("$$ part 7", "UNITS/MM", "GOTO/1,2,3"), "part.txt")
+    True
+    >>> looks_like_cutter_location(("G21", "G1 X1 F100"), "part.txt")
+    False
+    """
     if name.lower().endswith(EXTENSIONS):
         return True
     seen = 0
@@ -190,7 +198,7 @@ def _parse(pieces: list[tuple[int, int, str]], name: str) -> Statement | None:
     found = _WORD.match(joined)
     if found is None:
         raise InputError(
-            f"{joined.strip()[:40]!r} is no statement of a cutter-location file",
+            f"{joined.strip()[:40]!r} is not a statement of a cutter-location file",
             expected="a word, or a word and / and its arguments",
             hint="definitions and computations need APT's processor: give the file that it or the CAM system writes"
             if "=" in joined

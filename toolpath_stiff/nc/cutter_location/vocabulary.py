@@ -53,7 +53,7 @@ def listed(reason: str) -> Act:
 
 
 def doubted(reason: str) -> Act:
-    """What a word does that hangs on the machine: it is listed, and a warning."""
+    """What a word does that depends on the machine: it is listed, and a warning."""
     return lambda state, statement: state.note(state.doubtful, reason)
 
 
@@ -190,7 +190,7 @@ def _unknown(state: State, statement: Statement) -> None:
     """Listed with a warning, and refused where the word may move the tool or belong to another language."""
     name = statement.word
     if LIKE_G_CODE.match(name) or (not statement.arguments and " " in name):
-        raise state.fail(f"{statement.shown!r} is no statement of a cutter-location file", "a word of APT's")
+        raise state.fail(f"{statement.shown!r} is not a statement of a cutter-location file", "a word of APT's")
     numbers = sum(is_number(argument.text) for argument in statement.arguments)
     carries_point = numbers == len(statement.arguments) >= NUMBERS_OF_A_POINT
     if name.startswith(LIKE_MOTION) or carries_point:
@@ -203,7 +203,15 @@ def _unknown(state: State, statement: Statement) -> None:
 
 
 def words_table() -> str:
-    """The words as a Markdown table, as it stands in docs/nc.md: neighbours with the same meaning share a row."""
+    r"""The words as a Markdown table, as it stands in docs/nc.md: neighbours with the same meaning share a row.
+
+    Examples
+    --------
+    >>> print("\n".join(words_table().splitlines()[:3]))
+    | words | taken for | | written by | source |
+    | --- | --- | --- | --- | --- |
+    | `GOTO/x,y,z[,i,j,k]` | the tool moves to a point | read | all | ISO 4343 |
+    """
     lines = ["| words | taken for | | written by | source |", "| --- | --- | --- | --- | --- |"]
     order = (READ, LISTED, DOUBTFUL, REFUSED)
     words = sorted(WORDS.values(), key=lambda word: order.index(word.kind))

@@ -136,7 +136,7 @@ class _Session:
     def _shift(self, origin: ShopPose | None, default_origin: ShopPose) -> tuple[float, float, float]:
         """How far all work offsets must be moved for machine coordinates to be those of the machine; mm.
 
-        Only G53, G28 and G30 can tell. G10 writes offsets that are machine coordinates already: then none.
+        It matters to G53, G28 and G30 alone. G10 writes offsets that are machine coordinates already: then none.
         """
         g54 = self.offsets.table[0]
         place = origin if origin is not None else None if g54.given else default_origin
@@ -222,7 +222,7 @@ class _Session:
         elif "File ended" in text:  # it did not see the M2 that the copy ends with
             line, text = unclosed(self.lines), "the end of an O word is missing"
         return InputError(
-            f"LinuxCNC's interpreter refuses: {text or 'it broke off without a message'}",
+            f"LinuxCNC's interpreter refuses: {text or 'it stopped without a message'}",
             file=self.name,
             line=line or None,
         )
@@ -230,7 +230,7 @@ class _Session:
     def _first_g54(
         self, run: Run, follower: Follower, offsets: Offsets, shift: tuple[float, float, float]
     ) -> tuple[list[float], bool]:
-        """G54's axes (mm) at the first motion, and whether anyone set them."""
+        """G54's axes (mm) at the first motion, and whether they were set at all."""
         before = [a + s for a, s in zip(offsets.table[0].axes, (*shift, 0.0, 0.0, 0.0), strict=True)]
         given = offsets.table[0].given
         after, _ = first_offset(run.parameters)
@@ -288,7 +288,7 @@ class _Session:
                 "to it"
             )
         warnings += [
-            f"line {line.number}: M66 waits for an input that is not there; what depends on it may be otherwise"
+            f"line {line.number}: M66 waits for an input that is not there; what depends on it may differ"
             for line in self.lines
             if WAITS.search(line.plain)
         ]

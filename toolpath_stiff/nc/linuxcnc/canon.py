@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.geometry import arc_sweep
-from toolpath_stiff.nc.linuxcnc.inputs import Line
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES
@@ -23,7 +23,7 @@ from toolpath_stiff.units import MM_PER_INCH
 
 CALL = re.compile(r"^ *\d+ +N(?:\.+|(\d+)) *([A-Z][A-Z0-9_]*)\((.*)\) *$", re.MULTILINE)
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
-PLANES = {"XY": (0, 1, 2), "XZ": (2, 0, 1), "YZ": (1, 2, 0)}
+PLANES = {"XY": geometry.PLANES["G17"], "XZ": geometry.PLANES["G18"], "YZ": geometry.PLANES["G19"]}
 MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")
 CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
 MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
@@ -31,7 +31,7 @@ HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
-LENGTH_UNKNOWN_BELOW_MM = -9e4  # see tables.UNKNOWN_LENGTH_MM
+LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
 
 Vector = list[float]
@@ -39,7 +39,10 @@ Vector = list[float]
 
 @dataclass
 class Follower:
-    """Follows the canonical commands; `recorder` holds the moves in control coordinates less the `reference`."""
+    """Follows the canonical commands; `recorder` holds the moves in control coordinates less the `reference`.
+
+    A command of `COMMANDS` is a method, which is given the text between its parentheses.
+    """
 
     name: str
     lines: Sequence[Line]
@@ -61,7 +64,7 @@ class Follower:
     rotation: float = 0.0
     tool_z: float = 0.0
     position: Vector = field(default_factory=lambda: [0.0] * 6)
-    feed: float = 0.0  # mm/min, mm/rev, or what is left of it for degrees
+    feed: float = 0.0  # mm/min or mm/rev; degrees/min where only rotary axes move
     feed_scale: float = 1.0
     feed_line: int = 0
     per_revolution: bool = False
@@ -81,20 +84,17 @@ class Follower:
     from_machine: list[bool] = field(default_factory=lambda: [False] * 6)
 
     def follow(self, text: str) -> None:
-        """Take every command. Raises `InputError` for what is no path: probing, splines, a tool without its length."""
-        actions: dict[str, Callable[[str], None]] = {
-            name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
-        }
+        """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
         for match in CALL.finditer(text):
             number, name, inner = match.groups()
-            action = actions.get(name)
+            action = COMMANDS.get(name)
             if action is None:
                 continue
             if number is not None:
                 self.reading = int(number)
                 if not self.tagged:
                     self.line = self.reading
-            action(inner)
+            action(self, inner)
 
     def fail(self, line: int, found: str, expected: str = "", hint: str = "") -> InputError:
         """An error of a line of the program."""
@@ -118,7 +118,7 @@ class Follower:
     def _lengths(self, inner: str) -> Vector:
         return [v * self.scale if i < 3 else v for i, v in enumerate(_numbers(inner)[:6])]
 
-    def _on_use_length_units(self, inner: str) -> None:
+    def _use_length_units(self, inner: str) -> None:
         scale = MM_PER_INCH if "INCH" in inner else 1.0
         if scale != self.scale and self.tool_z:
             raise self.fail(
@@ -131,15 +131,15 @@ class Follower:
         if self.feed_line == self.reading:  # `G20 F20`: rs274 takes F first, controls mean inches
             self.feed_scale = scale
 
-    def _on_set_g5x_offset(self, inner: str) -> None:
+    def _set_g5x_offset(self, inner: str) -> None:
         self.g5x = self._lengths(inner.partition(",")[2])
         self.frame_changed = True
 
-    def _on_set_g92_offset(self, inner: str) -> None:
+    def _set_g92_offset(self, inner: str) -> None:
         self.g92 = self._lengths(inner)
         self.frame_changed = True
 
-    def _on_set_xy_rotation(self, inner: str) -> None:
+    def _set_xy_rotation(self, inner: str) -> None:
         rotation = math.radians(_numbers(inner)[0])
         # G10 that turns the offset in force: rs274 keeps the old numbers of axes that the next move does not name.
         if rotation != self.rotation and "G10" in self._words(self.reading):
@@ -147,7 +147,7 @@ class Follower:
         self.rotation = rotation
         self.frame_changed = True
 
-    def _on_use_tool_length_offset(self, inner: str) -> None:
+    def _use_tool_length_offset(self, inner: str) -> None:
         x, y, z, *rest = (v * self.scale for v in _numbers(inner))
         if x or y or any(rest):
             raise self.fail(self.reading, "a tool offset in other directions than Z", "a length along Z alone")
@@ -166,24 +166,24 @@ class Follower:
         self.tool_length = math.nan if cancelled or not self.reading else z
         self.frame_changed = True
 
-    def _on_select_plane(self, inner: str) -> None:
+    def _select_plane(self, inner: str) -> None:
         self.plane = inner.removeprefix("CANON_PLANE_")
 
     # -- feeds and tools -------------------------------------------------------------------------------------------
 
-    def _on_set_feed_rate(self, inner: str) -> None:
+    def _set_feed_rate(self, inner: str) -> None:
         self.feed, self.feed_scale, self.feed_line = _numbers(inner)[0], self.scale, self.reading
 
-    def _on_set_feed_mode(self, inner: str) -> None:
+    def _set_feed_mode(self, inner: str) -> None:
         self.per_revolution = _numbers(inner)[-1] != 0.0
 
-    def _on_set_spindle_speed(self, inner: str) -> None:
+    def _set_spindle_speed(self, inner: str) -> None:
         self.speed = _numbers(inner)[-1]
 
-    def _on_start_speed_feed_sync(self, inner: str) -> None:
+    def _start_speed_feed_sync(self, inner: str) -> None:
         self.synchronised = abs(_numbers(inner)[0]) * self.scale
 
-    def _on_stop_speed_feed_synch(self, _: str) -> None:
+    def _stop_speed_feed_synch(self, _: str) -> None:
         self.synchronised = 0.0
 
     def _feed_of(self, start: Vector, end: Vector, arc: bool) -> float:
@@ -195,17 +195,17 @@ class Follower:
         rotary = not arc and start[:3] == end[:3]
         return self.feed if rotary else self.feed * self.feed_scale
 
-    def _on_change_tool(self, inner: str) -> None:
+    def _change_tool(self, inner: str) -> None:
         place = int(_numbers(inner)[0])
         self.tool = self.numbers[place - 1] if place else 0
         self.renamed = False
         self.lost, self.raised = self.lost + self.raised, 0.0
 
-    def _on_change_tool_number(self, inner: str) -> None:
-        self._on_change_tool(inner)
+    def _change_tool_number(self, inner: str) -> None:
+        self._change_tool(inner)
         self.renamed = True  # and rs274 goes on with the old one's length and diameter
 
-    def _on_dwell(self, inner: str) -> None:
+    def _dwell(self, inner: str) -> None:
         self.recorder.add_dwell(_numbers(inner)[0])
 
     # -- lines -----------------------------------------------------------------------------------------------------
@@ -213,7 +213,7 @@ class Follower:
     def _words(self, line: int) -> str:
         return self.lines[line - 1].plain if line else ""
 
-    def _on_comment(self, inner: str) -> None:
+    def _comment(self, inner: str) -> None:
         text = inner.strip('"')
         if text.isdigit():
             self.line, self.moves_of_line = int(text), 0
@@ -224,7 +224,7 @@ class Follower:
             self._check_diameter()
 
     def _check_diameter(self) -> None:
-        """rs274 takes 0 for a diameter that its table does not give, and would compensate by nothing."""
+        """rs274 takes 0 for a diameter that its table does not give, and would compensate by zero."""
         words = self._words(self.reading)
         if "G41.1" in words or "G42.1" in words:
             return
@@ -242,24 +242,24 @@ class Follower:
                 hint="give it in a tool table (--tools FILE)",
             )
 
-    def _on_nurbs_feed(self, _: str) -> None:
+    def _nurbs_feed(self, _: str) -> None:
         raise self.fail(self.reading, "a spline, whose points LinuxCNC does not print", hint="post arcs and lines")
 
-    def _on_straight_probe(self, _: str) -> None:
+    def _straight_probe(self, _: str) -> None:
         raise self.fail(self.reading, "probing: what follows depends on what is met", hint="leave probing out")
 
-    def _on_program_end(self, _: str) -> None:
+    def _program_end(self, _: str) -> None:
         self.ended = True
 
     # -- moves -----------------------------------------------------------------------------------------------------
 
-    def _on_straight_traverse(self, inner: str) -> None:
+    def _straight_traverse(self, inner: str) -> None:
         self._move(RAPID, _numbers(inner), None)
 
-    def _on_straight_feed(self, inner: str) -> None:
+    def _straight_feed(self, inner: str) -> None:
         self._move(CYCLE if self.cycle else FEED, _numbers(inner), None)
 
-    def _on_rigid_tap(self, inner: str) -> None:
+    def _rigid_tap(self, inner: str) -> None:
         """Down and, the spindle reversed, back."""
         start = [*self._program_point(), 0.0, 0.0, 0.0]
         end = _numbers(inner)
@@ -275,7 +275,7 @@ class Follower:
             x, y = cos * x + sin * y, cos * y - sin * x
         return [(v - g) / self.scale for v, g in zip((x, y, z), self.g92[:3], strict=True)]
 
-    def _on_arc_feed(self, inner: str) -> None:
+    def _arc_feed(self, inner: str) -> None:
         e1, e2, c1, c2, turns, axis_end, a, b, c = _numbers(inner)
         if self.plane not in PLANES:
             raise self.fail(self.line, f"an arc in the plane {self.plane}", "G17, G18 or G19")
@@ -291,7 +291,7 @@ class Follower:
             self._find_height(end)
         self.raised = 0.0
         start, self.position = self.position, end
-        if self.line == 0:  # a move of ours, before the program
+        if self.line == 0:  # one of the moves that the copy puts before the program
             self.frame_changed = False
             return
         if self.first_motion is None:
@@ -322,7 +322,7 @@ class Follower:
         middle = list(here)
         g = self.g92
         middle[first], middle[second] = c1 * self.scale + g[first], c2 * self.scale + g[second]
-        sweep = arc_sweep(
+        sweep = geometry.arc_sweep(
             (here[first], here[second]),
             (there[first], there[second]),
             (middle[first], middle[second]),
@@ -397,3 +397,30 @@ class Follower:
 
 def _numbers(inner: str) -> Vector:
     return [float(value) for value in NUMBER.findall(inner)]
+
+
+# The commands of LinuxCNC's canonical interface (src/emc/nml_intf/canon.hh) as `rs274` spells them.
+COMMANDS: dict[str, Callable[[Follower, str], None]] = {
+    "USE_LENGTH_UNITS": Follower._use_length_units,
+    "SET_G5X_OFFSET": Follower._set_g5x_offset,
+    "SET_G92_OFFSET": Follower._set_g92_offset,
+    "SET_XY_ROTATION": Follower._set_xy_rotation,
+    "USE_TOOL_LENGTH_OFFSET": Follower._use_tool_length_offset,
+    "SELECT_PLANE": Follower._select_plane,
+    "SET_FEED_RATE": Follower._set_feed_rate,
+    "SET_FEED_MODE": Follower._set_feed_mode,
+    "SET_SPINDLE_SPEED": Follower._set_spindle_speed,
+    "START_SPEED_FEED_SYNC": Follower._start_speed_feed_sync,
+    "STOP_SPEED_FEED_SYNCH": Follower._stop_speed_feed_synch,
+    "CHANGE_TOOL": Follower._change_tool,
+    "CHANGE_TOOL_NUMBER": Follower._change_tool_number,
+    "DWELL": Follower._dwell,
+    "COMMENT": Follower._comment,
+    "NURBS_FEED": Follower._nurbs_feed,
+    "STRAIGHT_PROBE": Follower._straight_probe,
+    "PROGRAM_END": Follower._program_end,
+    "STRAIGHT_TRAVERSE": Follower._straight_traverse,
+    "STRAIGHT_FEED": Follower._straight_feed,
+    "RIGID_TAP": Follower._rigid_tap,
+    "ARC_FEED": Follower._arc_feed,
+}

@@ -23,11 +23,14 @@ from toolpath_stiff.units import MM_PER_INCH
 
 LONGEST_LINE = 250  # rs274 reads at most 255 characters (LINELEN, interp_internal.hh)
 LINE_NUMBER = re.compile(r"N[0-9]+(\.[0-9]+)?")
+# What must not follow the line number of the copy, because it would join it: `1O<x>CALL` would become N11 and a call
+# that no check has seen.
+BARE_NUMBER = tuple("0123456789.")
 NAMED = re.compile(r"<[^<>]*>")
 ABORT = "abort,"
 NO_COMMENTS: tuple[tuple[int, str], ...] = ()
 # Where the line that asks for a move is not the one that rs274 is reading when it prints it (cutter compensation holds
-# moves back), or where more than the move is wanted from its line: cycles, machine coordinates, computed G codes.
+# moves back), or where more than the move is needed from its line: cycles, machine coordinates, computed G codes.
 NEEDS_TAGS = re.compile(r"G(?:4[12]|7[346]|8[1-9]|0*53|28|30|33|[\[#A-Z])")
 
 
@@ -126,7 +129,7 @@ def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, tags: bool
     """The text for `rs274`: after the `prefix`, one line for each of the program's.
 
     Text before a tape mark that follows words, and after it, is treated as by the built-in reader: the second `%`, or
-    one that follows words, ends the program. `M2` is added: LinuxCNC wants an end.
+    one that follows words, ends the program. `M2` is added: LinuxCNC requires an end.
     """
     copy = list(prefix)
     started = False
@@ -146,6 +149,13 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
     aborts = any("".join(text.split()).lower().startswith(ABORT) for _, text in line.comments)
     if not line.words and not aborts:
         return ""
+    if line.words.startswith(BARE_NUMBER):
+        raise InputError(
+            f"a block that begins with a number: {line.words[:20]!r}",
+            expected="a letter before each number",
+            file=name,
+            line=line.number,
+        )
     comment = f"({ABORT}stopped by the program)" if aborts else f"({line.number})" if tags else ""
     if line.words.startswith("O") and not aborts:  # after an O word some forms take no comment
         comment = ""
@@ -160,6 +170,8 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
     return text
 
 
+# -- the fence ---------------------------------------------------------------------------------------------------------
+
 # `py,`, `pyrun`, `pyreload`, and `py` alone or before anything but a letter or digit, whatever blanks are in between;
 # a comment within a comment counts, though LinuxCNC does not look there.
 PYTHON = re.compile(r"[\s(;]*p\s*y(?:\s*(?:[^\w\s]|$|r\s*u\s*n|r\s*e\s*l\s*o\s*a\s*d)|\s)", re.IGNORECASE)
@@ -169,8 +181,6 @@ SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
 OPENS_OR_ENDS = re.compile(r"O(<[^<>]*>|\d+)(END)?(SUB|IF|WHILE|REPEAT)")
 M98 = re.compile(r"M[+]?0*98(?!\d)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
-# These would join the line number that the copy puts before them: `1O<x>CALL` would be N11 and a call that nobody saw.
-BARE_NUMBER = tuple("0123456789.")
 
 
 def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
@@ -180,13 +190,6 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
         for column, text in line.comments:
             if PYTHON.match(text):
                 raise _refused("a comment that runs Python", name, line.number, column)
-        if line.words.startswith(BARE_NUMBER):
-            raise InputError(
-                f"a block that begins with a number: {line.words[:20]!r}",
-                expected="a letter before each number",
-                file=name,
-                line=line.number,
-            )
         if "M" in line.words:
             _check_m_codes(line, name)
     _check_calls(lines, name)
@@ -264,6 +267,8 @@ def unclosed(lines: Iterable[Line]) -> int | None:
 def _key(name: str) -> str:
     return name if name.startswith("<") else str(int(name))
 
+
+# -- tool table and parameters -----------------------------------------------------------------------------------------
 
 # LinuxCNC's manual, "Parameters": the persistent ones must all be there, in order.
 G92_ENABLED, G92_FIRST, ACTIVE_SYSTEM = 5210, 5211, 5220

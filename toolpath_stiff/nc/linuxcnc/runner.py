@@ -1,4 +1,4 @@
-"""Running `rs274` in a folder of its own: no shell, no network, no way out, and an end.
+"""Running `rs274` in a folder of its own: no shell, no network, limits on time, memory and output.
 
 Limits on time, memory and file size by the kernel, and no process beside it (`limiter`); bubblewrap, where it is
 installed and works, makes the whole file system but that folder read-only and takes away the network.
@@ -57,7 +57,7 @@ def find_rs274(path: str | None = None) -> str:
     """The interpreter's path. Raises `InputError` with how to get it."""
     found = shutil.which(path or "rs274")
     if found is None:
-        what = f"{path!r} is no program that can be run" if path else "LinuxCNC's interpreter rs274 is not installed"
+        what = f"{path!r} is not a program that can be run" if path else "LinuxCNC's interpreter rs274 is not installed"
         raise InputError(what, hint=HOW_TO_GET)
     return str(Path(found).resolve())
 
@@ -114,7 +114,7 @@ def _execute(command: list[str], folder: Path, limits: Limits) -> int:
 
 
 def _wait(process: subprocess.Popen[bytes], folder: Path, limits: Limits) -> int:
-    """Exit code, or the signal that it deserves: Python within rs274 has the one for large files ignored."""
+    """Exit code, or the signal in its place: Python within rs274 ignores the one for large files."""
     # A process that sleeps uses no processor time: the clock ends it too.
     end = time.monotonic() + 2 * limits.seconds + 5
     pause = 0.01
@@ -139,7 +139,7 @@ def _limiter(limits: Limits) -> list[str]:
 
 
 def _exceeded(code: int, limits: Limits) -> str:
-    """Which limit an exit code tells of; a shell's or bubblewrap's 128 + n is signal n."""
+    """Which limit an exit code stands for; a shell's or bubblewrap's 128 + n is signal n."""
     number = -code if code < 0 else code - 128
     end = "an endless loop, or a program too long for it"
     if number in (signal.SIGXCPU, signal.SIGKILL):
@@ -148,7 +148,7 @@ def _exceeded(code: int, limits: Limits) -> str:
         return f"LinuxCNC's interpreter was stopped after {limits.file_bytes / 1e6:.0f} MB of output: {end}"
     if number in (signal.SIGABRT, signal.SIGSEGV, signal.SIGBUS):
         memory = limits.memory_bytes >> 20
-        return f"LinuxCNC's interpreter broke down (signal {number}; its memory is limited to {memory} MB)"
+        return f"LinuxCNC's interpreter crashed (signal {number}; its memory is limited to {memory} MB)"
     return ""
 
 
@@ -195,7 +195,7 @@ def _last_line(path: Path) -> int | None:
 
 
 def message_and_line(message: str) -> tuple[str, int | None]:
-    """What rs274 complains of, and the line: it repeats the line it was reading, with our N word."""
+    """The message of rs274, and the line: it repeats the line that it was reading, with the copy's N word."""
     lines = [line.strip() for line in message.splitlines()]
     lines = [line for line in lines if line and line != "executing" and not line.startswith("link (updating")]
     if not lines:
