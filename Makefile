@@ -1,10 +1,11 @@
 # make demo: set up and run the main job on a real program. make test: set up and run every check.
+# make docs: build the site.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PROGRAM ?= programs/pocket.nc
 
-.PHONY: demo test lint benchmark clean
+.PHONY: demo test lint docs dist benchmark clean
 
 demo: $(VENV)/.run
 	$(BIN)/tps analyze $(PROGRAM) --out reports/demo --replace
@@ -20,11 +21,15 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+docs: $(VENV)/.dev
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env -c docs -d docs/_build/doctrees . docs/_build/html
+	@echo "Site: $(CURDIR)/docs/_build/html/index.html"
+
 benchmark: $(VENV)/.dev
 	$(BIN)/python -m benchmarks
 
 clean:
-	rm -rf $(VENV) reports/demo
+	rm -rf $(VENV) reports/demo docs/_build docs/api build dist
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
