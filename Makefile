@@ -1,5 +1,5 @@
 # make demo: set up and run the main job on a real program. make test: set up and run every check.
-# make docs: build the site.
+# make docs: build the site. make dist: build the packages and try them.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -24,6 +24,15 @@ lint: $(VENV)/.dev
 docs: $(VENV)/.dev
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env -c docs -d docs/_build/doctrees . docs/_build/html
 	@echo "Site: $(CURDIR)/docs/_build/html/index.html"
+
+# Wheel and sdist; the wheel goes into an empty environment, where it must print what the README shows.
+dist: $(VENV)/.dev
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist
+	$(PYTHON) -m venv dist/empty
+	dist/empty/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	TPS=$(CURDIR)/dist/empty/bin/tps $(BIN)/python -m pytest tests/test_readme.py
+	rm -rf dist/empty
 
 benchmark: $(VENV)/.dev
 	$(BIN)/python -m benchmarks

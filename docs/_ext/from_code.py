@@ -18,8 +18,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import toolpath_stiff
-from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
-from toolpath_stiff.stiffness.effects.registry import packaged_effects
+from toolpath_stiff.stiffness.effects import LINKS, Effect, Parameter, packaged_effects
 
 DOCS = Path(__file__).parents[1]
 API = DOCS / "api"  # one page for each public name, made and git-ignored
@@ -61,8 +60,6 @@ def effects_in_full() -> str:
 
 
 def _effects() -> list[Effect]:
-    from toolpath_stiff.stiffness.effects.contract import LINKS
-
     return sorted(packaged_effects().values(), key=lambda effect: (LINKS.index(effect.link), effect.name))
 
 
