@@ -48,9 +48,15 @@ def test_commands_print_what_is_shown(tmp_path, monkeypatch, capsys):
 def printed(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     """What a command prints; it must succeed."""
     if TPS:
-        return subprocess.run([TPS, *arguments], capture_output=True, text=True, check=True).stdout
+        return installed(TPS, *arguments)
     assert main(arguments) == 0, arguments
     return capsys.readouterr().out
+
+
+def installed(*command: str) -> str:
+    """What a command of another environment prints, with nothing of this one on its path."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
 
 
 def assert_alike(printed: list[str], expected: list[str]) -> None:
@@ -68,8 +74,7 @@ def test_python_example_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     code = README.split("```python\n", 1)[1].split("```", 1)[0]
     if TPS:
-        python = Path(TPS).with_name("python")
-        out = subprocess.run([python, "-c", code], capture_output=True, text=True, check=True).stdout
+        out = installed(str(Path(TPS).with_name("python")), "-c", code)
     else:
         exec(compile(code, "README.md", "exec"), {})
         out = capsys.readouterr().out
