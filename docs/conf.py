@@ -1,7 +1,7 @@
 """The documentation site: `make docs` builds it into docs/_build/html, without network.
 
 The source directory is the repository itself, so that a link between two pages is the same relative path on the site
-and in a checkout. What can be read from the code is made by `docs/_ext` while the site is built.
+and in a checkout. What can be read from the code is made by `docs/from_code.py` while the site is built.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
+sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import toolpath_stiff  # noqa: E402
 

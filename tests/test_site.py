@@ -22,7 +22,7 @@ from toolpath_stiff.stiffness.effects import packaged_effects
 pytest.importorskip("sphinx")
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
-SPEC = importlib.util.spec_from_file_location("from_code", DOCS / "_ext" / "from_code.py")
+SPEC = importlib.util.spec_from_file_location("from_code", DOCS / "from_code.py")
 from_code = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(from_code)
 # Tags that make a browser fetch something, and where from; `a` waits for a click.
@@ -152,7 +152,7 @@ def test_public_names_have_a_page(pages):
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
 def test_what_is_committed_of_the_code_is_up_to_date(page):
     text = page.read_text("utf-8")
-    assert from_code.fill(text, from_code.COMMITTED) == text, "make it again: python docs/_ext/from_code.py"
+    assert from_code.fill(text, from_code.COMMITTED) == text, "make it again: python docs/from_code.py"
 
 
 def test_help_is_safe_within_markdown():

@@ -1,7 +1,7 @@
-"""What the pages hold that the code knows: effects, codes, commands, the public API.
+"""What the pages hold that the code knows: effects, codes, words, commands, the public API.
 
-A page marks the place with two comments, `<!-- made: NAME -->` and `<!-- end: NAME -->`. Sphinx fills it while it reads
-the page; `python docs/_ext/from_code.py` writes the parts of `COMMITTED` into the pages themselves, for GitHub.
+A page marks the place with two comments, `<!-- NAME: made by ... -->` and `<!-- end of NAME -->`. Sphinx fills it while
+it reads the page; `python docs/from_code.py` writes the parts of `COMMITTED` into the pages themselves, for GitHub.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).parents[2]))
+    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import toolpath_stiff
+from toolpath_stiff.nc.codes.registry import codes_table
+from toolpath_stiff.nc.cutter_location.vocabulary import words_table
 from toolpath_stiff.stiffness.effects import LINKS, Effect, Parameter, packaged_effects
 
-DOCS = Path(__file__).parents[1]
+DOCS = Path(__file__).parent
 API = DOCS / "api"  # one page for each public name, made and git-ignored
 HELP_WIDTH = 90
 
@@ -28,11 +30,10 @@ HELP_WIDTH = 90
 def fill(text: str, parts: dict[str, Callable[[], str]]) -> str:
     """A page with each part that it marks made anew."""
     for name, make in parts.items():
-        begin, end = f"<!-- made: {name} -->", f"<!-- end: {name} -->"
-        if begin in text:
-            before, rest = text.split(begin, maxsplit=1)
-            after = rest.split(end, maxsplit=1)[1]
-            text = f"{before}{begin}\n\n{make().strip()}\n\n{end}{after}"
+        place = re.compile(rf"(<!-- {name}: made by .*? -->).*(<!-- end of {name} -->)", re.DOTALL)
+        if place.search(text):
+            made = f"\n\n{make().strip()}\n\n"
+            text = place.sub(lambda found, made=made: f"{found[1]}{made}{found[2]}", text)
     return text
 
 
@@ -210,7 +211,12 @@ def _page(name: str, kind: str) -> str:
     return f"# {name}\n\n```{{eval-rst}}\n.. {directive}:: toolpath_stiff.{name}\n```\n"
 
 
-COMMITTED: dict[str, Callable[[], str]] = {"table of effects": effects_table, "effects": effects_in_full}
+COMMITTED: dict[str, Callable[[], str]] = {
+    "codes": codes_table,
+    "words": words_table,
+    "table of effects": effects_table,
+    "effects": effects_in_full,
+}
 MADE = {**COMMITTED, "commands": commands, "api": api}
 
 
