@@ -64,9 +64,11 @@ nb_merge_streams = True
 default_role = "literal"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
-autodoc_typehints = "none"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
-autodoc_default_options = {"members": True, "show-inheritance": True}
+autodoc_default_options = {"members": True}
 autosummary_generate = False
 
 html_theme = "pydata_sphinx_theme"

@@ -174,17 +174,20 @@ def api() -> str:
     for kind, names in _public().items():
         lines += [f"## {kind}", ""]
         lines += rows(("name", "what it is"), *((f"[`{name}`](api/{name}.md)", _summary(name)) for name in names))
-        lines += [""]
+        lines += ["", "```{toctree}", ":hidden:", "", *(f"api/{name}" for name in names), "```", ""]
     return "\n".join(lines)
 
 
 def _public() -> dict[str, list[str]]:
-    """The names of `toolpath_stiff.__all__` by kind: functions, classes, errors."""
-    kinds: dict[str, list[str]] = {"Functions": [], "Classes": [], "Errors": []}
+    """The names of `toolpath_stiff.__all__` by kind."""
+    kinds: dict[str, list[str]] = {"What goes in": [], "Functions": [], "Results": [], "Errors": []}
     for name in toolpath_stiff.__all__:
         value = getattr(toolpath_stiff, name)
         if inspect.isclass(value):
-            kinds["Errors" if issubclass(value, Exception) else "Classes"].append(name)
+            ancestors = {base.__name__ for base in value.__mro__}
+            kinds["Errors" if "TpsError" in ancestors else "Results" if "Result" in ancestors else "What goes in"] += [
+                name
+            ]
         elif callable(value):
             kinds["Functions"].append(name)
     return {kind: names for kind, names in kinds.items() if names}
@@ -207,8 +210,9 @@ def write_api_pages(app: Any) -> None:
 
 
 def _page(name: str, kind: str) -> str:
-    directive = {"Functions": "autofunction", "Classes": "autoclass", "Errors": "autoexception"}[kind]
-    return f"# {name}\n\n```{{eval-rst}}\n.. {directive}:: toolpath_stiff.{name}\n```\n"
+    directive = {"Functions": "autofunction", "Errors": "autoexception"}.get(kind, "autoclass")
+    options = {"Results": "   :inherited-members:\n", "Errors": "   :show-inheritance:\n"}.get(kind, "")
+    return f"# {name}\n\n```{{eval-rst}}\n.. {directive}:: toolpath_stiff.{name}\n{options}```\n"
 
 
 COMMITTED: dict[str, Callable[[], str]] = {
@@ -220,6 +224,20 @@ COMMITTED: dict[str, Callable[[], str]] = {
 MADE = {**COMMITTED, "commands": commands, "api": api}
 
 
+def on_docstring(app: Any, what: str, name: str, value: object, options: Any, lines: list[str]) -> None:
+    """Put the first line of a property together again: napoleon takes what stands before a colon for its type."""
+    for number, line in enumerate(lines if what == "property" else []):
+        if line.startswith(":type: "):
+            lines[0] = f"{line.removeprefix(':type: ')}: {lines[0]}"
+            del lines[number]
+            return
+
+
+def on_signature(app: Any, what: str, name: str, value: object, *_: object) -> tuple[str, None] | None:
+    """Results are made by functions, so that how they are called does not matter to a reader."""
+    return ("", None) if what == "class" and name.rsplit(".", 1)[-1] in _public().get("Results", []) else None
+
+
 def on_source_read(app: Any, docname: str, source: list[str]) -> None:
     """Fill a page as Sphinx reads it."""
     source[0] = fill(source[0], MADE)
@@ -229,6 +247,8 @@ def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
     app.connect("builder-inited", write_api_pages)
     app.connect("source-read", on_source_read)
+    app.connect("autodoc-process-docstring", on_docstring, priority=600)  # after napoleon
+    app.connect("autodoc-process-signature", on_signature)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
