@@ -55,6 +55,7 @@ smartquotes = False  # --out is not a dash
 html_math_renderer = "mathml"
 
 nb_execution_mode = "force"
+nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_execution_show_tb = True
