@@ -1,10 +1,11 @@
 # make demo: set up and run the main job on a real program. make test: set up and run every check.
+# make docs: build the site. make dist: build the packages and try them.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PROGRAM ?= programs/pocket.nc
 
-.PHONY: demo test lint benchmark clean
+.PHONY: demo test lint docs dist benchmark clean
 
 demo: $(VENV)/.run
 	$(BIN)/tps analyze $(PROGRAM) --out reports/demo --replace
@@ -20,11 +21,24 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+docs: $(VENV)/.dev
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env -c docs -d docs/_build/doctrees . docs/_build/html
+	@echo "Site: $(CURDIR)/docs/_build/html/index.html"
+
+# Wheel and sdist; the wheel goes into an empty environment, where it must print what the README shows.
+dist: $(VENV)/.dev
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist
+	$(PYTHON) -m venv dist/empty
+	dist/empty/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	TPS=$(CURDIR)/dist/empty/bin/tps $(BIN)/python -m pytest tests/test_readme.py
+	rm -rf dist/empty
+
 benchmark: $(VENV)/.dev
 	$(BIN)/python -m benchmarks
 
 clean:
-	rm -rf $(VENV) reports/demo
+	rm -rf $(VENV) reports/demo docs/_build docs/api build dist
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

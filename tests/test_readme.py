@@ -1,8 +1,13 @@
-"""What the README shows is what the commands print."""
+"""What the README shows is what the commands print.
+
+With TPS=.../bin/tps in the environment it is the installed tool that is run (`make dist`), else the checkout.
+"""
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,6 +15,7 @@ import pytest
 from toolpath_stiff.cli.main import main
 
 ROOT = Path(__file__).parent.parent
+TPS = os.environ.get("TPS")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
@@ -36,8 +42,21 @@ def test_commands_print_what_is_shown(tmp_path, monkeypatch, capsys):
         arguments = command.split("#")[0].split()[1:]
         if arguments[0] in ("analyze", "place", "diagnose", "update"):
             arguments.append("--no-plots")
-        assert main(arguments) == 0, command
-        assert_alike(capsys.readouterr().out.splitlines()[: len(shown(command))], shown(command))
+        assert_alike(printed(arguments, capsys).splitlines()[: len(shown(command))], shown(command))
+
+
+def printed(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """What a command prints; it must succeed."""
+    if TPS:
+        return installed(TPS, *arguments)
+    assert main(arguments) == 0, arguments
+    return capsys.readouterr().out
+
+
+def installed(*command: str) -> str:
+    """What a command of another environment prints, with nothing of this one on its path."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
 
 
 def assert_alike(printed: list[str], expected: list[str]) -> None:
@@ -50,11 +69,16 @@ def assert_alike(printed: list[str], expected: list[str]) -> None:
             assert [float(number) for number in NUMBER.findall(line)] == pytest.approx(numbers, rel=5e-3), line
 
 
-def test_python_example_runs(monkeypatch, capsys):
-    monkeypatch.chdir(ROOT)
+def test_python_example_runs(tmp_path, monkeypatch, capsys):
+    (tmp_path / "programs").symlink_to(ROOT / "programs")
+    monkeypatch.chdir(tmp_path)
     code = README.split("```python\n", 1)[1].split("```", 1)[0]
-    exec(compile(code, "README.md", "exec"), {})
-    assert "stiffness_N_per_mm" in capsys.readouterr().out
+    if TPS:
+        out = installed(str(Path(TPS).with_name("python")), "-c", code)
+    else:
+        exec(compile(code, "README.md", "exec"), {})
+        out = capsys.readouterr().out
+    assert "stiffness_N_per_mm" in out
 
 
 def test_links_lead_somewhere():

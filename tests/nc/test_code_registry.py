@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import runpy
-from pathlib import Path
 
 import pytest
 
@@ -13,11 +11,8 @@ from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.codes import EVERYWHERE, MOTION, ONCE, STEPS, Code, holds_anyway
 from toolpath_stiff.nc.codes.registry import ALIASES, CODES, REFUSED, code_meaning, codes_table, table
 from toolpath_stiff.nc.controller import DIALECTS, Controller
-from toolpath_stiff.nc.cutter_location.vocabulary import words_table
 from toolpath_stiff.nc.plain_lines import MODE_NAMES
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
-
-PAGE = Path(__file__).parents[2] / "docs" / "nc.md"
 
 
 @pytest.mark.parametrize("name", CODES)
@@ -105,14 +100,6 @@ def test_groups_that_other_modules_name():
     assert {name for name, code in CODES.items() if code.takes_axes and code.group == ONCE} == {
         "G10", "G28", "G30", "G52", "G92",
     }  # fmt: skip
-
-
-def test_the_page_holds_the_tables_as_they_are():
-    """Of codes, and of the words of cutter-location files."""
-    page = PAGE.read_text("utf-8")
-    with_tables = runpy.run_path(str(PAGE.with_name("tables.py")))["with_tables"]
-    assert with_tables(page) == page, "make it again: python docs/tables.py"
-    assert codes_table() in page and words_table() in page
 
 
 def test_the_table_names_every_code_once():

@@ -30,6 +30,7 @@ __all__ = [
     "effects_from_file",
     "find_effect",
     "known_effects",
+    "packaged_effects",
 ]
 
 ENTRY_POINTS = "toolpath_stiff.effects"

@@ -1,0 +1,266 @@
+"""What the pages hold that the code knows: effects, codes, words, commands, the public API.
+
+A page marks the place with two comments, `<!-- NAME: made by ... -->` and `<!-- end of NAME -->`. Sphinx fills it while
+it reads the page; `python docs/from_code.py` writes the parts of `COMMITTED` into the pages themselves, for GitHub.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import toolpath_stiff
+from toolpath_stiff.nc.codes.registry import codes_table
+from toolpath_stiff.nc.cutter_location.vocabulary import words_table
+from toolpath_stiff.stiffness.effects import LINKS, Effect, Parameter, packaged_effects
+
+DOCS = Path(__file__).parent
+API = DOCS / "api"  # one page for each public name, made and git-ignored
+HELP_WIDTH = 90
+
+
+def fill(text: str, parts: dict[str, Callable[[], str]]) -> str:
+    """A page with each part that it marks made anew."""
+    for name, make in parts.items():
+        place = re.compile(rf"(<!-- {name}: made by .*? -->).*(<!-- end of {name} -->)", re.DOTALL)
+        if place.search(text):
+            made = f"\n\n{make().strip()}\n\n"
+            text = place.sub(lambda found, made=made: f"{found[1]}{made}{found[2]}", text)
+    return text
+
+
+def rows(*lines: Iterable[str]) -> Iterator[str]:
+    """Lines of a Markdown table; the first are its headings."""
+    for number, cells in enumerate(lines):
+        row = [cell.replace("|", r"\|") for cell in cells]
+        yield f"| {' | '.join(row)} |"
+        if number == 0:
+            yield f"|{' --- |' * len(row)}"
+
+
+# Effects
+
+
+def effects_table() -> str:
+    """One row for each packaged effect, along the load path."""
+    found = [(f"[`{effect.name}`](#{effect.name})", effect.link, effect.title, _keys(effect)) for effect in _effects()]
+    return "\n".join(rows(("effect", "link", "what it is", "parameters and their bounds"), *found))
+
+
+def effects_in_full() -> str:
+    """A section for each packaged effect: what it is, equation, needs, parameters with the source of their sizes."""
+    return "\n\n".join(_effect(effect) for effect in _effects())
+
+
+def _effects() -> list[Effect]:
+    return sorted(packaged_effects().values(), key=lambda effect: (LINKS.index(effect.link), effect.name))
+
+
+def _keys(effect: Effect) -> str:
+    return "; ".join(f"`{p.key}` {_bounds(p)}" for p in effect.parameters)
+
+
+def _bounds(p: Parameter) -> str:
+    return "a name" if p.kind == "text" else f"{_number(p.bounds[0])} to {_number(p.bounds[1])}"
+
+
+def _number(value: float) -> str:
+    return f"{value:g}".replace("e+0", "e")
+
+
+def _effect(effect: Effect) -> str:
+    about = " ".join((inspect.getdoc(type(effect)) or "").split("\n\n")[0].split())
+    further = (inspect.getdoc(type(effect)) or "").split("\n\n")[1:]
+    lines = [f"### {effect.name}", "", about]
+    for paragraph in further:
+        lines += ["", " ".join(paragraph.split())]
+    lines += ["", f"Equation: `{effect.equation}`. Source: {effect.source}."]
+    if effect.load_dependent:
+        lines += ["", "It depends on the size of the load (`--force`); the stiffness is the secant one."]
+    if effect.needs:
+        columns = ", ".join(f"`{name}`" for name in effect.needs)
+        lines += ["", f"It needs {columns}: [what an effect waits for](effects.md#what-an-effect-waits-for)."]
+    table = [("key", "meaning", "bounds", "typical", "source of the typical size")]
+    table += [
+        (f"`{p.key}`", p.meaning or p.name, _bounds(p), "chosen" if p.discrete else _typical(p), p.source)
+        for p in effect.parameters
+    ]
+    return "\n".join([*lines, "", *rows(*table)])
+
+
+def _typical(p: Parameter) -> str:
+    return f"{_number(p.typical[0])} to {_number(p.typical[1])} {p.unit}".rstrip()
+
+
+# Commands
+
+
+def commands() -> str:
+    """Every command and every action of a command, with its usage and options, from the parsers themselves."""
+    from toolpath_stiff.cli.main import COMMANDS, build_parser
+
+    lines: list[str] = []
+    for group in dict.fromkeys(command.group for command in COMMANDS):
+        lines += [f"## {group}", ""]
+        for command in COMMANDS:
+            if command.group == group:
+                whole = build_parser(command.name)
+                lines += _command(_actions(whole)[command.name], command.help, 3)
+    return "\n".join(lines)
+
+
+def _actions(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            return dict(action.choices)
+    return {}
+
+
+def _command(parser: argparse.ArgumentParser, about: str, level: int) -> list[str]:
+    formatter = argparse.HelpFormatter(parser.prog, width=HELP_WIDTH)
+    formatter.add_usage(parser.usage, parser._actions, parser._mutually_exclusive_groups)
+    lines = ["#" * level + " " + parser.prog, "", _escaped(about[:1].upper() + about[1:]) + ".", ""]
+    lines += ["```text", formatter.format_help().strip(), "```", ""]
+    for group in parser._action_groups:
+        lines += _options(group, formatter)
+    if parser.epilog:
+        lines += ["```text", parser.epilog.strip(), "```", ""]
+    helps = {
+        choice.dest: choice.help or ""
+        for action in parser._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for choice in action._choices_actions
+    }
+    for name, sub in _actions(parser).items():
+        lines += _command(sub, helps[name], level + 1)
+    return lines
+
+
+def _options(group: argparse._ArgumentGroup, formatter: argparse.HelpFormatter) -> list[str]:
+    """Definitions of a group's options; what every command has, and the actions, are left out."""
+    lines = []
+    for action in group._group_actions:
+        if action.help in (None, argparse.SUPPRESS) or isinstance(
+            action, argparse._HelpAction | argparse._SubParsersAction
+        ):
+            continue
+        lines += [f"`{formatter._format_action_invocation(action)}`"]
+        lines += [f": {_escaped(formatter._expand_help(action))}", ""]
+    if lines and group.title not in ("options", "positional arguments", "optional arguments"):
+        lines[:0] = [f"**{_escaped(str(group.title))}**", ""]
+    return lines
+
+
+def _escaped(text: str) -> str:
+    """Plain text, safe within Markdown; what stands between backticks stays code."""
+    parts = re.split(r"(`[^`]*`)", " ".join(text.split()))
+    return "".join(part if part.startswith("`") else re.sub(r"([\\*_<>\[\]$#|{}])", r"\\\1", part) for part in parts)
+
+
+# The public API
+
+
+def api() -> str:
+    """Tables of the public names by kind, each with the first line of its docstring."""
+    lines: list[str] = []
+    for kind, names in _public().items():
+        lines += [f"## {kind}", ""]
+        lines += rows(("name", "what it is"), *((f"[`{name}`](api/{name}.md)", _summary(name)) for name in names))
+        lines += ["", "```{toctree}", ":hidden:", "", *(f"api/{name}" for name in names), "```", ""]
+    return "\n".join(lines)
+
+
+def _public() -> dict[str, list[str]]:
+    """The names of `toolpath_stiff.__all__` by kind."""
+    kinds: dict[str, list[str]] = {"What goes in": [], "Functions": [], "Results": [], "Errors": []}
+    for name in toolpath_stiff.__all__:
+        value = getattr(toolpath_stiff, name)
+        if inspect.isclass(value):
+            ancestors = {base.__name__ for base in value.__mro__}
+            kinds["Errors" if "TpsError" in ancestors else "Results" if "Result" in ancestors else "What goes in"] += [
+                name
+            ]
+        elif callable(value):
+            kinds["Functions"].append(name)
+    return {kind: names for kind, names in kinds.items() if names}
+
+
+def _summary(name: str) -> str:
+    return " ".join((inspect.getdoc(getattr(toolpath_stiff, name)) or "").split("\n\n")[0].split())
+
+
+def write_api_pages(app: Any) -> None:
+    """One page for each public name; those of names that are gone are removed."""
+    API.mkdir(exist_ok=True)
+    pages = {f"{name}.md": _page(name, kind) for kind, names in _public().items() for name in names}
+    for old in API.glob("*.md"):
+        if old.name not in pages:
+            old.unlink()
+    for file, text in pages.items():
+        if not (API / file).exists() or (API / file).read_text("utf-8") != text:
+            (API / file).write_text(text, "utf-8")
+
+
+def _page(name: str, kind: str) -> str:
+    directive = {"Functions": "autofunction", "Errors": "autoexception"}.get(kind, "autoclass")
+    options = {"Results": "   :inherited-members:\n", "Errors": "   :show-inheritance:\n"}.get(kind, "")
+    return f"# {name}\n\n```{{eval-rst}}\n.. {directive}:: toolpath_stiff.{name}\n{options}```\n"
+
+
+COMMITTED: dict[str, Callable[[], str]] = {
+    "codes": codes_table,
+    "words": words_table,
+    "table of effects": effects_table,
+    "effects": effects_in_full,
+}
+MADE = {**COMMITTED, "commands": commands, "api": api}
+
+
+def on_docstring(app: Any, what: str, name: str, value: object, options: Any, lines: list[str]) -> None:
+    """Put the first line of a property together again: napoleon takes what stands before a colon for its type."""
+    for number, line in enumerate(lines if what == "property" else []):
+        if line.startswith(":type: "):
+            lines[0] = f"{line.removeprefix(':type: ')}: {lines[0]}"
+            del lines[number]
+            return
+
+
+def on_signature(app: Any, what: str, name: str, value: object, *_: object) -> tuple[str, None] | None:
+    """Results are made by functions, so that how they are called does not matter to a reader."""
+    return ("", None) if what == "class" and name.rsplit(".", 1)[-1] in _public().get("Results", []) else None
+
+
+def on_source_read(app: Any, docname: str, source: list[str]) -> None:
+    """Fill a page as Sphinx reads it."""
+    source[0] = fill(source[0], MADE)
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Register with Sphinx."""
+    app.connect("builder-inited", write_api_pages)
+    app.connect("source-read", on_source_read)
+    app.connect("autodoc-process-docstring", on_docstring, priority=600)  # after napoleon
+    app.connect("autodoc-process-signature", on_signature)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def main() -> None:
+    """Write the committed parts into their pages."""
+    for page in sorted(DOCS.glob("*.md")):
+        text = page.read_text("utf-8")
+        made = fill(text, COMMITTED)
+        if made != text:
+            page.write_text(made, "utf-8")
+            print(f"wrote {page.relative_to(DOCS.parent)}")
+
+
+if __name__ == "__main__":
+    main()
