@@ -40,8 +40,8 @@ from toolpath_stiff.updating.comparison.structure import (
     far_off,
     find_structure,
 )
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.fits import Baseline, Fit, deviation_percent, error_figures
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
+from toolpath_stiff.updating.inference.fits import Baseline, deviation_percent, error_figures
 from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, Noise, Scatter, covariance, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements

@@ -17,10 +17,10 @@ from toolpath_stiff.updating.correction import Correction
 from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
 from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
 from toolpath_stiff.updating.diagnosis.document import interval, json_number, rounded_errors
+from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import (
     LAW_REFITTED,
     NORMAL_95,
-    Fit,
     deviation_percent,
     errors_text,
     gain_in_standard_errors,

@@ -14,8 +14,8 @@ from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.diagnosis.words import next_steps, verdict_text, why
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, Judgement
 from toolpath_stiff.updating.inference.candidates import EXPECTED, Component
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
-from toolpath_stiff.updating.inference.fits import NORMAL_95, Fit, error_figures, gain_in_standard_errors
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit
+from toolpath_stiff.updating.inference.fits import NORMAL_95, error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
 
 FloatArray = NDArray[np.float64]
