@@ -144,18 +144,17 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
 def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:
     """Raise `InputError` at the first thing that is wrong with a heading."""
     wide = any(name in heading for name in WIDE)
-    checks = [_check_names, _check_layout, _check_groups, *([] if wide else [_check_long])]
-    for check in checks:
-        wrong = check(heading, planned)
-        if wrong is not None:
-            found, expected, hint = wrong
-            raise InputError(found, expected=expected, hint=hint, file=file, line=line)
+    wrong = _check_names(heading) or _check_layout(heading) or _check_groups(heading)
+    wrong = wrong or (None if wide else _check_long(heading, planned))
+    if wrong is not None:
+        found, expected, hint = wrong
+        raise InputError(found, expected=expected, hint=hint, file=file, line=line)
 
 
 Wrong = tuple[str, str, str]  # what was found, what was expected, a hint
 
 
-def _check_names(heading: list[str], planned: bool) -> Wrong | None:
+def _check_names(heading: list[str]) -> Wrong | None:
     """Names that are missing, there twice, or almost those of a known column."""
     for name in heading:
         if not name:
@@ -169,7 +168,7 @@ def _check_names(heading: list[str], planned: bool) -> Wrong | None:
     return None
 
 
-def _check_layout(heading: list[str], planned: bool) -> Wrong | None:
+def _check_layout(heading: list[str]) -> Wrong | None:
     """Wide or long, not both, with the columns that the layout needs."""
     wide = any(name in heading for name in WIDE)
     missing = [name for name in (POSITION + WIDE if wide else POSITION) if name not in heading]
@@ -180,7 +179,7 @@ def _check_layout(heading: list[str], planned: bool) -> Wrong | None:
     return None
 
 
-def _check_groups(heading: list[str], planned: bool) -> Wrong | None:
+def _check_groups(heading: list[str]) -> Wrong | None:
     """Three angles and three components of a direction, or none."""
     for group in (ANGLES, VECTOR):
         absent = [name for name in group if name not in heading]

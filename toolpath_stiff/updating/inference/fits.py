@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -331,7 +332,15 @@ def deviation_percent(residual: FloatArray) -> FloatArray:
     return np.asarray(100.0 * np.expm1(residual))
 
 
-def error_figures(residual: FloatArray) -> dict[str, float]:
+class ErrorFigures(TypedDict):
+    """Errors of a model over some readings; %."""
+
+    mean_abs_error_percent: float
+    bias_percent: float
+    rms_percent: float
+
+
+def error_figures(residual: FloatArray) -> ErrorFigures:
     """Errors of a model in per cent, of residuals ln(measured / modelled).
 
     Mean and rms of |modelled - measured| / measured, as the paper counts it; `bias_percent` is the mean of
