@@ -134,7 +134,7 @@ def explanations(document: DiagnosisDocument) -> list[str]:
     return [plain(str(name)) for name in entries(document, "explanations")]
 
 
-def is_plausible(entry: Mapping[str, Any], document: DiagnosisDocument) -> bool:
+def is_plausible(entry: Mapping[str, Any], document: DiagnosisDocument | Mapping[str, Any]) -> bool:
     """Whether it is one of the explanations left standing; a member of a pair alone is not."""
     return " + ".join(effect_names(entry)) in explanations(document)
 
