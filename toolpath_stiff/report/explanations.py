@@ -129,7 +129,7 @@ def parameter_name(key: str, unit: str) -> str:
     return (key.removesuffix(f"_{tail}") if tail else key).replace("_", " ")
 
 
-def explanations(document: DiagnosisDocument) -> list[str]:
+def explanations(document: DiagnosisDocument | Mapping[str, Any]) -> list[str]:
     """What is left standing: effects, `none`, pairs as "a + b"."""
     return [plain(str(name)) for name in entries(document, "explanations")]
 
