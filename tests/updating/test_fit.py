@@ -17,8 +17,8 @@ from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.diagnosis.document import parameters
 from toolpath_stiff.updating.inference.candidates import Candidate, candidates_of
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
-from toolpath_stiff.updating.inference.fits import NORMAL_95, Fit, fit_effects
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.updating.inference.fits import NORMAL_95, fit_effects
 from toolpath_stiff.updating.inference.prediction import Predictor
 
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ from scipy.stats import binom, chi2, kstest
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.updating.inference.evidence import Problem, Score
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import (
     DRAWS,
     Gate,
@@ -44,7 +44,7 @@ def setting() -> tuple[Problem, FloatArray, dict[str, FloatArray]]:
     return problem, spread, discrepancy_forms(problem.predictor)
 
 
-def refitted(problem: Problem, logs: FloatArray) -> Score:
+def refitted(problem: Problem, logs: FloatArray) -> Fit:
     """The base model refitted to other readings (42,) of ln k."""
     problem.observed = logs
     return problem.score_base()

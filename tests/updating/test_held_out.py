@@ -12,8 +12,8 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.updating.inference.candidates import candidates_of
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.fits import Fit, _inverse_without, fit_effects, gain_in_standard_errors, held_out
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
+from toolpath_stiff.updating.inference.fits import _inverse_without, fit_effects, gain_in_standard_errors, held_out
 from toolpath_stiff.updating.inference.noise import Scatter
 
 DATA = campaign(21, "paper", "weak_strut", 0.06)[0]

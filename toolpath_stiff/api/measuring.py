@@ -347,7 +347,7 @@ class Diagnosis(FolderResult):
         from toolpath_stiff.updating.diagnosis.document import document
 
         self.diagnosed, self.inputs = diagnosed, inputs
-        self._document = dict(document(diagnosed))
+        self._document = document(diagnosed)
 
     @property
     def verdict(self) -> str:
@@ -366,7 +366,7 @@ class Diagnosis(FolderResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The content of diagnose.json."""
-        return self._document
+        return dict(self._document)
 
     def to_frame(self) -> pd.DataFrame:
         """The candidates, one a row: probability, errors, why not."""
@@ -479,7 +479,7 @@ class Update(FolderResult):
         from toolpath_stiff.updating.correction.document import document
 
         self.correction, self._asked, self.inputs = correction, asked, asked.inputs
-        self._document = dict(document(correction))
+        self._document = document(correction)
 
     @property
     def accepted(self) -> bool:
@@ -505,7 +505,7 @@ class Update(FolderResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The content of update.json."""
-        return self._document
+        return dict(self._document)
 
     def to_frame(self) -> pd.DataFrame:
         """The steps, one a row: as given, strut law refitted, each effect; errors in per cent."""
@@ -641,11 +641,11 @@ class Plan(FolderResult):
         from toolpath_stiff.updating.planning.document import document
 
         self.proposal, self.inputs = proposal, asked.inputs
-        self._document = dict(document(proposal, line))
+        self._document = document(proposal, line)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of plan.json."""
-        return self._document
+        return dict(self._document)
 
     def to_frame(self) -> pd.DataFrame:
         """One row a reading, as in `plan.csv`: a measurement file with the stiffness left empty."""

@@ -8,11 +8,14 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report.words import machine_text, number, plain, shortened
 from toolpath_stiff.updating.inference.candidates import choice_text
+
+if TYPE_CHECKING:
+    from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument
 
 # Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
 MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
@@ -38,7 +41,7 @@ def figure_of(entry: Mapping[str, Any] | None, name: str) -> float | None:
     return float(value)
 
 
-def entries(document: Mapping[str, Any], name: str) -> list[Any]:
+def entries(document: DiagnosisDocument | Mapping[str, Any], name: str) -> list[Any]:
     """A list of the document, empty where it is absent."""
     found = document.get(name)
     return list(found) if isinstance(found, list | tuple) else []
@@ -126,24 +129,24 @@ def parameter_name(key: str, unit: str) -> str:
     return (key.removesuffix(f"_{tail}") if tail else key).replace("_", " ")
 
 
-def explanations(document: Mapping[str, Any]) -> list[str]:
+def explanations(document: DiagnosisDocument | Mapping[str, Any]) -> list[str]:
     """What is left standing: effects, `none`, pairs as "a + b"."""
     return [plain(str(name)) for name in entries(document, "explanations")]
 
 
-def is_plausible(entry: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
+def is_plausible(entry: Mapping[str, Any], document: DiagnosisDocument | Mapping[str, Any]) -> bool:
     """Whether it is one of the explanations left standing; a member of a pair alone is not."""
     return " + ".join(effect_names(entry)) in explanations(document)
 
 
-def is_offered(entry: Mapping[str, Any], document: Mapping[str, Any]) -> bool:
+def is_offered(entry: Mapping[str, Any], document: DiagnosisDocument | Mapping[str, Any]) -> bool:
     """False only where the diagnosis says so and does not rely on it all the same."""
     return entry.get("offered") is not False or is_plausible(entry, document)
 
 
-def model_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
+def model_rows(document: DiagnosisDocument) -> list[dict[str, Any]]:
     """The machine file as given, then with its strut law refitted: the first rows of every table and ladder."""
-    base = document.get("baseline") or {}
+    base = document["baseline"]
     as_given = base.get("as_given")
     first = [{**as_given, "effect": AS_GIVEN, "title": "the machine file as it stands"}] if as_given else []
     return [*first, {**base, "effect": NONE, "title": "no further effect"}]
@@ -154,7 +157,7 @@ def row_name(entry: Mapping[str, Any]) -> str:
     return "strut law refitted (none)" if entry.get("effect") == NONE else name_text(entry)
 
 
-def best_explanation(document: Mapping[str, Any]) -> Mapping[str, Any] | None:
+def best_explanation(document: DiagnosisDocument | Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The entry that `best` names; else the likeliest candidate or pair that is offered, the first of equals."""
     found = [*entries(document, "candidates"), *entries(document, "pairs")]
     for entry in found:
@@ -174,7 +177,7 @@ def remark_text(entry: Mapping[str, Any]) -> str:
     return plain("; ".join(part for part in (said, own or ("leaves structure" if settled else "")) if part))
 
 
-def noise_floor_percent(document: Mapping[str, Any]) -> float | None:
+def noise_floor_percent(document: DiagnosisDocument) -> float | None:
     """Mean absolute error that scatter alone would leave."""
     stated = figure_of(document.get("baseline"), "noise_floor_percent")
     noise = figure_of(document.get("baseline"), "noise_percent")
@@ -201,14 +204,14 @@ def hidden_name(entry: Mapping[str, Any]) -> str:
     return plain(f"{entry.get('effect', '?')} {parameter}".rstrip())
 
 
-def floor_text(document: Mapping[str, Any]) -> str:
+def floor_text(document: DiagnosisDocument) -> str:
     """The noise floor in words; a guess says so."""
-    name = str((document.get("noise") or {}).get("name") or "")
+    name = str(document["noise"]["name"])
     guess = f" ({plain(name)} guess)" if name in ("low", "high") else ""
     return percent(noise_floor_percent(document), 2) + guess
 
 
-def headline(document: Mapping[str, Any]) -> str:
+def headline(document: DiagnosisDocument) -> str:
     """The verdict as one sentence: the cause where one was found."""
     verdict = str(document.get("verdict") or "-")
     cause = str((best_explanation(document) or {}).get("finding") or "") if verdict == "identified" else ""
@@ -223,7 +226,7 @@ def headline(document: Mapping[str, Any]) -> str:
     return plain(HEADLINES.get(verdict, verdict))
 
 
-def path_text(document: Mapping[str, Any]) -> str:
+def path_text(document: DiagnosisDocument) -> str:
     """How far apart the plausible explanations are on a tool path, in one sentence; "" where it was not tried."""
     path = document.get("path") or {}
     program = plain(str(path.get("program") or "the program"))
@@ -256,7 +259,7 @@ MOST_SIZES = 6
 LONGEST_NAME = 45
 
 
-def text(document: Mapping[str, Any]) -> str:
+def text(document: DiagnosisDocument) -> str:
     """The diagnosis in some 25 lines.
 
     Parameters
@@ -311,16 +314,16 @@ def _hints(label: str, hints: Sequence[object]) -> list[str]:
     return lines
 
 
-def _data(document: Mapping[str, Any]) -> str:
+def _data(document: DiagnosisDocument) -> str:
     files = ", ".join(str(name) for name in entries(document, "data")) or "-"
     readings = figure_of(document, "readings")
     count = f"{readings:.0f} readings of " if readings is not None else ""
     return f"{count}{files}, machine {machine_text(document)}"
 
 
-def _error(document: Mapping[str, Any]) -> str:
+def _error(document: DiagnosisDocument) -> str:
     """The fall of the error in one sentence: in sample, at left-out points, against the noise floor."""
-    base = document.get("baseline") or {}
+    base = document["baseline"]
     parts = []
     as_given = figure_of(base.get("as_given"), "mean_abs_error_percent")
     if as_given is not None:
@@ -337,7 +340,7 @@ def _pair_of_errors(entry: Mapping[str, Any]) -> str:
     return f"{percent(inside, 2)} ({percent(outside, 2)} at points left out)"
 
 
-def _table(document: Mapping[str, Any]) -> list[str]:
+def _table(document: DiagnosisDocument) -> list[str]:
     """As given, strut law refitted, pairs and the best candidates; an asterisk marks what is left standing."""
     models = model_rows(document)
     candidates, pairs = entries(document, "candidates"), entries(document, "pairs")
@@ -373,7 +376,7 @@ def _table(document: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _by_noise(document: Mapping[str, Any]) -> list[str]:
+def _by_noise(document: DiagnosisDocument) -> list[str]:
     """Verdicts under each guess of the noise, where there are several."""
     found = document.get("by_noise") or {}
     if len(found) < 2:
@@ -386,7 +389,7 @@ def _by_noise(document: Mapping[str, Any]) -> list[str]:
     return _entry("noise", "; ".join(parts))
 
 
-def _detectable(document: Mapping[str, Any]) -> str:
+def _detectable(document: DiagnosisDocument) -> str:
     """Of an adequate model: the smallest sizes that these data would have shown, and what they never show."""
     if document.get("verdict") != "adequate":
         return ""
@@ -398,7 +401,7 @@ def _detectable(document: Mapping[str, Any]) -> str:
     return "; ".join(part for part in (text, f"at no size: {', '.join(never)}" if never else "") if part)
 
 
-def _next_readings(document: Mapping[str, Any]) -> list[str]:
+def _next_readings(document: DiagnosisDocument) -> list[str]:
     """How many readings are proposed, and what they would settle."""
     readings = [e for e in entries(document, "next_measurements") if isinstance(e, Mapping)]
     if not readings:

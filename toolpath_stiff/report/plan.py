@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,8 @@ from toolpath_stiff.updating.planning.visits import Visits
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from toolpath_stiff.updating.planning.document import PlanDocument
 
 FloatArray = NDArray[np.float64]
 
@@ -221,7 +223,7 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return ("plan.csv", "plan.json", *(("plan.png",) if plots else ()))
 
 
-def files(proposal: Proposal, document: Mapping[str, Any], *, plots: bool = True) -> dict[str, Content]:
+def files(proposal: Proposal, document: PlanDocument, *, plots: bool = True) -> dict[str, Content]:
     """The measurement file to fill in, `document` as JSON, and with `plots` the picture."""
     contents: dict[str, Content] = {
         "plan.csv": plan_csv(rows_of(proposal)),
@@ -230,7 +232,7 @@ def files(proposal: Proposal, document: Mapping[str, Any], *, plots: bool = True
     return contents | ({"plan.png": plan_picture(*picture_arguments(proposal))} if plots else {})
 
 
-def text(document: Mapping[str, Any]) -> str:
+def text(document: PlanDocument) -> str:
     """The visits in measuring order, then what is to be expected."""
     lines = [
         f"{'':>4} {'x':>7} {'y':>7} {'z':>7} mm {'a':>6} {'b':>6} deg {'tool':>5} mm  load N     set-up, directions"

@@ -189,7 +189,6 @@ def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
 
 def _columns(files: list[RowFile]) -> Measurements:
     rows = [row for file in files for row in file.rows]
-    n = len(rows)
 
     def numbers(name: str) -> FloatArray:
         return np.array([getattr(row, name) for row in rows], dtype=float)
@@ -207,17 +206,8 @@ def _columns(files: list[RowFile]) -> Measurements:
         "temperature_C": ~np.isnan(temperature),
         **{name: texts(name) != "" for name in LABELS},
     }
-    notes = [note for file in files for note in file.notes]
-    if not given["force_N"].all():
-        lacking = n - int(given["force_N"].sum())
-        notes.append(f"{lacking} of {n} readings do not say at which force: {DEFAULT_FORCE:g} N assumed")
-    for name, there in given.items():
-        if name not in ("force_N", "setup", "loop") and there.any() and not there.all():
-            notes.append(f"column {name} is empty in {n - int(there.sum())} of {n} readings: treated as absent there")
     setup, point = texts("setup"), _points(rows, texts("point"))
-    common = set.intersection(*(set(row.extra) for row in rows))
-    dropped = sorted({name for row in rows for name in row.extra} - common)
-    notes += [f"column {name} is not in every file and is not used" for name in dropped]
+    extra, dropped = _extra_columns(rows)
     return Measurements(
         position=numbers("position"),
         angles=numbers("angles"),
@@ -235,11 +225,31 @@ def _columns(files: list[RowFile]) -> Measurements:
         clamp=_clampings(rows, point, setup),
         file=np.array([row.file for row in rows], dtype=str),
         line=np.array([row.line for row in rows], dtype=np.int64),
-        extra={name: np.array([row.extra[name] for row in rows]) for name in sorted(common)},
+        extra=extra,
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
-        notes=tuple(notes),
+        notes=(*(note for file in files for note in file.notes), *_incomplete(given), *dropped),
     )
+
+
+def _extra_columns(rows: list[Row]) -> tuple[dict[str, FloatArray], list[str]]:
+    """Further numeric columns that every file has; remarks about those that some lack."""
+    common = set.intersection(*(set(row.extra) for row in rows))
+    dropped = sorted({name for row in rows for name in row.extra} - common)
+    columns = {name: np.array([row.extra[name] for row in rows]) for name in sorted(common)}
+    return columns, [f"column {name} is not in every file and is not used" for name in dropped]
+
+
+def _incomplete(given: Mapping[str, NDArray[np.bool_]]) -> list[str]:
+    """Remarks about columns that some readings leave empty, and about a load that is assumed."""
+    n, notes = len(given["force_N"]), []
+    if not given["force_N"].all():
+        lacking = n - int(given["force_N"].sum())
+        notes.append(f"{lacking} of {n} readings do not say at which force: {DEFAULT_FORCE:g} N assumed")
+    for name, there in given.items():
+        if name not in ("force_N", "setup", "loop") and there.any() and not there.all():
+            notes.append(f"column {name} is empty in {n - int(there.sum())} of {n} readings: treated as absent there")
+    return notes
 
 
 def _points(rows: list[Row], labels: TextArray) -> TextArray:

@@ -142,34 +142,60 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
 
 
 def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:
-    def refuse(found: str, expected: str = "", hint: str = "") -> None:
+    """Raise `InputError` at the first thing that is wrong with a heading."""
+    wide = any(name in heading for name in WIDE)
+    wrong = _check_names(heading) or _check_layout(heading) or _check_groups(heading)
+    wrong = wrong or (None if wide else _check_long(heading, planned))
+    if wrong is not None:
+        found, expected, hint = wrong
         raise InputError(found, expected=expected, hint=hint, file=file, line=line)
 
+
+Wrong = tuple[str, str, str]  # what was found, what was expected, a hint
+
+
+def _check_names(heading: list[str]) -> Wrong | None:
+    """Names that are missing, there twice, or almost those of a known column."""
     for name in heading:
         if not name:
-            refuse("a column without a name")
+            return "a column without a name", "", ""
         if heading.count(name) > 1:
-            refuse(f"column {name} stands twice")
+            return f"column {name} stands twice", "", ""
         if name not in KNOWN and name not in WIDE and name not in WIDE_MODEL:
             near = difflib.get_close_matches(name, (*KNOWN, *WIDE), n=1, cutoff=0.75)
             if near:
-                refuse(f"unknown column {name}", hint=f"did you mean {near[0]}? Otherwise give it another name")
+                return f"unknown column {name}", "", f"did you mean {near[0]}? Otherwise give it another name"
+    return None
+
+
+def _check_layout(heading: list[str]) -> Wrong | None:
+    """Wide or long, not both, with the columns that the layout needs."""
     wide = any(name in heading for name in WIDE)
     missing = [name for name in (POSITION + WIDE if wide else POSITION) if name not in heading]
     if missing:
-        refuse(f"column {missing[0]} is missing", expected="x_mm,y_mm,z_mm,direction,stiffness_N_per_mm or more")
+        return f"column {missing[0]} is missing", "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm or more", ""
     if wide and any(name in heading for name in ("direction", *VECTOR, "stiffness_N_per_mm", "displacement_um")):
-        refuse("columns of the wide layout beside those of the long one", hint="use one of the two")
+        return "columns of the wide layout beside those of the long one", "", "use one of the two"
+    return None
+
+
+def _check_groups(heading: list[str]) -> Wrong | None:
+    """Three angles and three components of a direction, or none."""
     for group in (ANGLES, VECTOR):
         absent = [name for name in group if name not in heading]
         if absent and len(absent) < len(group):
-            refuse(f"column {absent[0]} is missing", expected=f"all of {', '.join(group)} or none")
-    if wide:
-        return
+            return f"column {absent[0]} is missing", f"all of {', '.join(group)} or none", ""
+    return None
+
+
+def _check_long(heading: list[str], planned: bool) -> Wrong | None:
+    """One direction, and a stiffness unless it is still to be measured."""
     if ("direction" in heading) == (VECTOR[0] in heading):
-        refuse("no direction" if "direction" not in heading else "two directions", expected="direction, or dx,dy,dz")
+        found = "no direction" if "direction" not in heading else "two directions"
+        return found, "direction, or dx,dy,dz", ""
     if not planned and "stiffness_N_per_mm" not in heading and not {"force_N", "displacement_um"} <= set(heading):
-        refuse("no measured stiffness", expected="stiffness_N_per_mm, or force_N with displacement_um")
+        return "no measured stiffness", "stiffness_N_per_mm, or force_N with displacement_um", ""
+    return None
 
 
 def _all_numbers(table: Table, column: int) -> bool:

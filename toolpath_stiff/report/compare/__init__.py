@@ -23,6 +23,7 @@ from toolpath_stiff.updating.inference.fits import deviation_percent
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.comparison import Comparison
+    from toolpath_stiff.updating.comparison.document import ComparisonDocument, Figures
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
@@ -105,14 +106,14 @@ def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
     )
 
 
-def _headline(document: Mapping[str, Any]) -> str:
+def _headline(document: ComparisonDocument) -> str:
     """The strongest finding, or that there is none."""
     if document["findings"]:
         return str(document["findings"][0]["text"])
     return f"{document['baseline']['mean_abs_error_percent']:.2f} % off in the mean as given, without a pattern"
 
 
-def _figures(document: Mapping[str, Any]) -> str:
+def _figures(document: ComparisonDocument) -> str:
     """The few figures that say it all."""
     base, noise = document["baseline"], document["noise"]
     refit = base["strut_law_refitted"]
@@ -129,7 +130,7 @@ def _figures(document: Mapping[str, Any]) -> str:
     return figures(found)
 
 
-def _findings(document: Mapping[str, Any]) -> str:
+def _findings(document: ComparisonDocument) -> str:
     """Findings with their probabilities, or the strongest hints."""
     if not document["findings"]:
         hints = [("out", (*_said(one), _alike(one))) for one in document["hints"]]
@@ -150,12 +151,17 @@ def _alike(one: Mapping[str, Any]) -> str:
     return ", ".join(one["not_told_from"]) or "-"
 
 
-def _errors(document: Mapping[str, Any]) -> str:
+def _groups(document: ComparisonDocument) -> list[tuple[str, Mapping[str, Figures]]]:
+    """Readings by direction, plane and set-up; planes have a name that needs no title."""
+    return [("direction", document["by_direction"]), ("", document["by_plane"]), ("set-up", document["by_setup"])]
+
+
+def _errors(document: ComparisonDocument) -> str:
     """Errors by direction, plane and set-up, beside those of scatter alone."""
-    levels = [("all readings", document["baseline"])]
-    for title, key in (("direction", "by_direction"), ("", "by_plane"), ("set-up", "by_setup")):
-        if len(document[key]) > 1:
-            levels += [(f"{title} {name or '(none)'}".strip(), figures) for name, figures in document[key].items()]
+    levels: list[tuple[str, Figures]] = [("all readings", document["baseline"])]
+    for title, by in _groups(document):
+        if len(by) > 1:
+            levels += [(f"{title} {name or '(none)'}".strip(), figures) for name, figures in by.items()]
     names = [one["name"] for one in document["noise"]]
     rows = [
         (
@@ -176,7 +182,7 @@ def _errors(document: Mapping[str, Any]) -> str:
     return text_table(head, rows, range(1, len(head))) + f'<p class="muted">{escaped(remark)}</p>'
 
 
-def _far_off(document: Mapping[str, Any]) -> str:
+def _far_off(document: ComparisonDocument) -> str:
     rows = [
         (
             "",
@@ -194,7 +200,7 @@ def _far_off(document: Mapping[str, Any]) -> str:
     return text_table(head, rows, (3, 4))
 
 
-def _model_free(document: Mapping[str, Any]) -> str:
+def _model_free(document: ComparisonDocument) -> str:
     """Checks that need no stiffness model, and why others cannot be made."""
     found = document["model_free"]
     rows = [
@@ -208,7 +214,7 @@ def _model_free(document: Mapping[str, Any]) -> str:
     return text_table(("principle", "result", "t", "p, corrected"), rows, (2, 3))
 
 
-def _tests(document: Mapping[str, Any]) -> str:
+def _tests(document: ComparisonDocument) -> str:
     """The strongest patterns, each on its own."""
     tests = document["tests"]
     rows = [
@@ -232,7 +238,7 @@ def _tests(document: Mapping[str, Any]) -> str:
     return f"<details><summary>{escaped(remark)}</summary>{table}</details>"
 
 
-def _noise(document: Mapping[str, Any]) -> str:
+def _noise(document: ComparisonDocument) -> str:
     base = document["baseline"]
     rows = [
         (
@@ -257,7 +263,7 @@ def _noise(document: Mapping[str, Any]) -> str:
 MOST_NAMED = 5  # readings far off, on the terminal
 
 
-def text(document: Mapping[str, Any]) -> str:
+def text(document: ComparisonDocument) -> str:
     """Errors, findings, checks, in lines."""
     lines = [document["text"], ""]
     lines += _table(document)
@@ -298,11 +304,10 @@ def text(document: Mapping[str, Any]) -> str:
     return "\n".join(line for i, line in enumerate(lines) if line or lines[i - 1 : i] != [""]).rstrip() + "\n"
 
 
-def _table(document: Mapping[str, Any]) -> list[str]:
+def _table(document: ComparisonDocument) -> list[str]:
     """Errors by direction, plane and set-up."""
-    rows = [("all readings", document["baseline"])]
-    for title, key in (("direction", "by_direction"), ("", "by_plane"), ("set-up", "by_setup")):
-        levels = document[key]
+    rows: list[tuple[str, Figures]] = [("all readings", document["baseline"])]
+    for title, levels in _groups(document):
         if len(levels) > 1:
             rows += [(f"{title} {plain(name) or '(none)'}".strip(), figures) for name, figures in levels.items()]
     noise = document["noise"][-1]["name"]

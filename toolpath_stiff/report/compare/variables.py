@@ -61,7 +61,7 @@ def variables_png(found: Comparison) -> Figure:
     with house_style():
         width, height = 15.0, 1.0 + PITCH * max(rows, 1)
         figure = new_figure(width, height)
-        for k, (_, p, one) in enumerate(panels):
+        for k, (_, shown, one) in enumerate(panels):
             i, j = divmod(k, ACROSS)
             x, y = 0.6 + 2.88 * j, height - 1.0 - PITCH * (i + 1) + 0.42
             axes = figure.add_axes((x / width, y / height, 2.62 / width, 1.45 / height))
@@ -75,8 +75,8 @@ def variables_png(found: Comparison) -> Figure:
             name = plain(one.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
             axes.set_title(shortened(name, 30), fontsize=9, pad=3)
             axes.set_title(
-                p, fontsize=8.5, pad=3, loc="right", weight="bold" if p.endswith("*") else "normal",
-                color=UNREACHABLE_RED if p.endswith("*") else MUTED,
+                shown, fontsize=8.5, pad=3, loc="right", weight="bold" if shown.endswith("*") else "normal",
+                color=UNREACHABLE_RED if shown.endswith("*") else MUTED,
             )  # fmt: skip
         _key(figure, found)
         heading(

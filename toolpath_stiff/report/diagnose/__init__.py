@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from toolpath_stiff.updating.inference.fits import deviation_percent
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.diagnosis import Diagnosis
+    from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument
 
 __all__ = ["diagnose_html", "files", "names", "residuals_csv", "text"]
 
@@ -72,7 +73,7 @@ QUESTIONS = {
 }
 
 
-def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
+def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) -> str:
     """The page's text.
 
     Parameters
@@ -114,9 +115,9 @@ def diagnose_html(document: Mapping[str, Any], pictures: Mapping[str, bytes]) ->
     )
 
 
-def _figures(document: Mapping[str, Any]) -> str:
+def _figures(document: DiagnosisDocument) -> str:
     """The few figures that say it all."""
-    base = document.get("baseline") or {}
+    base = document["baseline"]
     best = best_explanation(document)
     key = "mean_abs_error_percent"
     found = [(percent(figure_of(base.get("as_given"), key), 2), "mean error as given")]
@@ -131,7 +132,7 @@ def _figures(document: Mapping[str, Any]) -> str:
     return figures(found)
 
 
-def _candidates(document: Mapping[str, Any]) -> str:
+def _candidates(document: DiagnosisDocument) -> str:
     """As given, strut law refitted, pairs and all candidates."""
     rows = []
     for entry in [*model_rows(document), *entries(document, "pairs"), *entries(document, "candidates")]:
@@ -158,7 +159,7 @@ def _candidates(document: Mapping[str, Any]) -> str:
     return table(head, rows, range(2, 6))
 
 
-def _next(document: Mapping[str, Any]) -> str:
+def _next(document: DiagnosisDocument) -> str:
     """What to do, and the readings that tell most."""
     readings = [entry for entry in entries(document, "next_measurements") if isinstance(entry, Mapping)]
     body = hint_list(entries(document, "next"))
@@ -181,7 +182,7 @@ def _cell(value: object) -> str:
     return escaped(f"{value:.6g}" if isinstance(value, float) else value)
 
 
-def _cannot_test(document: Mapping[str, Any]) -> str:
+def _cannot_test(document: DiagnosisDocument) -> str:
     rows = []
     for entry in entries(document, "cannot_test"):
         columns = ", ".join(f"<code>{escaped(name)}</code>" for name in entry.get("missing") or [])
@@ -201,7 +202,7 @@ def _cannot_test(document: Mapping[str, Any]) -> str:
     return table(("effect", "the column that is missing"), rows) if rows else ""
 
 
-def _path(document: Mapping[str, Any]) -> str:
+def _path(document: DiagnosisDocument) -> str:
     """What the plausible explanations predict on the path."""
     text = path_text(document)
     if not text:
@@ -213,9 +214,9 @@ def _path(document: Mapping[str, Any]) -> str:
     return f"<p>{escaped(text[0].upper() + text[1:])}.</p>{listed}"
 
 
-def _noise(document: Mapping[str, Any]) -> str:
+def _noise(document: DiagnosisDocument) -> str:
     """Where the noise comes from, and the verdict under each guess."""
-    noise = document.get("noise") or {}
+    noise = document["noise"]
     parts = [
         f"{word} {percent(value)}"
         for word, key in (("repeats", "repeat_percent"), ("clamping", "clamping_percent"),
@@ -251,7 +252,7 @@ def names(plots: bool = True) -> tuple[str, ...]:
     return (*data, *pictures, "report.html") if plots else data
 
 
-def files(diagnosis: Diagnosis, document: dict[str, Any], *, plots: bool = True) -> dict[str, Content]:
+def files(diagnosis: Diagnosis, document: DiagnosisDocument, *, plots: bool = True) -> dict[str, Content]:
     """`document` as JSON, one row a reading, and with `plots` pictures and page."""
     contents: dict[str, Content] = {
         "diagnose.json": json.dumps(document, indent=2, ensure_ascii=False) + "\n",
@@ -260,7 +261,7 @@ def files(diagnosis: Diagnosis, document: dict[str, Any], *, plots: bool = True)
     return contents | (_pictures(document, diagnosis) if plots else {})
 
 
-def _pictures(document: dict[str, Any], diagnosis: Diagnosis) -> dict[str, Content]:
+def _pictures(document: DiagnosisDocument, diagnosis: Diagnosis) -> dict[str, Content]:
     """The pictures that have something to show, and the page with them."""
     pictures: dict[str, bytes | None] = {
         "ladder.png": ladder_png(document),

@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument
+
 ROW = 0.47  # inch a candidate
 OUTSIDE = "outside the catalogue"
 OPAQUE = 0.75  # from here on a cell is dark on a light page, and light on a dark one
@@ -59,7 +61,7 @@ BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and 
 
 
 @drawn
-def ladder_png(document: Mapping[str, Any]) -> Figure:
+def ladder_png(document: DiagnosisDocument) -> Figure:
     """PNG: every explanation with its error at left-out points and its probability, best first."""
     rows = ladder_rows(document)
     height = 1.75 + ROW * len(rows)
@@ -92,7 +94,7 @@ def ladder_png(document: Mapping[str, Any]) -> Figure:
         return figure
 
 
-def ladder_rows(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def ladder_rows(document: DiagnosisDocument) -> list[Mapping[str, Any]]:
     """As given, strut law refitted, what no effect describes (if it was weighed), then pairs and effects."""
     models = model_rows(document)
     outside = figure_of(models[-1], "probability_outside")
@@ -100,7 +102,7 @@ def ladder_rows(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [*models, *beyond, *entries(document, "pairs")[:MOST_PAIRS], *entries(document, "candidates")]
 
 
-def _ladder_note(document: Mapping[str, Any]) -> str:
+def _ladder_note(document: DiagnosisDocument) -> str:
     standing = len(explanations(document))
     shown = f"shaded: {standing} explanation{'s' if standing > 1 else ''} left standing" if standing else "none left"
     return (
@@ -109,7 +111,7 @@ def _ladder_note(document: Mapping[str, Any]) -> str:
     )
 
 
-def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
+def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: DiagnosisDocument) -> None:
     for y, row in enumerate(rows):
         name = row_name(row)
         small = ", ".join(parameter_texts(row, intervals=False)) or plain(str(row.get("title") or ""))
@@ -120,7 +122,7 @@ def _ladder_labels(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[
         axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=MUTED if offered else RAPID_GREY, size=8)
 
 
-def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
+def _ladder_errors(axes: Axes, rows: list[Mapping[str, Any]], document: DiagnosisDocument) -> None:
     base = figure_of(document.get("baseline"), "held_out_error_percent")
     held = [figure_of(row, "held_out_error_percent") for row in rows]
     inside = [figure_of(row, "mean_abs_error_percent") for row in rows]
@@ -168,7 +170,7 @@ def standard_error(base: float | None, outside: float | None, gain_in_se: float 
     return abs((base - outside) / gain_in_se)
 
 
-def _row_colour(row: Mapping[str, Any], document: Mapping[str, Any]) -> str:
+def _row_colour(row: Mapping[str, Any], document: DiagnosisDocument) -> str:
     if not is_offered(row, document):
         return RAPID_GREY
     if is_plausible(row, document):
@@ -176,7 +178,7 @@ def _row_colour(row: Mapping[str, Any], document: Mapping[str, Any]) -> str:
     return INK if row.get("effect") in (AS_GIVEN, NONE) else MUTED
 
 
-def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
+def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]], document: DiagnosisDocument) -> None:
     axes.set_xlim(0.0, 1.0)
     for y, row in enumerate(rows):
         value = figure_of(row, "probability")
@@ -190,7 +192,7 @@ def _ladder_chances(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping
     axes.set_xlabel("probability", size=9)
 
 
-def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[str, Any]) -> None:
+def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]], document: DiagnosisDocument) -> None:
     import textwrap
 
     for y, row in enumerate(rows):
@@ -199,11 +201,11 @@ def _ladder_words(axes: Axes, rows: list[Mapping[str, Any]], document: Mapping[s
 
 
 @drawn
-def confounding_png(document: Mapping[str, Any]) -> Figure:
+def confounding_png(document: DiagnosisDocument) -> Figure:
     """PNG: how alike the effects' signatures are on this design; effects that cannot be told apart stand in boxes."""
     from matplotlib.colors import to_rgb
 
-    given = document.get("confounding") or {}
+    given = document["confounding"]
     names, matrix, sets = confounding_in_order(given)
     count = max(len(names), 1)
     with house_style():
@@ -290,7 +292,7 @@ def _chain(places: list[int], matrix: np.ndarray[Any, np.dtype[np.float64]]) -> 
 
 
 @drawn
-def detectable_png(document: Mapping[str, Any]) -> Figure:
+def detectable_png(document: DiagnosisDocument) -> Figure:
     """PNG: the smallest size of each effect that these data would show, as the change of stiffness that it makes."""
     from matplotlib.ticker import LogLocator, NullLocator
 
@@ -344,11 +346,11 @@ def detectable_png(document: Mapping[str, Any]) -> Figure:
         return figure
 
 
-def envelope_png(document: Mapping[str, Any]) -> Drawing | None:
+def envelope_png(document: DiagnosisDocument) -> Drawing | None:
     """PNG: the base model's weighted sum of squares among simulated ones; None where `gates` does not hold them."""
     from matplotlib.ticker import MaxNLocator, NullLocator
 
-    gates = document.get("gates") or {}
+    gates = document["gates"]
     simulated = np.asarray(gates.get("simulated_squares") or [], dtype=float)
     if not (simulated > 0.0).any():
         return None

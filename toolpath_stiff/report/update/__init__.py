@@ -19,6 +19,7 @@ from toolpath_stiff.updating.correction.strut_law import bar_curve_csv
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
+    from toolpath_stiff.updating.correction.document import StepEntry, UpdateDocument
     from toolpath_stiff.updating.correction.ladder import Update
     from toolpath_stiff.updating.correction.strut_law import BarCurve
 
@@ -50,7 +51,7 @@ QUESTIONS = {
 }
 
 
-def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]) -> str:
+def update_html(document: UpdateDocument, pictures: Mapping[str, bytes | str]) -> str:
     """The page's text.
 
     Parameters
@@ -89,7 +90,7 @@ def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]
     )
 
 
-def _headline(document: Mapping[str, Any]) -> str:
+def _headline(document: UpdateDocument) -> str:
     first, last = document["steps"][0], document["steps"][-1]
     if document["verdict"] == "nothing added":
         return f"Mean error {first['mean_abs_error_percent']:.2f} % as given, and nothing to add"
@@ -99,20 +100,22 @@ def _headline(document: Mapping[str, Any]) -> str:
     return f"Mean error {first['mean_abs_error_percent']:.2f} % as given, {last['mean_abs_error_percent']:.2f} % after"
 
 
-def _figures(document: Mapping[str, Any]) -> str:
-    key, last = "mean_abs_error_percent", document["steps"][-1]
-    found = [(_percent(document["steps"][0][key]), "mean error as given")]
+def _figures(document: UpdateDocument) -> str:
+    last = document["steps"][-1]
+    found = [(_percent(document["steps"][0]["mean_abs_error_percent"]), "mean error as given")]
     if document["objective"] == "likelihood":
-        found.append((_percent(document["strut_law_refitted"][key]), "mean error, strut law refitted"))
+        found.append(
+            (_percent(document["strut_law_refitted"]["mean_abs_error_percent"]), "mean error, strut law refitted")
+        )
     if last["effects"] or document["objective"] != "likelihood":
         called = f"mean error with {' + '.join(last['effects'])}" if last["effects"] else last["name"]
-        found.append((_percent(last[key]), called))
+        found.append((_percent(last["mean_abs_error_percent"]), called))
     found.append((_percent(last["held_out_error_percent"]), "the same at left-out points"))
     found.append((_percent(document["noise_floor_percent"]), "would be left by scatter alone"))
     return figures(found)
 
 
-def _by_direction(document: Mapping[str, Any]) -> str:
+def _by_direction(document: UpdateDocument) -> str:
     first, last = document["steps"][0]["by_direction"], result_step(document)["by_direction"]
     rows = [
         (
@@ -131,7 +134,7 @@ def _by_direction(document: Mapping[str, Any]) -> str:
     return text_table(head, [("", row) for row in rows], range(1, len(head))) + f'<p class="muted">{remark}</p>'
 
 
-def _fitted(document: Mapping[str, Any]) -> str:
+def _fitted(document: UpdateDocument) -> str:
     last = result_step(document)
     rows = [
         ("strut law", f"at {end['length_mm']:.1f} mm", f"{end['stiffness']:.2f} N/um", f"sd {end['sd']:.2g} N/um")
@@ -148,7 +151,7 @@ def _fitted(document: Mapping[str, Any]) -> str:
     return text_table(("effect", "parameter", "value", "95 % interval, or sd"), [("", row) for row in rows], (2, 3))
 
 
-def _support(document: Mapping[str, Any]) -> str:
+def _support(document: UpdateDocument) -> str:
     rows = []
     for one in (*document["support"], *document["turned_down"]):
         gain = one["held_out_gain_in_se"]
@@ -177,7 +180,7 @@ WIDTH = 110
 MACHINE_FILE = "machine.toml"
 
 
-def text(document: Mapping[str, Any]) -> str:
+def text(document: UpdateDocument) -> str:
     """Ladder, errors by direction before and after, parameters, what was turned down."""
     lines = [
         f"data     {document['readings']} readings of {', '.join(plain(name) for name in document['data'])}, "
@@ -200,7 +203,7 @@ def text(document: Mapping[str, Any]) -> str:
     return "\n".join(lines).rstrip()
 
 
-def _ladder(document: Mapping[str, Any]) -> list[str]:
+def _ladder(document: UpdateDocument) -> list[str]:
     steps = document["steps"]
     width = max(len(step["name"]) for step in steps)
     found = [f"{'':<{width}}  error %  left out %  gain/SE"]
@@ -216,13 +219,12 @@ def _ladder(document: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def result_step(document: Mapping[str, Any]) -> Mapping[str, Any]:
+def result_step(document: UpdateDocument) -> StepEntry:
     """The model that comes out: the last step, the machine file as given where nothing is added."""
-    found: Mapping[str, Any] = document["steps"][0 if document["verdict"] == "nothing added" else -1]
-    return found
+    return document["steps"][0 if document["verdict"] == "nothing added" else -1]
 
 
-def _direction_lines(document: Mapping[str, Any]) -> list[str]:
+def _direction_lines(document: UpdateDocument) -> list[str]:
     first, last = document["steps"][0]["by_direction"], result_step(document)["by_direction"]
     found = ["direction  readings  as given %  after %  left out %"]
     for name, before in first.items():
@@ -234,7 +236,7 @@ def _direction_lines(document: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def _parameters(document: Mapping[str, Any]) -> list[str]:
+def _parameters(document: UpdateDocument) -> list[str]:
     last = result_step(document)
     found = []
     if last["strut_law_N_per_um"][0]["sd"] is not None:
@@ -271,7 +273,7 @@ def names(plots: bool = True, *, machine: bool = True, figure3: bool = False) ->
 
 def files(
     update: Update,
-    document: dict[str, Any],
+    document: UpdateDocument,
     *,
     machine: Machine | None = None,
     bars: BarCurve | None = None,
@@ -292,7 +294,7 @@ def files(
     return contents | (_pictures(document, update, bars) if plots else {})
 
 
-def machine_heading(found: Mapping[str, Any]) -> str:
+def machine_heading(found: UpdateDocument) -> str:
     """The remark above the machine file that an update writes."""
     provenance = found["provenance"]
     return "\n".join(
@@ -305,7 +307,7 @@ def machine_heading(found: Mapping[str, Any]) -> str:
     )
 
 
-def _pictures(found: dict[str, Any], update: Update, bars: BarCurve | None) -> dict[str, Content]:
+def _pictures(found: UpdateDocument, update: Update, bars: BarCurve | None) -> dict[str, Content]:
     last = found["steps"][-1]
     called = f"with {' + '.join(last['effects'])}" if last["effects"] else last["name"]
     entry = {"effect": called, "held_out_error_percent": last["held_out_error_percent"]}
@@ -324,14 +326,14 @@ def _pictures(found: dict[str, Any], update: Update, bars: BarCurve | None) -> d
     return {**pictures, "report.html": update_html(found, pictures)}
 
 
-def ladder(found: Mapping[str, Any]) -> tuple[Any, ...]:
+def ladder(found: UpdateDocument) -> tuple[Any, ...]:
     """What `error_ladder_png` takes."""
     turned_down = [{**one, "name": one["effect"]} for one in found["turned_down"]]
     floor, question = found["noise_floor_percent"], "What does each step do to the error?"
     return [_rung(step) for step in found["steps"]], floor, question, turned_down
 
 
-def _rung(step: dict[str, Any]) -> dict[str, Any]:
+def _rung(step: StepEntry) -> dict[str, Any]:
     """A step with what its effect acts on below the effect's name."""
     choices = re.findall(r"\(([^)]*)\)", step["name"])
     return {**step, "name": re.sub(r" \([^)]*\)", "", step["name"]), "remark": ", ".join(choices)}

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,18 @@ class Check:
     text: str
     broken: str
     size: float | None = None
+
+
+class CheckEntry(TypedDict):
+    """The outcome of a check."""
+
+    check: str
+    holds: bool
+    percent: float
+    standard_error_percent: float
+    statistic: float
+    p_adjusted: float
+    text: str
 
 
 def symmetries(machine: Machine) -> list[FloatArray]:
@@ -108,7 +120,7 @@ def model_free_checks(machine: Machine, data: Measurements) -> tuple[list[Check]
     return checks, cannot
 
 
-def assess(checks: list[Check], data: Measurements, covariance: FloatArray, draws: FloatArray) -> list[dict[str, Any]]:
+def assess(checks: list[Check], data: Measurements, covariance: FloatArray, draws: FloatArray) -> list[CheckEntry]:
     """Size, statistic and adjusted probability of every check.
 
     `draws` (m, n): simulated scatter, in which the largest statistic of all checks is looked up as well.
@@ -120,7 +132,7 @@ def assess(checks: list[Check], data: Measurements, covariance: FloatArray, draw
     logs = np.log(data.stiffness)
     value = np.array([check.weights @ logs if check.size is None else check.size for check in checks])
     largest = np.abs(draws @ (weights / sd[:, None]).T).max(axis=1)
-    found = []
+    found: list[CheckEntry] = []
     for check, size, spread in zip(checks, value.tolist(), sd.tolist(), strict=True):
         p = (1.0 + float((largest >= abs(size) / spread).sum())) / (1.0 + len(largest))
         holds = p >= 0.05

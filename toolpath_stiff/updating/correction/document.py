@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,11 @@ from toolpath_stiff.updating.comparison.residuals import directions
 from toolpath_stiff.updating.correction import Correction
 from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
 from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
-from toolpath_stiff.updating.diagnosis.document import interval, json_number, rounded_errors
+from toolpath_stiff.updating.diagnosis.document import HeldErrors, RoundedErrors, interval, json_number, rounded_errors
+from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import (
     LAW_REFITTED,
     NORMAL_95,
-    Fit,
     deviation_percent,
     errors_text,
     gain_in_standard_errors,
@@ -33,13 +33,110 @@ MEAN_OVER_SD = 0.80  # mean absolute value of a normal deviate over its standard
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
 
 
-def document(correction: Correction) -> dict[str, Any]:
+class LawEntry(TypedDict):
+    """The strut law at one length, N/um."""
+
+    length_mm: float | None
+    stiffness: float | None
+    sd: float | None
+
+
+class DirectionErrors(HeldErrors):
+    """Errors along one direction."""
+
+    readings: int
+
+
+class StepEntry(HeldErrors):
+    """A rung of the ladder."""
+
+    name: str
+    effects: list[str]
+    findings: list[str]
+    held_out_rms_percent: float | None
+    by_direction: dict[str, DirectionErrors]
+    strut_law_N_per_um: list[LawEntry]  # noqa: N815  as in the file
+    parameters: dict[str, dict[str, Any]]
+    wild_readings: int
+    held_out_gain_in_se: NotRequired[float | None]
+    held_out_se_percent: NotRequired[float | None]
+
+
+class SupportEntry(TypedDict):
+    """Whether the data support an effect."""
+
+    effect: str
+    supported: bool
+    reasons: list[str]
+    mean_abs_error_percent: float | None
+    held_out_error_percent: float | None
+    held_out_fall_percent: float | None
+    held_out_gain_in_se: float | None
+    likelihood_gain: float | None
+    threshold: float | None
+
+
+class NoiseEntry(TypedDict):
+    """The noise model."""
+
+    name: str
+    origin: str
+
+
+class UncertaintyEntry(TypedDict):
+    """Joint uncertainty of what was fitted."""
+
+    parameters: list[str]
+    sd: list[float | None]
+    correlation: list[list[float | None]]
+
+
+class SearchEntry(TypedDict):
+    """Starts and ends of the paper's own search."""
+
+    starts_N_per_um: list[list[float]]
+    ends_N_per_um: list[list[float]]
+    end_errors_percent: list[float]
+    agreeing: int
+
+
+class UpdateDocument(TypedDict):
+    """The content of update.json."""
+
+    verdict: str
+    text: str
+    objective: str
+    baseline: StepEntry
+    strut_law_refitted: RoundedErrors
+    steps: list[StepEntry]
+    support: list[SupportEntry]
+    turned_down: list[SupportEntry]
+    noise_percent: float | None
+    noise_floor_percent: float | None
+    noise: NoiseEntry
+    widening: float | None
+    uncertainty: UncertaintyEntry | None
+    assumptions: list[str]
+    warnings: list[str]
+    notes: list[str]
+    machine: str
+    effects: list[str]
+    machine_file: str | None
+    data: list[str]
+    readings: int
+    provenance: dict[str, Any]
+    seed: int
+    next: list[str]
+    search: NotRequired[SearchEntry]
+
+
+def document(correction: Correction) -> UpdateDocument:
     """Everything that `update.json` holds."""
     update, updated = correction.update, correction.machine
     steps = [_step(update, k) for k in range(len(update.steps))]
     verdict = _verdict(update)
     uncertainty = updated.uncertainty if updated is not None else None
-    return {
+    found: UpdateDocument = {
         "verdict": verdict,
         "text": _text(update, verdict),
         "objective": update.objective,
@@ -70,11 +167,13 @@ def document(correction: Correction) -> dict[str, Any]:
         "provenance": dict(correction.provenance),
         "seed": correction.seed,
         "next": list(correction.next),
-        **({} if correction.search is None else {"search": _search(correction.search)}),
     }
+    if correction.search is not None:
+        found["search"] = _search(correction.search)
+    return found
 
 
-def _search(search: StrutLawSearch) -> dict[str, Any]:
+def _search(search: StrutLawSearch) -> SearchEntry:
     """Starts and ends of the paper's search, in N/um."""
     machine_law = np.array([search.strut_law.stiffness_1, search.strut_law.stiffness_2]) / np.exp(search.law) / 1e6
     return {
@@ -124,14 +223,17 @@ def _left_out(update: Update) -> str:
     return f" ({held:.2f} % at left-out points)" if np.isfinite(held) else ""
 
 
-def _step(update: Update, k: int) -> dict[str, Any]:
+def _step(update: Update, k: int) -> StepEntry:
     step = update.steps[k]
     held = step.held
     along = directions(update.data)
-    found: dict[str, Any] = {
+    errors = rounded_errors(step.fit.residual)
+    found: StepEntry = {
         "name": step.name,
         "effects": list(step.fit.names),
-        **rounded_errors(step.fit.residual),
+        "mean_abs_error_percent": errors["mean_abs_error_percent"],
+        "bias_percent": errors["bias_percent"],
+        "rms_percent": errors["rms_percent"],
         "findings": list(step.fit.findings),
         "held_out_error_percent": json_number(100.0 * held.mean_error),
         "held_out_rms_percent": json_number(100.0 * held.rms),
@@ -156,7 +258,7 @@ def _step(update: Update, k: int) -> dict[str, Any]:
     return found
 
 
-def _law(machine: Machine, step: Step, widening: float) -> list[dict[str, Any]]:
+def _law(machine: Machine, step: Step, widening: float) -> list[LawEntry]:
     law = scaled_law(machine.strut_law, step.fit.law)
     deviations = widening * np.sqrt(np.maximum(np.diag(step.fit.covariance)[:2], 0.0))
     ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))
@@ -170,9 +272,9 @@ def _law(machine: Machine, step: Step, widening: float) -> list[dict[str, Any]]:
     ]
 
 
-def step_parameters(fit: Fit, widening: float = 1.0) -> dict[str, Any]:
+def step_parameters(fit: Fit, widening: float = 1.0) -> dict[str, dict[str, Any]]:
     """Effect -> key -> value, unit and 95 % interval, and the effect's choice. None stands for infinite."""
-    found: dict[str, Any] = {}
+    found: dict[str, dict[str, Any]] = {}
     index = 0
     for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
         entry: dict[str, Any] = {key: value for key, value in candidate.choice if value not in ("", 0)}
@@ -199,7 +301,7 @@ def _interval(fit: Fit, index: int, component: Any, size: float, widening: float
     return max(size - reach, low_bound), min(size + reach, high_bound)
 
 
-def _support(one: Support) -> dict[str, Any]:
+def _support(one: Support) -> SupportEntry:
     return {
         "effect": one.effect,
         "supported": one.supported,

@@ -32,18 +32,16 @@ from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.correction.machines import fitted_machine
 from toolpath_stiff.updating.diagnosis import FEWEST
 from toolpath_stiff.updating.inference.candidates import Candidate, Component, candidates_of, testable_effects
-from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import (
     AS_GIVEN,
     LAW_REFITTED,
     Baseline,
-    Fit,
     HeldOut,
     add_effect,
     base_fit,
     gain_in_standard_errors,
     held_out,
-    log_posterior,
 )
 from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures
@@ -349,7 +347,7 @@ class _Work:
         problem, _, threshold = self.field(before.fit)
         none = base_fit(problem, law_free=True)
         alone = add_effect(problem, none, candidates, law_free=True)
-        gained = 2.0 * (log_posterior(alone) - log_posterior(none)) / dispersion(alone)
+        gained = 2.0 * (alone.log_posterior - none.log_posterior) / dispersion(alone)
         reasons = []
         if not fit.sizes[j].any():
             reasons.append("it fits best when it is absent")

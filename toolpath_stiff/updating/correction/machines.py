@@ -19,7 +19,7 @@ from toolpath_stiff.stiffness.effects.contract import SETUP
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.tables import split_name
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m
-from toolpath_stiff.updating.inference.fits import Fit
+from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.prediction import scaled_law
 from toolpath_stiff.updating.measurements import NIST_TABLE_1
 

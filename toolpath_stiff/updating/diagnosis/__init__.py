@@ -21,8 +21,8 @@ from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model, setup_of
 from toolpath_stiff.updating.inference import NONE, Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.fits import Baseline, Fit, HeldOut, held_out, refine
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
+from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, refine
 from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
 from toolpath_stiff.updating.inference.noise import JOINT_ERROR, STRUT_SPREAD, Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law

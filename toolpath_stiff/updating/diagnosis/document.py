@@ -2,29 +2,219 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.hints import Asked
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, joined
+from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
-from toolpath_stiff.updating.diagnosis.words import next_steps, verdict_text, why
-from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, Judgement
-from toolpath_stiff.updating.inference.candidates import EXPECTED, Component
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
-from toolpath_stiff.updating.inference.fits import NORMAL_95, Fit, error_figures, gain_in_standard_errors
+from toolpath_stiff.updating.diagnosis.words import assumptions, next_steps, row_words, verdict_text, why
+from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
+from toolpath_stiff.updating.inference.candidates import Component
+from toolpath_stiff.updating.inference.evidence import Fit
+from toolpath_stiff.updating.inference.fits import NORMAL_95, error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
 
 FloatArray = NDArray[np.float64]
 
-SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
 
 
-def document(diagnosis: Diagnosis) -> dict[str, Any]:
+class RoundedErrors(TypedDict):
+    """Errors of a model over some readings, as the paper counts them; %, None where there is none."""
+
+    mean_abs_error_percent: float | None
+    bias_percent: float | None
+    rms_percent: float | None
+
+
+class HeldErrors(RoundedErrors):
+    """The same, and at left-out points."""
+
+    held_out_error_percent: float | None
+
+
+class LawEntry(TypedDict):
+    """The strut law at one length."""
+
+    length_mm: float | None
+    stiffness_N_per_um: float | None
+    machine_file_N_per_um: float | None
+    sd_percent: float | None
+
+
+class BaselineEntry(HeldErrors):
+    """The model without a further effect, its strut law refitted; and as given."""
+
+    held_out_rms_percent: float | None
+    noise_percent: float | None
+    noise_floor_percent: float | None
+    probability: float | None
+    probability_outside: float | None
+    adequate: bool
+    words: str
+    as_given: HeldErrors
+    law: list[LawEntry]
+
+
+class ParameterEntry(TypedDict):
+    """A fitted parameter in its own unit with its 95 % interval; None stands for an infinite value."""
+
+    value: float | None
+    unit: str
+    interval: list[float | None]
+
+
+class Explanation(TypedDict):
+    """How a hypothesis stands."""
+
+    probability: float | None
+    log_evidence: float | None
+    words: str
+    mean_abs_error_percent: float | None
+    finding: str
+    held_out_error_percent: float | None
+    held_out_rms_percent: float | None
+    held_out_gain_in_se: float | None
+    adequate: bool
+
+
+class CandidateEntry(Explanation):
+    """A single effect."""
+
+    effect: str
+    title: str
+    link: str
+    parameters: dict[str, ParameterEntry]
+    choice: dict[str, Any]
+    offered: bool
+    remark: str
+
+
+class TestedEntry(CandidateEntry):
+    """A single effect that is there; the probability of its absolute test, None where that was not made."""
+
+    adequate_probability: float | None
+
+
+class _Common(TypedDict):
+    """What every candidate's entry begins with."""
+
+    effect: str
+    title: str
+    link: str
+    probability: float | None
+    log_evidence: float | None
+    words: str
+
+
+class PairEntry(Explanation):
+    """Two effects; parameters by effect, with what it acts on."""
+
+    effects: list[str]
+    parameters: dict[str, dict[str, Any]]
+    adequate_probability: float | None
+
+
+class NoiseEntry(TypedDict):
+    """The noise model that is written out."""
+
+    name: str
+    repeat_percent: float | None
+    clamping_percent: float | None
+    strut_spread_percent: float | None
+    joint_error_mm: float | None
+    origin: str
+
+
+class GatesEntry(TypedDict):
+    """The absolute test of the model without a further effect."""
+
+    baseline_probability: float | None
+    squares: float | None
+    squares_probability: float | None
+    simulated_squares: list[float | None]
+    structure_probability: float | None
+    structure: str
+    gain_probability: float | None
+    gain_threshold: float | None
+
+
+class InShort(TypedDict):
+    """A judgement under one noise model."""
+
+    verdict: str
+    plausible: list[str]
+    noise_percent: float | None
+    origin: str
+    probability: dict[str, float | None]
+    baseline_gate_probability: float | None
+    structure: str
+
+
+class DetectableEntry(TypedDict):
+    """The smallest size of a parameter that these data would have shown, in its own unit."""
+
+    effect: str
+    parameter: str
+    unit: str
+    size: float | None
+    rms_percent: float | None
+    detectable: bool
+
+
+class ConfoundingEntry(TypedDict):
+    """Which effects these data cannot tell apart."""
+
+    effects: list[str]
+    matrix: list[list[float | None]]
+    sets: list[list[str]]
+    threshold: float
+
+
+class CannotTest(TypedDict):
+    """An effect and the columns that the data lack for it."""
+
+    effect: str
+    missing: list[str]
+
+
+class DiagnosisDocument(TypedDict):
+    """The content of diagnose.json."""
+
+    verdict: str
+    text: str
+    baseline: BaselineEntry
+    candidates: list[CandidateEntry]
+    pairs: list[PairEntry]
+    plausible: list[str]
+    explanations: list[str]
+    best: str | None
+    why: list[str]
+    cannot_test: list[CannotTest]
+    next_measurements: list[dict[str, Any]]
+    next: list[str]
+    by_noise: dict[str, InShort]
+    noise: NoiseEntry
+    gates: GatesEntry
+    detectable: list[DetectableEntry]
+    confounding: ConfoundingEntry
+    path: dict[str, Any] | None
+    assumptions: list[str]
+    warnings: list[str]
+    notes: list[str]
+    seed: int
+    machine: str
+    effects: list[str]
+    data: list[str]
+    readings: int
+    command: str
+
+
+def document(diagnosis: Diagnosis) -> DiagnosisDocument:
     """Everything that `diagnose.json` holds."""
     main = diagnosis.main
     return {
@@ -80,16 +270,17 @@ def json_number(value: float, digits: int = 5) -> float | None:
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
-def rounded_errors(residual: FloatArray) -> dict[str, float | None]:
+def rounded_errors(residual: FloatArray) -> RoundedErrors:
     """`error_figures` as a document has them."""
-    return {name: json_number(value) for name, value in error_figures(residual).items()}
+    found = error_figures(residual)
+    return {
+        "mean_abs_error_percent": json_number(found["mean_abs_error_percent"]),
+        "bias_percent": json_number(found["bias_percent"]),
+        "rms_percent": json_number(found["rms_percent"]),
+    }
 
 
-def _errors(fit: Fit) -> dict[str, Any]:
-    return {"mean_abs_error_percent": json_number(100.0 * float(fit.errors.mean())), "finding": joined(fit.findings)}
-
-
-def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
+def _baseline(diagnosis: Diagnosis) -> BaselineEntry:
     held = diagnosis.held_out_base
     law = diagnosis.machine.strut_law
     factors = np.exp(diagnosis.base.law)
@@ -105,8 +296,10 @@ def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
         "adequate": bool(diagnosis.main.base_gate.probability > FALSE_ALARM),
         "words": row_words(diagnosis, NONE),
         # Nothing is fitted: leaving points out changes nothing.
-        "as_given": rounded_errors(diagnosis.as_given.residual)
-        | {"held_out_error_percent": json_number(100.0 * float(diagnosis.as_given.errors.mean()))},
+        "as_given": {
+            **rounded_errors(diagnosis.as_given.residual),
+            "held_out_error_percent": json_number(100.0 * float(diagnosis.as_given.errors.mean())),
+        },
         "law": [
             {
                 "length_mm": json_number(float(mm_from_m(length)), 7),
@@ -121,18 +314,18 @@ def _baseline(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _candidates(diagnosis: Diagnosis) -> list[CandidateEntry]:
     main = diagnosis.main
     ranked = sorted(main.families, key=lambda f: (-main.probability.get(f.name, 0.0), -f.log_evidence, f.name))
     return [_candidate(diagnosis, family) for family in ranked]
 
 
-def _candidate(diagnosis: Diagnosis, family: Family) -> dict[str, Any]:
+def _candidate(diagnosis: Diagnosis, family: Family) -> CandidateEntry | TestedEntry:
     main = diagnosis.main
     fit = diagnosis.fits.get(family.name)
     gate = main.gates.get(family.name)
     base_passes = main.base_gate.probability > FALSE_ALARM
-    common = {
+    common: _Common = {
         "effect": family.name,
         "title": family.effect.title,
         "link": family.effect.link,
@@ -141,7 +334,8 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> dict[str, Any]:
         "words": row_words(diagnosis, family.name),
     }
     if fit is None or not any(size.any() for size in fit.sizes):
-        return common | {
+        return {
+            **common,
             "parameters": {},
             "choice": {},
             "mean_abs_error_percent": json_number(100.0 * float(diagnosis.base.errors.mean())),
@@ -159,10 +353,12 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> dict[str, Any]:
     remark = f"{', '.join(bounded)} at its bound" if bounded else ""
     if not remark and gate is None and not base_passes:
         remark = "not tested further"
-    return common | {
+    return {
+        **common,
         "parameters": parameters(fit, family),
         "choice": dict(fit.candidates[0].choice),
-        **_errors(fit),
+        "mean_abs_error_percent": json_number(100.0 * float(fit.errors.mean())),
+        "finding": joined(fit.findings),
         "held_out_error_percent": json_number(100.0 * held.mean_error),
         "held_out_rms_percent": json_number(100.0 * held.rms),
         "held_out_gain_in_se": json_number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
@@ -173,36 +369,9 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> dict[str, Any]:
     }
 
 
-def row_words(diagnosis: Diagnosis, name: str) -> str:
-    """How a hypothesis stands: by its odds against the likeliest, unless a gate has settled it."""
-    main = diagnosis.main
-    probability = main.probability.get(name, 0.0)
-    base_passes = main.base_gate.probability > FALSE_ALARM
-    if base_passes:
-        return "enough" if name == NONE else "no more than chance" if probability >= SHOWN else "not needed"
-    gate = main.base_gate if name == NONE else main.gates.get(name)
-    if probability < SHOWN and gate is not None and gate.probability <= (FALSE_ALARM if name == NONE else ADEQUATE):
-        return "does not fit"
-    said = words(probability, max(main.probability.values(), default=0.0))
-    return "closest" if said == "best" and main.verdict == "unexplained" else said
-
-
-def words(probability: float, best: float) -> str:
-    """How a hypothesis stands against the likeliest one, by twice the logarithm of the odds (RadVel's wording)."""
-    if probability < SHOWN:
-        return "ruled out"
-    if probability >= best:
-        return "best"
-    twice = 2.0 * float(np.log(best / probability))
-    for limit, text in ((2.0, "nearly indistinguishable"), (4.0, "somewhat disfavoured")):
-        if twice < limit:
-            return text
-    return "strongly disfavoured"
-
-
-def parameters(fit: Fit, family: Family | None = None) -> dict[str, Any]:
+def parameters(fit: Fit, family: Family | None = None) -> dict[str, ParameterEntry]:
     """Key -> value, unit, 95 % interval, of all effects of a fit; None stands for an infinite value."""
-    found: dict[str, Any] = {}
+    found: dict[str, ParameterEntry] = {}
     index = 0
     for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
         for component, size in zip(candidate.components, sizes, strict=True):
@@ -249,8 +418,8 @@ def interval(
     return max(0.0, low_bound), min(upper, high_bound)
 
 
-def _pairs(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    found = []
+def _pairs(diagnosis: Diagnosis) -> list[PairEntry]:
+    found: list[PairEntry] = []
     for pair in diagnosis.main.pairs:
         name = " + ".join(pair.names)
         fit = diagnosis.fits.get(name)
@@ -265,7 +434,8 @@ def _pairs(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "log_evidence": json_number(pair.log_evidence - diagnosis.main.base.log_evidence),
                 "words": row_words(diagnosis, name),
                 "parameters": pair_parameters(fit),
-                **_errors(fit),
+                "mean_abs_error_percent": json_number(100.0 * float(fit.errors.mean())),
+                "finding": joined(fit.findings),
                 "held_out_error_percent": json_number(100.0 * held.mean_error),
                 "held_out_rms_percent": json_number(100.0 * held.rms),
                 "held_out_gain_in_se": json_number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
@@ -276,10 +446,11 @@ def _pairs(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return sorted(found, key=lambda pair: (-(pair["probability"] or 0.0), -(pair["log_evidence"] or 0.0)))
 
 
-def pair_parameters(fit: Fit) -> dict[str, Any]:
+def pair_parameters(fit: Fit) -> dict[str, dict[str, Any]]:
     """Effect -> its parameters and choice."""
     flat = list(parameters(fit).items())
-    found, start = {}, 0
+    found: dict[str, dict[str, Any]] = {}
+    start = 0
     for candidate in fit.candidates:
         count = len(candidate.components)
         found[candidate.name] = dict(flat[start : start + count]) | dict(candidate.choice)
@@ -287,7 +458,7 @@ def pair_parameters(fit: Fit) -> dict[str, Any]:
     return found
 
 
-def _noise(judgement: Judgement) -> dict[str, Any]:
+def _noise(judgement: Judgement) -> NoiseEntry:
     noise = judgement.noise
     return {
         "name": noise.name,
@@ -299,7 +470,7 @@ def _noise(judgement: Judgement) -> dict[str, Any]:
     }
 
 
-def _gates(judgement: Judgement) -> dict[str, Any]:
+def _gates(judgement: Judgement) -> GatesEntry:
     gate = judgement.base_gate
     return {
         "baseline_probability": json_number(gate.probability, 3),
@@ -313,7 +484,7 @@ def _gates(judgement: Judgement) -> dict[str, Any]:
     }
 
 
-def _in_short(judgement: Judgement) -> dict[str, Any]:
+def _in_short(judgement: Judgement) -> InShort:
     return {
         "verdict": judgement.verdict,
         "plausible": list(judgement.plausible),
@@ -327,23 +498,3 @@ def _in_short(judgement: Judgement) -> dict[str, Any]:
         "baseline_gate_probability": json_number(judgement.base_gate.probability, 3),
         "structure": judgement.base_gate.worst,
     }
-
-
-def assumptions(diagnosis: Diagnosis) -> list[str]:
-    """What was assumed, in sentences."""
-    noise = diagnosis.noise
-    found = [
-        f"noise: {noise.origin}",
-        f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
-        f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
-        f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: assumed",
-        f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
-        "(sd) of the machine file: effective values, which absorb part of every other effect",
-        f"sizes of effects: flat in the logarithm between {100 * EXPECTED[0]:g} and {100 * EXPECTED[1]:g} % change of "
-        "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
-        f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
-        f"the plausible set holds {100 * HELD:g} %",
-    ]
-    if "force_N" in diagnosis.data.missing:
-        found.append(f"load of every reading: {DEFAULT_FORCE:g} N, assumed because force_N is missing")
-    return found

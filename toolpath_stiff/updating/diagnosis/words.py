@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from toolpath_stiff.hints import Asked, command_line, hint, options
-from toolpath_stiff.stiffness.effects.contract import joined
+from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, joined
+from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
-from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.updating.inference.candidates import EXPECTED
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
 from toolpath_stiff.updating.inference.fits import errors_text
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED
+
+SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:
@@ -183,3 +190,50 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
             hint("and try it", asked.command("diagnose", effects=[file])),
         ]
     return ["use the model; `detectable` lists what could still be there unseen"]
+
+
+def row_words(diagnosis: Diagnosis, name: str) -> str:
+    """How a hypothesis stands: by its odds against the likeliest, unless a gate has settled it."""
+    main = diagnosis.main
+    probability = main.probability.get(name, 0.0)
+    base_passes = main.base_gate.probability > FALSE_ALARM
+    if base_passes:
+        return "enough" if name == NONE else "no more than chance" if probability >= SHOWN else "not needed"
+    gate = main.base_gate if name == NONE else main.gates.get(name)
+    if probability < SHOWN and gate is not None and gate.probability <= (FALSE_ALARM if name == NONE else ADEQUATE):
+        return "does not fit"
+    said = words(probability, max(main.probability.values(), default=0.0))
+    return "closest" if said == "best" and main.verdict == "unexplained" else said
+
+
+def words(probability: float, best: float) -> str:
+    """How a hypothesis stands against the likeliest one, by twice the logarithm of the odds (RadVel's wording)."""
+    if probability < SHOWN:
+        return "ruled out"
+    if probability >= best:
+        return "best"
+    twice = 2.0 * float(np.log(best / probability))
+    for limit, text in ((2.0, "nearly indistinguishable"), (4.0, "somewhat disfavoured")):
+        if twice < limit:
+            return text
+    return "strongly disfavoured"
+
+
+def assumptions(diagnosis: Diagnosis) -> list[str]:
+    """What was assumed, in sentences."""
+    noise = diagnosis.noise
+    found = [
+        f"noise: {noise.origin}",
+        f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
+        f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
+        f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: assumed",
+        f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
+        "(sd) of the machine file: effective values, which absorb part of every other effect",
+        f"sizes of effects: flat in the logarithm between {100 * EXPECTED[0]:g} and {100 * EXPECTED[1]:g} % change of "
+        "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
+        f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
+        f"the plausible set holds {100 * HELD:g} %",
+    ]
+    if "force_N" in diagnosis.data.missing:
+        found.append(f"load of every reading: {DEFAULT_FORCE:g} N, assumed because force_N is missing")
+    return found

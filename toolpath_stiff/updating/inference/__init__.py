@@ -1,4 +1,18 @@
-"""From fits, probabilities and gates to a verdict.
+"""From readings to a verdict: the whole way on this page, a function and a type a step.
+
+| step | function | gives |
+| --- | --- | --- |
+| read | `measurements.read_measurements` | `Measurements`: readings as columns |
+| noise | `noise.noise_models` | `Noise`: how far readings scatter for reasons that no model explains |
+| | `evidence.Problem.of` | `Problem`: readings, model and scatter together |
+| candidates | `find_candidates` | `Candidates`: every effect fitted as far as a table of its compliance goes |
+| fits | `Fits` | `Fit`: the likely ones once more with the model itself, each when it is asked for |
+| gates | `apply_gates` | `Gates`: which explanations leave no more than noise would |
+| probabilities | `weigh` | `Probabilities` of those that pass |
+| verdict | `decide` | `Judgement`: the verdict, the explanations that hold the truth, all of the above |
+
+`judge` takes the steps from the candidates on, under one noise model; `diagnosis.diagnose` all of them, under each
+noise model that the data allow.
 
 Two gates. Absolute: a hypothesis must leave residuals that its own noise explains. Relative: among those that do, the
 posterior probabilities decide; only a name far ahead of all others is given as the answer.
@@ -11,15 +25,15 @@ unexplained   something is missing, and nothing in the catalogue accounts for it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.updating.inference.evidence import Problem, Score
-from toolpath_stiff.updating.inference.fits import Fit, refine
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
+from toolpath_stiff.updating.inference.fits import refine
 from toolpath_stiff.updating.inference.gates import Gate, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import (
     Family,
@@ -82,7 +96,7 @@ class Judgement:
     explanations: tuple[str, ...]
     problem: Problem
     noise: Noise
-    base: Score
+    base: Fit
     base_gate: Gate
     families: tuple[Family, ...]
     gates: dict[str, Gate]
@@ -102,35 +116,244 @@ class Judgement:
 
 
 def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:
-    """Search all candidates, test them, and come to a verdict under one noise model."""
+    """Search all candidates, test them, and come to a verdict under one noise model.
+
+    Parameters
+    ----------
+    problem, noise
+        Readings, model and scatter; the noise model behind the scatter.
+    effects
+        What may be missing.
+    seed
+        Of the simulated readings.
+    """
+    candidates = find_candidates(problem, effects)
+    fits = Fits(problem)
+    gates = apply_gates(problem, noise, candidates, fits, seed)
+    weighed = weigh(problem, noise, candidates, gates)
+    verdict, explanations = decide(gates, weighed)
+    return Judgement(
+        verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form,
+    )  # fmt: skip
+
+
+# -- candidates --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Everything that was searched, on tables of added compliance.
+
+    Attributes
+    ----------
+    base
+        The model with its strut law refitted, without a further effect.
+    families
+        All effects that do something to these data, the most likely first.
+    forms
+        Forms that a discrepancy may take which no effect describes, in words -> covariance (n, n).
+    """
+
+    base: Fit
+    families: tuple[Family, ...]
+    forms: Mapping[str, FloatArray]
+
+    @property
+    def offered(self) -> list[Family]:
+        """Effects that fit best when they are there."""
+        return [family for family in self.families if family.best is not None]
+
+
+def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
+    """Fit every effect with each of its choices beside the strut law."""
     base = problem.score_base()
     families = score_families(problem, effects, base)
-    forms = discrepancy_forms(problem.predictor)
+    return Candidates(base, tuple(families), discrepancy_forms(problem.predictor))
+
+
+# -- fits --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Final fits with the model itself; each is made when it is first asked for, since few of them are needed."""
+
+    problem: Problem
+    made: dict[str, Fit] = field(default_factory=dict)
+
+    def of(self, name: str, found: Fit) -> Fit:
+        """The final fit of a hypothesis from what the search has found."""
+        if name not in self.made:
+            self.made[name] = refine(self.problem, found)
+        return self.made[name]
+
+
+# -- gates -------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Gates:
+    """Which explanations leave no more than noise would.
+
+    Attributes
+    ----------
+    base
+        The absolute test of the model without a further effect.
+    none_stands
+        Whether that model stays in the running.
+    singles, pairs
+        Effects that pass, the most likely first; pairs that pass and beat each of their members.
+    tried
+        All pairs that were fitted, the most likely first.
+    by_name
+        Effect (or "a + b") -> its absolute test, where it was made.
+    """
+
+    base: Gate
+    none_stands: bool
+    singles: tuple[str, ...] = ()
+    pairs: tuple[Pair, ...] = ()
+    tried: tuple[Pair, ...] = ()
+    by_name: Mapping[str, Gate] = field(default_factory=dict)
+
+    @property
+    def enough(self) -> bool:
+        """Whether the model explains the data without a further effect."""
+        return self.base.probability > FALSE_ALARM
+
+
+def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
+    """The model alone, then single effects, then pairs: of the likeliest single that passes, else of the best ones."""
     simulator = Simulator.of(noise, problem.covariance, seed)
+    base, families, forms = candidates.base, candidates.families, candidates.forms
     # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
-    base_gate = absolute_gate(
-        problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain
-    )
-    work = _Work(problem, noise, base, families, forms, simulator)
-    if base_gate.probability > FALSE_ALARM:
-        posterior = work.posterior(none=True, names=[f.name for f in families])
-        likely = _smallest_set(posterior)
-        likely = likely if NONE in likely else (*likely, NONE)
-        return work.judgement("adequate", likely, noise, base_gate, posterior, "")
+    alone = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain)
+    if alone.probability > FALSE_ALARM:
+        return Gates(alone, none_stands=True)
+    by_name: dict[str, Gate] = {}
+
+    def passes(name: str, found: Fit) -> bool:
+        fit = fits.of(name, found)
+        by_name[name] = absolute_gate(problem, fit.residual, fit.jacobian, simulator, forms)
+        return by_name[name].probability > ADEQUATE
+
+    singles: list[Family] = []
+    for count, family in enumerate(candidates.offered):
+        assert family.best is not None
+        if count >= TESTED and (not singles or family.log_evidence < singles[0].log_evidence - FAR):
+            break
+        if passes(family.name, family.best):
+            singles.append(family)
+    tried = score_pairs(problem, families, singles[:1] or families)
+    evidence = {f.name: f.log_evidence for f in families}
+    pairs = [
+        pair
+        for pair in tried[:TESTED]
+        if pair.log_evidence > max(evidence[member] for member in pair.names) + SURVIVES
+        and passes(pair.name, pair.score)
+    ]
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
-    none_stands = min(base_gate.squares_probability, base_gate.structure_probability) > ADEQUATE
-    names = work.adequate_singles(none_stands)
-    if names:
-        posterior = work.posterior(none_stands, names, work.adequate_pairs(names[0]))
-        if sum(weight for name, weight in posterior.items() if " + " in name) < POSITIVE * posterior[names[0]]:
-            posterior = work.posterior(none_stands, names)
+    none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
+    return Gates(alone, none_stands, tuple(f.name for f in singles), tuple(pairs), tuple(tried), by_name)
+
+
+# -- probabilities -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Probabilities:
+    """Hypothesis -> posterior probability: effects, `none`, "a + b", `OUTSIDE`; 0 for those that a gate keeps out.
+
+    `form` is the form of discrepancy that stands out, in words; "" if none was looked for.
+    """
+
+    by_name: Mapping[str, float]
+    form: str = ""
+
+
+def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) -> Probabilities:
+    """Probabilities of the explanations that pass: of single effects where one does, else of pairs and of others."""
+    families = candidates.families
+    if gates.enough:
+        return Probabilities(_posterior(problem, noise, candidates, True, [f.name for f in families]))
+    if gates.singles:
+        found = _posterior(problem, noise, candidates, gates.none_stands, gates.singles, gates.pairs)
+        if sum(weight for name, weight in found.items() if " + " in name) < POSITIVE * found[gates.singles[0]]:
+            found = _posterior(problem, noise, candidates, gates.none_stands, gates.singles)
+        return Probabilities(found)
+    outside, form = -np.inf, ""
+    for fit in (candidates.base, *(f.best for f in candidates.offered[:2] if f.best is not None)):
+        evidence, words = discrepancy_evidence(problem, fit, candidates.forms)
+        if evidence > outside:
+            outside, form = evidence, words
+    evidences = {OUTSIDE: outside} | {pair.name: pair.log_evidence for pair in gates.pairs}
+    prior = {OUTSIDE: PRIOR_OUTSIDE} | {pair.name: _pair_prior(families) for pair in gates.pairs}
+    found = probabilities(evidences, prior)
+    if found[OUTSIDE] < STANDS and gates.pairs:  # ruled out
+        del found[OUTSIDE]
+    return Probabilities(found, form)
+
+
+def _posterior(
+    problem: Problem,
+    noise: Noise,
+    candidates: Candidates,
+    none: bool,
+    names: Sequence[str],
+    pairs: Sequence[Pair] = (),
+) -> dict[str, float]:
+    """Probabilities of the base model (if it stands), of single effects and of pairs; 0 for all others."""
+    base, families = candidates.base, candidates.families
+
+    def evidence(log_evidence: float, fit: Fit) -> float:
+        return _with_unknown_noise(problem, noise, log_evidence, fit)
+
+    found = {f.name: evidence(f.log_evidence, f.best or base) for f in families}
+    found |= {pair.name: evidence(pair.log_evidence, pair.score) for pair in pairs}
+    prior = {name: PRIOR_SINGLES / max(len(families), 1) for name in names}
+    prior |= {pair.name: _pair_prior(families) for pair in pairs}
+    return probabilities(
+        {NONE: evidence(base.log_evidence, base)} | found, prior | ({NONE: PRIOR_NONE} if none else {})
+    )
+
+
+def _pair_prior(families: Sequence[Family]) -> float:
+    """Prior probability of one pair."""
+    return PRIOR_PAIRS / max(len(families) * (len(families) - 1) // 2, 1)
+
+
+def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:
+    """Log evidence when the size of the noise is itself known to `noise.freedom` degrees of freedom only.
+
+    Integrated over it, the normal likelihood exp(-q / 2) of the weighted squares q of n readings becomes Student's,
+    (1 + q / freedom)^(-(freedom + n) / 2): many readings that fit badly say as much of the noise as of the model.
+    """
+    freedom, n = noise.freedom, len(fit.residual)
+    if not np.isfinite(freedom):
+        return log_evidence
+    squares = -2.0 * fit.log_likelihood - problem.scatter.log_determinant
+    return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
+
+
+# -- verdict -----------------------------------------------------------------------------------------------------------
+
+
+def decide(gates: Gates, weighed: Probabilities) -> tuple[str, tuple[str, ...]]:
+    """The verdict, and the hypotheses that hold the truth with 95 % probability, the most likely first."""
+    posterior = dict(weighed.by_name)
+    if gates.enough:
         likely = _smallest_set(posterior)
-        verdict = "identified" if max(posterior.values()) >= NAMED else "ambiguous"
-        if posterior[NONE] > 0.5:  # what counts against the model is likelier chance than any effect
-            verdict = "adequate"
-        return work.judgement(verdict, likely, noise, base_gate, posterior, "")
-    return work.beyond_singles(noise, base_gate)
+        return "adequate", likely if NONE in likely else (*likely, NONE)
+    if gates.singles:
+        named = "identified" if max(posterior.values()) >= NAMED else "ambiguous"
+        # Above a half, what counts against the model is likelier chance than any effect.
+        return "adequate" if posterior[NONE] > 0.5 else named, _smallest_set(posterior)
+    if OUTSIDE in posterior:
+        return "unexplained", ()
+    standing = [name for name, weight in posterior.items() if weight > STANDS]
+    return "identified" if len(standing) == 1 else "ambiguous", _smallest_set(posterior)
 
 
 def _smallest_set(posterior: dict[str, float]) -> tuple[str, ...]:
@@ -146,118 +369,3 @@ def _smallest_set(posterior: dict[str, float]) -> tuple[str, ...]:
         found.append(name)
         held += weight
     return tuple(found)
-
-
-class _Work:
-    """What one judgement passes from step to step."""
-
-    def __init__(
-        self,
-        problem: Problem,
-        noise: Noise,
-        base: Score,
-        families: list[Family],
-        forms: dict[str, FloatArray],
-        simulator: Simulator,
-    ) -> None:
-        self.problem, self.noise, self.base, self.families = problem, noise, base, families
-        self.forms, self.simulator = forms, simulator
-        self.gates: dict[str, Gate] = {}
-        self.fits: dict[str, Fit] = {}
-        self.pairs: list[Pair] = []
-
-    def gate(self, name: str, score: Score) -> Gate:
-        """The absolute test of a fit, made once, with the model itself."""
-        if name not in self.gates:
-            fit = self.fits[name] = refine(self.problem, score)
-            self.gates[name] = absolute_gate(self.problem, fit.residual, fit.jacobian, self.simulator, self.forms)
-        return self.gates[name]
-
-    def evidence(self, log_evidence: float, score: Score) -> float:
-        """Log evidence when the size of the noise is itself known to `noise.freedom` degrees of freedom only.
-
-        Integrated over it, the normal likelihood exp(-q / 2) of the weighted squares q of n readings becomes Student's,
-        (1 + q / freedom)^(-(freedom + n) / 2): many readings that fit badly say as much of the noise as of the model.
-        """
-        freedom, n = self.noise.freedom, len(score.residual)
-        if not np.isfinite(freedom):
-            return log_evidence
-        squares = -2.0 * score.log_likelihood - self.problem.scatter.log_determinant
-        return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
-
-    def posterior(self, none: bool, names: Sequence[str], pairs: Sequence[Pair] = ()) -> dict[str, float]:
-        """Probabilities of the base model (if it stands), of single effects and of pairs; 0 for all others."""
-        evidence = {f.name: self.evidence(f.log_evidence, f.best or self.base) for f in self.families}
-        evidence |= {pair.name: self.evidence(pair.log_evidence, pair.score) for pair in pairs}
-        prior = {name: PRIOR_SINGLES / max(len(self.families), 1) for name in names}
-        prior |= {pair.name: self.pair_prior for pair in pairs}
-        return probabilities(
-            {NONE: self.evidence(self.base.log_evidence, self.base)} | evidence,
-            prior | ({NONE: PRIOR_NONE} if none else {}),
-        )
-
-    def adequate_singles(self, none_stands: bool) -> list[str]:
-        """Effects that pass the absolute gate, among all that could matter."""
-        offered = [f for f in self.families if f.best is not None]
-        if not offered:
-            return []
-        top = -np.inf
-        passed: list[str] = []
-        for count, family in enumerate(offered):
-            assert family.best is not None
-            if count >= TESTED and (not passed or family.log_evidence < top - FAR):
-                break
-            if self.gate(family.name, family.best).probability > ADEQUATE:
-                top = top if passed else family.log_evidence
-                passed.append(family.name)
-        return passed
-
-    @property
-    def pair_prior(self) -> float:
-        """Prior probability of one pair."""
-        return PRIOR_PAIRS / max(len(self.families) * (len(self.families) - 1) // 2, 1)
-
-    def adequate_pairs(self, start: str = "") -> list[Pair]:
-        """Pairs that pass the absolute gate and beat each member alone; of the best singles, or of one that stands."""
-        starts = [f for f in self.families if f.name == start] or self.families
-        self.pairs = score_pairs(self.problem, self.families, starts)
-        singles = {f.name: f.log_evidence for f in self.families}
-        return [
-            pair
-            for pair in self.pairs[:TESTED]
-            if pair.log_evidence > max(singles[member] for member in pair.names) + SURVIVES
-            and self.gate(pair.name, pair.score).probability > ADEQUATE
-        ]
-
-    def beyond_singles(self, noise: Noise, base_gate: Gate) -> Judgement:
-        """No single effect will do: two, or something else."""
-        offered = [f for f in self.families if f.best is not None]
-        pairs = self.adequate_pairs()
-        outside, form = -np.inf, ""
-        for score in (self.base, *(f.best for f in offered[:2] if f.best is not None)):
-            evidence, words = discrepancy_evidence(self.problem, score, self.forms)
-            if evidence > outside:
-                outside, form = evidence, words
-        evidences = {OUTSIDE: outside} | {pair.name: pair.log_evidence for pair in pairs}
-        prior = {OUTSIDE: PRIOR_OUTSIDE} | {pair.name: self.pair_prior for pair in pairs}
-        posterior = probabilities(evidences, prior)
-        if posterior[OUTSIDE] >= STANDS or len(posterior) == 1:
-            return self.judgement("unexplained", (), noise, base_gate, posterior, form)
-        posterior.pop(OUTSIDE)
-        likely = [name for name, weight in posterior.items() if weight > STANDS]
-        verdict = "identified" if len(likely) == 1 else "ambiguous"
-        return self.judgement(verdict, _smallest_set(posterior), noise, base_gate, posterior, form)
-
-    def judgement(
-        self,
-        verdict: str,
-        explanations: tuple[str, ...],
-        noise: Noise,
-        base_gate: Gate,
-        posterior: dict[str, float],
-        form: str,
-    ) -> Judgement:
-        return Judgement(
-            verdict, explanations, self.problem, noise, self.base, base_gate, tuple(self.families), self.gates,
-            self.fits, tuple(self.pairs), posterior, form,
-        )  # fmt: skip

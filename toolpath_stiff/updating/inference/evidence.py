@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.candidates import (
     Candidate,
     Sight,
@@ -37,62 +38,108 @@ BEYOND = 0.05  # share of a bound by which a search may overshoot it
 
 
 @dataclass(frozen=True)
-class Score:
-    """One fit: a set of candidates with their sizes, and how likely it makes the data.
+class Fit:
+    """Strut law and effects fitted to n readings: by a search on tables, or with the model itself (`fits`).
 
     Attributes
     ----------
-    tables
-        The candidates' tables; none for the base model.
-    sizes
-        One array (p,) a candidate.
+    candidates, sizes
+        Effects with what they act on, none for the base model; their sizes, one array (p,) each, from the neutral
+        value.
+    free
+        Indices of the free sizes, counted over all candidates; the others are neutral.
     law
-        (2,) logarithms of the factors on the strut law.
+        (2,) logarithms of the factors on the strut law's stiffnesses; kept at 0 if `law_free` is false.
     residual
         (n,) ln measured - ln modelled.
-    scatter
-        With the wild readings of this fit.
-    log_likelihood, log_evidence
-        At the fit; integrated over sizes and law under their priors.
     jacobian
-        (n, 2 + p) derivatives of the modelled ln k to law and to the free sizes.
+        (n, 2 + free) of ln modelled to law and free sizes.
     covariance
-        (2 + p, 2 + p) of law and free sizes.
-    free
-        Indices of the free sizes, counted over all candidates.
+        (2 + free, 2 + free) of law and free sizes.
+    scatter
+        The noise with the readings that this fit takes for wild.
+    law_free
+        Whether the strut law was fitted along.
+    absent
+        Index of a size that is not free -> (where the data would pull it, sd of that), were all sizes free.
+    tables
+        Of a search: the candidates' tables.
+    log_evidence
+        Of a search: how likely it makes the data, integrated over sizes and law under their priors; else nan.
     interval
-        (2,) 95 % interval of the size of a single parameter from its profile; None otherwise.
+        Of a search: (2,) 95 % interval of the size of a single parameter from its profile; None otherwise.
     possible
         Whether the sizes lie within their bounds; if not, only `log_evidence` means anything.
     """
 
-    tables: tuple[Table, ...]
+    candidates: tuple[Candidate, ...]
     sizes: tuple[FloatArray, ...]
+    free: tuple[int, ...]
     law: FloatArray
     residual: FloatArray
-    scatter: Scatter
-    log_likelihood: float
-    log_evidence: float
     jacobian: FloatArray
     covariance: FloatArray
-    free: tuple[int, ...] = ()
+    scatter: Scatter
+    law_free: bool = True
+    absent: dict[int, tuple[float, float]] = field(default_factory=dict)
+    tables: tuple[Table, ...] = ()
+    log_evidence: float = np.nan
     interval: FloatArray | None = None
     possible: bool = True
 
     @property
-    def candidates(self) -> tuple[Candidate, ...]:
-        """The candidates."""
-        return tuple(table.candidate for table in self.tables)
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects."""
-        return tuple(table.candidate.name for table in self.tables)
+        return tuple(c.name for c in self.candidates)
+
+    @property
+    def effects(self) -> tuple[ActiveEffect, ...]:
+        """The effects with their values."""
+        return tuple(c.active(s) for c, s in zip(self.candidates, self.sizes, strict=True))
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Each effect with its size as a clause in an engineer's words."""
+        found = []
+        for candidate, sizes in zip(self.candidates, self.sizes, strict=True):
+            parts = zip(candidate.components, sizes, strict=True)
+            values = {c.parameter.name: c.value(float(size)) / c.parameter.si for c, size in parts}
+            found.append(candidate.effect.finding({**dict(candidate.choice), **values}))
+        return tuple(found)
+
+    @property
+    def errors(self) -> FloatArray:
+        """(n,) |modelled - measured| / measured."""
+        return np.abs(np.expm1(-self.residual))
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the residuals, the price of wild readings included."""
+        return float(self.scatter.log_likelihood(self.residual))
 
     @property
     def log_posterior(self) -> float:
-        """Log likelihood with the law's prior: what the fit has made largest."""
-        return self.log_likelihood - 0.5 * float(self.law @ self.law) / LAW_PRIOR**2
+        """Log likelihood with the law's prior: what the fit has made largest; -inf where the model has no answer."""
+        penalty = 0.5 * float(self.law @ self.law) / LAW_PRIOR**2 if self.law_free else 0.0
+        found = self.log_likelihood - penalty
+        return found if np.isfinite(found) else -np.inf
+
+    def deviation(self, index: int) -> float:
+        """Standard deviation of a size (counted over all candidates); 0 if it is not free."""
+        if index not in self.free:
+            return 0.0
+        at = 2 + self.free.index(index)
+        return float(np.sqrt(max(self.covariance[at, at], 0.0)))
+
+    def at_upper_bound(self) -> list[str]:
+        """Parameters whose size has run into its bound: such a fit is no explanation."""
+        found = []
+        for candidate, sizes in zip(self.candidates, self.sizes, strict=True):
+            for component, size in zip(candidate.components, sizes, strict=True):
+                reach = component.reach(float(np.sign(size))) if size else np.inf
+                if np.isfinite(reach) and abs(size) >= 0.999 * reach:
+                    found.append(component.parameter.name)
+        return found
 
 
 @dataclass
@@ -178,7 +225,7 @@ class Problem:
 
     # -- scores ----------------------------------------------------------------------------------------------------
 
-    def score_base(self) -> Score:
+    def score_base(self) -> Fit:
         """The model without any further effect."""
         scatter, law = self.scatter, np.zeros(2)
         none = np.zeros((1, len(self.observed)))
@@ -188,15 +235,13 @@ class Problem:
             scatter, wild = self.scatter.with_wild(residual), scatter.wild
             if scatter.wild == wild:
                 break
-        likelihood = float(scatter.log_likelihood(residual))
-        return Score(
-            (), (), law, residual, scatter, likelihood,
-            likelihood + float(_law_terms(law[None], information)[0]),
-            self.law_jacobian(law, self.compliance(law, none[0])),
-            np.asarray(np.linalg.inv(information[0]), dtype=float),
+        return Fit(
+            (), (), (), law, residual, self.law_jacobian(law, self.compliance(law, none[0])),
+            np.asarray(np.linalg.inv(information[0]), dtype=float), scatter,
+            log_evidence=float(scatter.log_likelihood(residual)) + float(_law_terms(law[None], information)[0]),
         )  # fmt: skip
 
-    def score_single(self, table: Table, start: Score) -> Score:
+    def score_single(self, table: Table, start: Fit) -> Fit:
         """A candidate of one parameter: quadrature over its size."""
         sizes = np.sort(
             np.concatenate([s * np.geomspace(np.exp(k[0][0]), table.reach(s), GRID) for s, k in table.knots.items()])
@@ -218,9 +263,10 @@ class Problem:
         information = jacobian.T @ scatter.inverse @ jacobian
         information[:2, :2] += np.eye(2) / LAW_PRIOR**2
         constant = -0.5 * scatter.log_determinant - len(scatter.wild) * scatter.price
-        return Score(
-            (table,), best, law, residual, scatter, float(scatter.log_likelihood(residual)), log_integral + constant,
-            jacobian, np.asarray(np.linalg.pinv(information), dtype=float), (0,), interval,
+        return Fit(
+            (table.candidate,), best, (0,), law, residual, jacobian,
+            np.asarray(np.linalg.pinv(information), dtype=float), scatter,
+            tables=(table,), log_evidence=log_integral + constant, interval=interval,
         )  # fmt: skip
 
     def _scan(self, table: Table, sizes: FloatArray, inverse: FloatArray, law: FloatArray, steps: int = 3) -> _Scan:
@@ -250,18 +296,14 @@ class Problem:
         slopes = [-t.slope(s) / compliance[:, None] for t, s in zip(tables, sizes, strict=True)]
         return np.concatenate([self.law_jacobian(law, compliance), *slopes], axis=1)
 
-    def score_subset(self, tables: Sequence[Table], free: tuple[int, ...], start: Score) -> Score | None:
+    def score_subset(self, tables: Sequence[Table], free: tuple[int, ...], start: Fit) -> Fit | None:
         """Candidates with these components free (counted over all of them); None if one ends at zero or at its bound.
 
         Gauss-Newton, then Laplace's approximation.
         """
         owners = [(t, j) for t in tables for j in range(len(t.candidate.components))]
         chosen = [owners[i] for i in free]
-        sizes = {id(t): np.zeros(len(t.candidate.components)) for t in tables}
-        if len(start.free) > 0:
-            for table, old in zip(start.tables, start.sizes, strict=True):
-                if id(table) in sizes:
-                    sizes[id(table)] = old.copy()
+        sizes = _starting_sizes(tables, start)
         law, scatter = start.law.copy(), self.scatter
         for last in range(MOST_ROUNDS, -1, -1):
             converged = self._gauss_newton(tables, chosen, sizes, law, scatter.inverse)
@@ -282,25 +324,41 @@ class Problem:
         possible = all(t.candidate.components[j].allows(size) for (t, j), size in zip(chosen, own, strict=True))
         if not possible and len(free) > 1:
             return None
-        likelihood = float(scatter.log_likelihood(residual))
-        evidence = likelihood - 0.5 * float(law @ law) / LAW_PRIOR**2 - 2.0 * np.log(LAW_PRIOR)
-        if len(free) == 1:
+        evidence = float(scatter.log_likelihood(residual)) - 0.5 * float(law @ law) / LAW_PRIOR**2
+        evidence += -2.0 * np.log(LAW_PRIOR)
+        return Fit(
+            tuple(t.candidate for t in tables), tuple(sizes[id(t)] for t in tables), free, law, residual, jacobian,
+            covariance, scatter, tables=tuple(tables),
+            log_evidence=float(self._integrated(evidence, tables, chosen, own, deviations, information)),
+            possible=possible,
+        )  # fmt: skip
+
+    def _integrated(
+        self,
+        evidence: float,
+        tables: Sequence[Table],
+        chosen: Sequence[tuple[Table, int]],
+        own: Sequence[float],
+        deviations: FloatArray,
+        information: FloatArray,
+    ) -> float:
+        """The log posterior of law and sizes at its peak, `evidence`, integrated over them.
+
+        `own` (p,) are the sizes, `deviations` (p,) their sd, `information` (2 + p, 2 + p).
+        """
+        if len(chosen) == 1:
             evidence -= 0.5 * np.linalg.slogdet(information[:2, :2])[1]
             # By quadrature, which holds for sizes next to nothing as well, with the profile as a parabola.
             table, j = chosen[0]
-            evidence += self.prior(table, j).log_mean_likelihood(own[0], float(deviations[0]))
-        else:
-            evidence -= 0.5 * np.linalg.slogdet(information)[1]
-            evidence += 0.5 * len(free) * np.log(2.0 * np.pi)
-            for table in tables:
-                mine = [i for i, (owner, _) in enumerate(chosen) if owner is table]
-                evidence += self._log_prior(
-                    table, [chosen[i][1] for i in mine], [own[i] for i in mine], deviations[mine].tolist()
-                )
-        return Score(
-            tuple(tables), tuple(sizes[id(t)] for t in tables), law, residual, scatter, likelihood, float(evidence),
-            jacobian, covariance, free, possible=possible,
-        )  # fmt: skip
+            return evidence + self.prior(table, j).log_mean_likelihood(own[0], float(deviations[0]))
+        evidence -= 0.5 * np.linalg.slogdet(information)[1]
+        evidence += 0.5 * len(chosen) * np.log(2.0 * np.pi)
+        for table in tables:
+            mine = [i for i, (owner, _) in enumerate(chosen) if owner is table]
+            evidence += self._log_prior(
+                table, [chosen[i][1] for i in mine], [own[i] for i in mine], deviations[mine].tolist()
+            )
+        return evidence
 
     def _log_prior(self, table: Table, components: list[int], sizes: list[float], sds: list[float]) -> float:
         """Log prior density of an effect's components: the strongest by itself, the others comparable to it."""
@@ -392,6 +450,14 @@ def scaled_inverse(matrix: FloatArray) -> FloatArray:
     """Inverse of a covariance or information matrix (p, p) whose rows may have very different units."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
+
+
+def _starting_sizes(tables: Sequence[Table], start: Fit) -> dict[int, FloatArray]:
+    """Id of a table -> its sizes where a fit begins: those of an earlier fit of the same table, else 0."""
+    sizes = {id(t): np.zeros(len(t.candidate.components)) for t in tables}
+    if len(start.free) > 0:
+        sizes |= {id(t): old.copy() for t, old in zip(start.tables, start.sizes, strict=True) if id(t) in sizes}
+    return sizes
 
 
 def _pull_back(chosen: Sequence[tuple[Table, int]], sizes: dict[int, FloatArray]) -> list[tuple[Table, int]]:

@@ -7,14 +7,14 @@ Everything is dimensionless or scaled: with constants in N/m the gradient would 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem, Score, scaled_inverse
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem, scaled_inverse
 from toolpath_stiff.updating.inference.noise import Scatter
 
 FloatArray = NDArray[np.float64]
@@ -24,87 +24,9 @@ TOLERANCE = 1e-3  # of a standard deviation
 NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Strut law and effects fitted to n readings.
-
-    Attributes
-    ----------
-    candidates, sizes
-        Effects with what they act on; their sizes, one array (p,) each, from the neutral value.
-    free
-        Indices of the free sizes, counted over all candidates; the others are neutral.
-    law
-        (2,) logarithms of the factors on the strut law's stiffnesses; kept at 0 if `law_free` is false.
-    residual
-        (n,) ln measured - ln modelled.
-    jacobian
-        (n, 2 + free) of ln modelled to law and free sizes.
-    covariance
-        (2 + free, 2 + free) of law and free sizes.
-    scatter
-        The noise with the readings that this fit takes for wild.
-    absent
-        Index of a size that is not free -> (where the data would pull it, sd of that), were all sizes free.
-    """
-
-    candidates: tuple[Candidate, ...]
-    sizes: tuple[FloatArray, ...]
-    free: tuple[int, ...]
-    law: FloatArray
-    residual: FloatArray
-    jacobian: FloatArray
-    covariance: FloatArray
-    scatter: Scatter
-    law_free: bool = True
-    absent: dict[int, tuple[float, float]] = field(default_factory=dict)
-
-    @property
-    def effects(self) -> tuple[ActiveEffect, ...]:
-        """The effects with their values."""
-        return tuple(c.active(s) for c, s in zip(self.candidates, self.sizes, strict=True))
-
-    @property
-    def findings(self) -> tuple[str, ...]:
-        """Each effect with its size as a clause in an engineer's words."""
-        found = []
-        for candidate, sizes in zip(self.candidates, self.sizes, strict=True):
-            parts = zip(candidate.components, sizes, strict=True)
-            values = {c.parameter.name: c.value(float(size)) / c.parameter.si for c, size in parts}
-            found.append(candidate.effect.finding({**dict(candidate.choice), **values}))
-        return tuple(found)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the effects."""
-        return tuple(c.name for c in self.candidates)
-
-    @property
-    def errors(self) -> FloatArray:
-        """(n,) |modelled - measured| / measured."""
-        return np.abs(np.expm1(-self.residual))
-
-    def deviation(self, index: int) -> float:
-        """Standard deviation of a size (counted over all candidates); 0 if it is not free."""
-        if index not in self.free:
-            return 0.0
-        at = 2 + self.free.index(index)
-        return float(np.sqrt(max(self.covariance[at, at], 0.0)))
-
-    def at_upper_bound(self) -> list[str]:
-        """Parameters whose size has run into its bound: such a fit is no explanation."""
-        found = []
-        for candidate, sizes in zip(self.candidates, self.sizes, strict=True):
-            for component, size in zip(candidate.components, sizes, strict=True):
-                reach = component.reach(float(np.sign(size))) if size else np.inf
-                if np.isfinite(reach) and abs(size) >= 0.999 * reach:
-                    found.append(component.parameter.name)
-        return found
-
-
-def refine(problem: Problem, score: Score, law_free: bool = True) -> Fit:
+def refine(problem: Problem, found: Fit, law_free: bool = True) -> Fit:
     """Gauss-Newton with the model itself from the searches' result, within the bounds."""
-    return fit_effects(problem, score.candidates, score.sizes, score.free, score.law, score.scatter, law_free)
+    return fit_effects(problem, found.candidates, found.sizes, found.free, found.law, found.scatter, law_free)
 
 
 def fit_effects(
@@ -318,14 +240,7 @@ def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], l
         for share in STARTS:
             start = np.array([_start(component, share) for component in candidate.components])
             fits.append(_settled(problem, together, (*before.sizes, start), free, before.law, law_free))
-    return _without_zeros(max(fits, key=log_posterior))
-
-
-def log_posterior(fit: Fit) -> float:
-    """Log likelihood of a fit with the law's prior."""
-    penalty = 0.5 * float(fit.law @ fit.law) / LAW_PRIOR**2 if fit.law_free else 0.0
-    found = float(fit.scatter.log_likelihood(fit.residual)) - penalty
-    return found if np.isfinite(found) else -np.inf
+    return _without_zeros(max(fits, key=lambda fit: fit.log_posterior))
 
 
 def _start(component: Component, share: float) -> float:
@@ -348,7 +263,7 @@ def _settled(
     for _ in range(ROUNDS):
         scatter = problem.scatter.with_wild(fit.residual)
         again = fit_effects(problem, candidates, fit.sizes, free, fit.law, scatter, law_free)
-        done = set(scatter.wild) == set(fit.scatter.wild) and log_posterior(again) < log_posterior(fit) + 1e-4
+        done = set(scatter.wild) == set(fit.scatter.wild) and again.log_posterior < fit.log_posterior + 1e-4
         fit = again
         if done:
             break
@@ -417,7 +332,15 @@ def deviation_percent(residual: FloatArray) -> FloatArray:
     return np.asarray(100.0 * np.expm1(residual))
 
 
-def error_figures(residual: FloatArray) -> dict[str, float]:
+class ErrorFigures(TypedDict):
+    """Errors of a model over some readings; %."""
+
+    mean_abs_error_percent: float
+    bias_percent: float
+    rms_percent: float
+
+
+def error_figures(residual: FloatArray) -> ErrorFigures:
     """Errors of a model in per cent, of residuals ln(measured / modelled).
 
     Mean and rms of |modelled - measured| / measured, as the paper counts it; `bias_percent` is the mean of

@@ -14,7 +14,7 @@ The bootstrapped distribution of the smallest p value makes one test of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,13 +103,13 @@ def set_wild_aside(pulls: FloatArray, projected: FloatArray) -> tuple[FloatArray
 
 
 class Structure:
-    """Score statistics of the forms of discrepancy for one fit, as surprises: -ln of a tail probability.
+    """Fit statistics of the forms of discrepancy for one fit, as surprises: -ln of a tail probability.
 
     r^T P K P r is a weighted sum of chi-squares; its tail is that of one scaled chi-square with the same mean and
     variance (Satterthwaite 1946). The bootstrap corrects what the approximation gets wrong.
     """
 
-    def __init__(self, forms: dict[str, FloatArray], projected: FloatArray) -> None:
+    def __init__(self, forms: Mapping[str, FloatArray], projected: FloatArray) -> None:
         self.names = tuple(forms)
         self.forms = tuple(forms.values())
         self.means, self.variances = [], []
@@ -143,7 +143,7 @@ def absolute_gate(
     residual: FloatArray,
     jacobian: FloatArray,
     simulator: Simulator,
-    forms: dict[str, FloatArray],
+    forms: Mapping[str, FloatArray],
     signatures: Sequence[Sequence[FloatArray]] = (),
     gain: float = 0.0,
 ) -> Gate:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.inference.candidates import Table, candidates_of, tabulate
-from toolpath_stiff.updating.inference.evidence import Problem, Score
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import Structure, set_wild_aside
 
 FloatArray = NDArray[np.float64]
@@ -38,9 +38,9 @@ class Family:
 
     effect: Effect
     tables: tuple[Table, ...]
-    best: Score | None
+    best: Fit | None
     log_evidence: float
-    subsets: tuple[tuple[Score, float], ...] = ()
+    subsets: tuple[tuple[Fit, float], ...] = ()
 
     @property
     def name(self) -> str:
@@ -48,12 +48,12 @@ class Family:
         return self.effect.name
 
 
-def score_family(problem: Problem, effect: Effect, base: Score) -> Family | None:
+def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
     """Search one effect; None if it does nothing to these data."""
     data = problem.predictor.data
     tables, evidences = [], []
-    best: Score | None = None
-    subsets: tuple[tuple[Score, float], ...] = ()
+    best: Fit | None = None
+    subsets: tuple[tuple[Fit, float], ...] = ()
     for candidate in candidates_of(effect, data):
         table = tabulate(candidate, problem.predictor, np.zeros(2))
         if table is None:
@@ -72,7 +72,7 @@ def score_family(problem: Problem, effect: Effect, base: Score) -> Family | None
     return Family(effect, tuple(tables), best, total, subsets)
 
 
-def _scores(problem: Problem, table: Table, base: Score) -> list[tuple[Score, float]]:
+def _scores(problem: Problem, table: Table, base: Fit) -> list[tuple[Fit, float]]:
     """Fits of one candidate with the log prior weight of each subset of components."""
     if table.knots:
         return [(problem.score_single(table, base), 0.0)]
@@ -82,7 +82,7 @@ def _scores(problem: Problem, table: Table, base: Score) -> list[tuple[Score, fl
 
 
 def score_families(
-    problem: Problem, effects: Iterable[Effect], base: Score, progress: Callable[[str], None] | None = None
+    problem: Problem, effects: Iterable[Effect], base: Fit, progress: Callable[[str], None] | None = None
 ) -> list[Family]:
     """All effects that do something to these data, the most likely first."""
     found = []
@@ -201,7 +201,7 @@ class Pair:
     """Two effects together."""
 
     names: tuple[str, str]
-    score: Score
+    score: Fit
     log_evidence: float
 
     @property
@@ -233,7 +233,7 @@ def score_pairs(problem: Problem, families: Sequence[Family], starts: Sequence[F
     return sorted(best.values(), key=lambda pair: (-pair.log_evidence, pair.names))
 
 
-def _beside(problem: Problem, first: Score, table: Table) -> Table:
+def _beside(problem: Problem, first: Fit, table: Table) -> Table:
     """The partner's table where the first effect is at work already, if one of the two is an instrument.
 
     An instrument's factor acts on the whole compliance, the partner's included; mechanical effects add up as they are.
@@ -257,10 +257,10 @@ def _gain(table: Table, pulls: FloatArray, projected: FloatArray, problem: Probl
     return float(sum(gains))
 
 
-def _together(problem: Problem, first: Score, table: Table) -> Score | None:
+def _together(problem: Problem, first: Fit, table: Table) -> Fit | None:
     """The first effect's components refitted along with each subset of the partner's; the best."""
     count = len(first.sizes[0])
-    found: Score | None = None
+    found: Fit | None = None
     subsets = list(table.candidate.subsets())
     for subset in subsets:
         free = (*first.free, *(count + j for j in subset))
@@ -273,13 +273,13 @@ def _together(problem: Problem, first: Score, table: Table) -> Score | None:
     return found
 
 
-def _replace_evidence(score: Score, log_evidence: float) -> Score:
+def _replace_evidence(score: Fit, log_evidence: float) -> Fit:
     from dataclasses import replace
 
     return replace(score, log_evidence=log_evidence)
 
 
-def discrepancy_evidence(problem: Problem, score: Score, forms: Mapping[str, FloatArray]) -> tuple[float, str]:
+def discrepancy_evidence(problem: Problem, score: Fit, forms: Mapping[str, FloatArray]) -> tuple[float, str]:
     """Log evidence of a fit plus a discrepancy of unknown form and amplitude, and the likeliest form.
 
     The gain over the fit alone is, for one form K and amplitude t, with P the projected inverse covariance and z = P r,
@@ -290,7 +290,7 @@ def discrepancy_evidence(problem: Problem, score: Score, forms: Mapping[str, Flo
     """
     projected = problem.projected(score.jacobian)
     pulls, _ = set_wild_aside((score.residual @ projected)[None], projected)
-    surprises = Structure(dict(forms), projected).surprises(pulls)[0]
+    surprises = Structure(forms, projected).surprises(pulls)[0]
     gains, names = [], list(forms)
     order = np.argsort(surprises)[::-1][:FORMS]
     for index in order:

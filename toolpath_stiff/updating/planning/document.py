@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NotRequired, TypedDict, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,103 @@ from toolpath_stiff.updating.planning.visits import (
     reachable,
 )
 
+
+class RivalEntry(TypedDict):
+    """A rival and its probability."""
+
+    name: str
+    probability: float
+
+
+class Expected(TypedDict):
+    """What is to be expected of the plan."""
+
+    probability_of_truth_before: float
+    probability_of_truth_after: float
+    settled_before: float
+    settled_after: float
+    settled_at: float
+    poses_to_settle: int | None
+    repeats_to_settle: int | None
+
+
+class PairEntry(TypedDict):
+    """How far two rivals are apart, in standard deviations."""
+
+    effects: list[str]
+    gap_sigma: float
+    best_single_pose_sigma: float
+    separable: bool
+    indicator_across: dict[str, str]
+
+
+class VisitEntry(TypedDict):
+    """One clamping."""
+
+    clamp: int
+    point: str
+    x_mm: float
+    y_mm: float
+    z_mm: float
+    a_deg: float
+    b_deg: float
+    c_deg: float
+    tool_extension_mm: float
+    setup: str
+    forces_N: list[float]
+    directions: list[str]
+    kind: str
+    why: str
+
+
+class Seen(TypedDict):
+    """An effect and how far a campaign would set it apart from nothing."""
+
+    effect: str
+    gap_sigma: float
+
+
+class _Promise(TypedDict):
+    """What every plan says of itself."""
+
+    poses: int
+    readings: int
+    minutes: float
+    text: list[str]
+    notes: list[str]
+
+
+class RivalsPlan(_Promise):
+    """A plan that tells rivals apart."""
+
+    rivals: list[RivalEntry]
+    expected: Expected
+    pairs: list[PairEntry]
+
+
+class PlanDocument(_Promise):
+    """The content of plan.json: of a plan between rivals, or of a first campaign."""
+
+    kind: str
+    verdict: NotRequired[str]
+    mean_abs_error_percent: NotRequired[dict[str, float]]
+    rivals: NotRequired[list[RivalEntry]]
+    expected: NotRequired[Expected]
+    pairs: NotRequired[list[PairEntry]]
+    sees: NotRequired[list[Seen]]
+    visits: list[VisitEntry]
+    machine: str
+    data: list[str]
+    seed: int
+    costs_minutes: dict[str, float]
+    command: str
+
+
 COSTS = ("reading", "pose", "tool", "setup")
 SHOWS = 3.0  # standard deviations from which on an effect is said to show
 
 
-def document(proposal: Proposal, command: str = "") -> dict[str, Any]:
+def document(proposal: Proposal, command: str = "") -> PlanDocument:
     """The content of plan.json."""
     found = proposal.plan
     rows = rows_of(proposal)
@@ -52,7 +144,7 @@ def document(proposal: Proposal, command: str = "") -> dict[str, Any]:
     else:
         own = _campaign(found, rows, proposal.noise)
         kinds = why = found.purposes
-    return own | {
+    whole = own | {
         "visits": _visits_of(rows, kinds, why),
         "machine": proposal.machine.name,
         "data": list(proposal.files),
@@ -60,6 +152,7 @@ def document(proposal: Proposal, command: str = "") -> dict[str, Any]:
         "costs_minutes": {name: getattr(proposal.costs, name) for name in COSTS},
         "command": command,
     }
+    return cast(PlanDocument, whole)
 
 
 def rows_of(proposal: Proposal) -> list[dict[str, Any]]:
@@ -102,9 +195,9 @@ def _noise_text(noise: float | tuple[float, float]) -> str:
     return " and ".join(f"{100 * part:g} %" for part in (noise if isinstance(noise, tuple) else (noise,)))
 
 
-def _visits_of(rows: list[dict[str, Any]], kinds: Sequence[str], why: Sequence[str]) -> list[dict[str, Any]]:
+def _visits_of(rows: list[dict[str, Any]], kinds: Sequence[str], why: Sequence[str]) -> list[VisitEntry]:
     """One entry a clamping: where, how, what is read, why."""
-    found = []
+    found: list[VisitEntry] = []
     for clamp, (kind, reason) in enumerate(zip(kinds, why, strict=True), 1):
         own = [row for row in rows if row["clamp"] == clamp]
         first = own[0]
@@ -112,7 +205,12 @@ def _visits_of(rows: list[dict[str, Any]], kinds: Sequence[str], why: Sequence[s
             {
                 "clamp": clamp,
                 "point": first["point"],
-                **{name: first[name] for name in POSE},
+                "x_mm": first["x_mm"],
+                "y_mm": first["y_mm"],
+                "z_mm": first["z_mm"],
+                "a_deg": first["a_deg"],
+                "b_deg": first["b_deg"],
+                "c_deg": first["c_deg"],
                 "tool_extension_mm": first["tool_extension_mm"],
                 "setup": first.get("setup", ""),
                 "forces_N": sorted({row["force_N"] for row in own}),
@@ -130,7 +228,7 @@ def _direction(row: dict[str, Any]) -> str:
     return "".join(axis for axis, part in zip("XYZ", (row["dx"], row["dy"], row["dz"]), strict=True) if part)
 
 
-def plan_document(plan: Plan) -> dict[str, Any]:
+def plan_document(plan: Plan) -> RivalsPlan:
     """The plan as the content of plan.json."""
     return {
         "rivals": [{"name": rival.name, "probability": rival.weight} for rival in plan.rivals],

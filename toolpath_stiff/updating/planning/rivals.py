@@ -22,16 +22,8 @@ from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
 from toolpath_stiff.updating.inference import NONE, Judgement
 from toolpath_stiff.updating.inference.candidates import Component
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
-from toolpath_stiff.updating.inference.fits import (
-    AS_GIVEN,
-    LAW_REFITTED,
-    Baseline,
-    Fit,
-    error_figures,
-    fit_effects,
-    refine,
-)
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, error_figures, fit_effects, refine
 from toolpath_stiff.updating.inference.hypotheses import score_family
 from toolpath_stiff.updating.inference.noise import JOINT_ERROR, STRUT_SPREAD
 from toolpath_stiff.updating.inference.prediction import JOINT_STEP, Predictor
