@@ -12,6 +12,9 @@ from toolpath_stiff.stiffness.model import machine_words
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
 
+# Of an analysis, in the order of every table.
+FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
+
 # The sign of every residual that is shown, for axes and legends.
 DEVIATION = "(measured - modelled) / modelled"
 MINUS_IS_SOFTER = "minus: softer than modelled"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.words import (
+    FIGURES,
     LABEL,
     READERS,
     WIDTH,
@@ -334,9 +335,6 @@ def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
     return (
         aligned(first_column_fitted(rows)) + notes + ([f"and {more} more operations in summary.json"] if more else [])
     )
-
-
-FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
 
 
 def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.compare.machine import machine_png
 from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare.variables import load_path_png, variables_png
-from toolpath_stiff.report.pages import bullets, escaped, figures, page, picture, section, text_table
+from toolpath_stiff.report.pages import bullets, markup, page, picture, section, table
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison import Comparison
@@ -112,13 +113,13 @@ def _headline(document: Mapping[str, Any]) -> str:
     return f"{document['baseline']['mean_abs_error_percent']:.2f} % off in the mean as given, without a pattern"
 
 
-def _figures(document: Mapping[str, Any]) -> str:
+def _figures(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     """The few figures that say it all."""
     base, noise = document["baseline"], document["noise"]
     refit = base["strut_law_refitted"]
     scatter = " to ".join(f"{base['scatter_rms_percent'][one['name']]:.1f}" for one in noise)
     share = " to ".join(f"{base['explained_by_scatter_percent'][one['name']]:.0f}" for one in noise)
-    found = [
+    return [
         (f"{base['mean_abs_error_percent']:.2f} %", "mean |modelled - measured| / measured, as given"),
         *([(f"{refit['mean_abs_error_percent']:.2f} %", "the same, strut law refitted")] if refit else []),
         (f"{base['bias_percent']:+.1f} %", f"bias: {DEVIATION}, {MINUS_IS_SOFTER}"),
@@ -126,20 +127,19 @@ def _figures(document: Mapping[str, Any]) -> str:
         (f"{scatter} %", "rms that scatter alone would leave"),
         (f"{share} %", "of the mean square is scatter"),
     ]
-    return figures(found)
 
 
-def _findings(document: Mapping[str, Any]) -> str:
+def _findings(document: Mapping[str, Any]) -> Markup:
     """Findings with their probabilities, or the strongest hints."""
     if not document["findings"]:
         hints = [("out", (*_said(one), _alike(one))) for one in document["hints"]]
-        return text_table(("the strongest hints", "t", "p, corrected", "looks the same in these data"), hints, (1, 2))
+        return table(("the strongest hints", "t", "p, corrected", "looks the same in these data"), hints, (1, 2))
     rows = []
     for one in document["findings"]:
         after = one.get("after_strut_law_refit")
         rows.append(("finding", (*_said(one), f"{after['p_adjusted']:.2g}" if after else "-", _alike(one))))
     head = ("finding", "t", "p, corrected", "p if the strut law is refitted", "looks the same in these data")
-    return text_table(head, rows, range(1, 4))
+    return table(head, rows, range(1, 4))
 
 
 def _said(one: Mapping[str, Any]) -> tuple[str, str, str]:
@@ -150,7 +150,7 @@ def _alike(one: Mapping[str, Any]) -> str:
     return ", ".join(one["not_told_from"]) or "-"
 
 
-def _errors(document: Mapping[str, Any]) -> str:
+def _errors(document: Mapping[str, Any]) -> Markup:
     """Errors by direction, plane and set-up, beside those of scatter alone."""
     levels = [("all readings", document["baseline"])]
     for title, key in (("direction", "by_direction"), ("", "by_plane"), ("set-up", "by_setup")):
@@ -173,10 +173,10 @@ def _errors(document: Mapping[str, Any]) -> str:
     ]
     head = ["", "readings", "mean error", "bias", "rms", *(f"rms of scatter alone ({name})" for name in names)]
     remark = f"Machine file as given. Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."
-    return text_table(head, rows, range(1, len(head))) + f'<p class="muted">{escaped(remark)}</p>'
+    return table(head, rows, range(1, len(head))) + markup('<p class="muted">{}</p>', remark)
 
 
-def _far_off(document: Mapping[str, Any]) -> str:
+def _far_off(document: Mapping[str, Any]) -> Markup:
     rows = [
         (
             "",
@@ -191,10 +191,10 @@ def _far_off(document: Mapping[str, Any]) -> str:
         for one in document["far_off"][:MOST_FAR_OFF]
     ]
     head = ("line", "direction", "point", "with the findings taken out", "standard deviations")
-    return text_table(head, rows, (3, 4))
+    return table(head, rows, (3, 4))
 
 
-def _model_free(document: Mapping[str, Any]) -> str:
+def _model_free(document: Mapping[str, Any]) -> Markup:
     """Checks that need no stiffness model, and why others cannot be made."""
     found = document["model_free"]
     rows = [
@@ -205,10 +205,10 @@ def _model_free(document: Mapping[str, Any]) -> str:
         for one in found["checks"]
     ]
     rows += [("out", (one["check"], f"not checked: {one['reason']}", "", "")) for one in found["cannot_check"]]
-    return text_table(("principle", "result", "t", "p, corrected"), rows, (2, 3))
+    return table(("principle", "result", "t", "p, corrected"), rows, (2, 3))
 
 
-def _tests(document: Mapping[str, Any]) -> str:
+def _tests(document: Mapping[str, Any]) -> Markup:
     """The strongest patterns, each on its own."""
     tests = document["tests"]
     rows = [
@@ -224,15 +224,15 @@ def _tests(document: Mapping[str, Any]) -> str:
         )
         for one in tests[:MOST_ROWS]
     ]
-    table = text_table(("pattern", "kind", "readings", "t", "p, corrected"), rows, (2, 3, 4))
-    if not table:
-        return ""
+    listed = table(("pattern", "kind", "readings", "t", "p, corrected"), rows, (2, 3, 4))
+    if not listed:
+        return Markup()
     remark = f"{len(tests)} patterns were looked for, each on its own here"
     remark += f"; the strongest {MOST_ROWS} are shown, all are in compare.json." if len(tests) > MOST_ROWS else "."
-    return f"<details><summary>{escaped(remark)}</summary>{table}</details>"
+    return markup("<details><summary>{}</summary>{}</details>", remark, listed)
 
 
-def _noise(document: Mapping[str, Any]) -> str:
+def _noise(document: Mapping[str, Any]) -> Markup:
     base = document["baseline"]
     rows = [
         (
@@ -251,7 +251,7 @@ def _noise(document: Mapping[str, Any]) -> str:
     ]
     head = ("noise", "reading", "clamping", "struts", "beyond it, place to place", "p of residuals this large",
             "origin")  # fmt: skip
-    return text_table(head, rows, range(1, 6))
+    return table(head, rows, range(1, 6))
 
 
 MOST_NAMED = 5  # readings far off, on the terminal

@@ -8,9 +8,11 @@ from collections.abc import Mapping
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine import machine_toml
-from toolpath_stiff.report.pages import bullets, figures, hint_list, page, picture, section, text_table
+from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
 from toolpath_stiff.report.residuals import before_after_png
 from toolpath_stiff.report.update.pictures import error_ladder_png, figure3_png
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, number, plain
@@ -99,7 +101,7 @@ def _headline(document: Mapping[str, Any]) -> str:
     return f"Mean error {first['mean_abs_error_percent']:.2f} % as given, {last['mean_abs_error_percent']:.2f} % after"
 
 
-def _figures(document: Mapping[str, Any]) -> str:
+def _figures(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     key, last = "mean_abs_error_percent", document["steps"][-1]
     found = [(_percent(document["steps"][0][key]), "mean error as given")]
     if document["objective"] == "likelihood":
@@ -109,10 +111,10 @@ def _figures(document: Mapping[str, Any]) -> str:
         found.append((_percent(last[key]), called))
     found.append((_percent(last["held_out_error_percent"]), "the same at left-out points"))
     found.append((_percent(document["noise_floor_percent"]), "would be left by scatter alone"))
-    return figures(found)
+    return found
 
 
-def _by_direction(document: Mapping[str, Any]) -> str:
+def _by_direction(document: Mapping[str, Any]) -> Markup:
     first, last = document["steps"][0]["by_direction"], result_step(document)["by_direction"]
     rows = [
         (
@@ -128,10 +130,10 @@ def _by_direction(document: Mapping[str, Any]) -> str:
     ]
     head = ("direction", "readings", "as given", "after", "after, left out", "bias as given", "bias after")
     remark = f"Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."
-    return text_table(head, [("", row) for row in rows], range(1, len(head))) + f'<p class="muted">{remark}</p>'
+    return table(head, [("", row) for row in rows], range(1, len(head))) + markup('<p class="muted">{}</p>', remark)
 
 
-def _fitted(document: Mapping[str, Any]) -> str:
+def _fitted(document: Mapping[str, Any]) -> Markup:
     last = result_step(document)
     rows = [
         ("strut law", f"at {end['length_mm']:.1f} mm", f"{end['stiffness']:.2f} N/um", f"sd {end['sd']:.2g} N/um")
@@ -145,10 +147,10 @@ def _fitted(document: Mapping[str, Any]) -> str:
                 rows.append((effect, key, f"{_value(value['value'])} {value['unit']}", f"{low} to {high}"))
             else:
                 rows.append((effect, key, str(value), "chosen"))
-    return text_table(("effect", "parameter", "value", "95 % interval, or sd"), [("", row) for row in rows], (2, 3))
+    return table(("effect", "parameter", "value", "95 % interval, or sd"), [("", row) for row in rows], (2, 3))
 
 
-def _support(document: Mapping[str, Any]) -> str:
+def _support(document: Mapping[str, Any]) -> Markup:
     rows = []
     for one in (*document["support"], *document["turned_down"]):
         gain = one["held_out_gain_in_se"]
@@ -162,7 +164,7 @@ def _support(document: Mapping[str, Any]) -> str:
             )
         )
     head = ("effect", "supported", "fall at left-out points", "gain in twice the log likelihood", "what is against it")
-    return text_table(head, [("", row) for row in rows], (2, 3))
+    return table(head, [("", row) for row in rows], (2, 3))
 
 
 def _percent(value: float | None) -> str:
