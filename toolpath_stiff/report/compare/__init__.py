@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from markupsafe import Markup
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.compare.machine import machine_png
 from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
@@ -332,14 +331,12 @@ def residuals_csv(found: Comparison) -> str:
         *(_with_unit(one.name, one.unit) for one in own),
     ]  # fmt: skip
     along, where = directions(data), planes(data)
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(head)
+    rows = []
     for i in range(len(data)):
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
         modelled = float(n_per_mm_from_n_per_m(np.exp(found.log_model[i])))
-        table.writerow(
+        rows.append(
             [
                 data.file[i], data.line[i], data.point[i], data.setup[i], data.clamp[i], where[i], along[i],
                 *(f"{value + 0.0:.6g}" for value in pose),
@@ -348,7 +345,7 @@ def residuals_csv(found: Comparison) -> str:
                 *("" if np.isnan(one.values[i]) else f"{one.values[i]:.6g}" for one in own),
             ]
         )  # fmt: skip
-    return out.getvalue()
+    return csv_text(head, rows)
 
 
 def names(plots: bool = True) -> tuple[str, ...]:

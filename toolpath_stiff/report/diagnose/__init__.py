@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from markupsafe import Markup
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, envelope_png, ladder_png
 from toolpath_stiff.report.explanations import (
@@ -280,11 +281,13 @@ def _pictures(document: dict[str, Any], diagnosis: Diagnosis) -> dict[str, Conte
 def residuals_csv(diagnosis: Diagnosis) -> str:
     """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
     data = diagnosis.data
-    lines = [
-        "file,line,point,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,dx,dy,dz,stiffness_N_per_mm,as_given_N_per_mm,"
-        "law_refitted_N_per_mm,after_N_per_mm,as_given_deviation_percent,law_refitted_deviation_percent,"
-        "after_deviation_percent"
-    ]
+    models = ("as_given", "law_refitted", "after")
+    head = [
+        "file", "line", "point", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz",
+        "stiffness_N_per_mm", *(f"{name}_N_per_mm" for name in models),
+        *(f"{name}_deviation_percent" for name in models),
+    ]  # fmt: skip
+    rows = []
     for i in range(len(data)):
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
@@ -293,7 +296,5 @@ def residuals_csv(diagnosis: Diagnosis) -> str:
         numbers = [f"{value:.6g}" for value in pose]
         numbers += [f"{value:.1f}" for value in (measured, *modelled)]
         numbers += [f"{float(deviation_percent(np.array(r))):.3f}" for r in own]
-        name = '"' + str(data.file[i]).replace('"', '""') + '"'
-        point = '"' + str(data.point[i]).replace('"', '""') + '"'
-        lines.append(",".join([name, str(data.line[i]), point, *numbers]))
-    return "\n".join(lines) + "\n"
+        rows.append([str(data.file[i]), int(data.line[i]), str(data.point[i]), *numbers])
+    return csv_text(head, rows)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis import Analysis
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.document import placement_of
@@ -223,9 +224,9 @@ def files(placed: Placed, *, plots: bool = True) -> dict[str, Content]:
     from toolpath_stiff.placement.document import COLUMNS
 
     summary = placed.summary
-    rows = [",".join(_cell(row[name]) for name in COLUMNS) for row in summary["front"]]
+    rows = [[_cell(row[name]) for name in COLUMNS] for row in summary["front"]]
     contents: dict[str, Content] = {
-        "placements.csv": "\n".join([",".join(COLUMNS), *rows, ""]),
+        "placements.csv": csv_text(COLUMNS, rows),
         "placement.json": json.dumps(summary, indent=2) + "\n",
     }
     if plots:
