@@ -40,7 +40,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
 
-SCRIPTS = ("path_data.js", "path_view.js", "profile_view.js", "listing.js", "operations.js")
+SCRIPTS = ("stage.js", "viewer.js", "profile.js", "analysis.js")
 
 
 def page(
