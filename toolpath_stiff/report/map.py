@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.poses import StiffnessMap, turning_points
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, picture
+from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, page_colours, picture
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.words import machine_text, number, plain
 from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
@@ -37,6 +37,7 @@ def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()
         "x": np.round(mm_from_m(found.x[::step]), 3).tolist(),
         "y": np.round(mm_from_m(found.y[::step]), 3).tolist(),
         "z": np.round(mm_from_m(found.z), 3).tolist(),
+        **page_colours(),
         "values": [[None if np.isnan(v) else round(float(v)) for v in layer.ravel()] for layer in stiffness],
     }
     tilt = ", ".join(f"{deg_from_rad(v):g}" for v in found.abc)
@@ -47,8 +48,8 @@ def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()
     ]
     return render(
         "map.html",
-        styles=["map.css"],
-        scripts=["map.js"],
+        styles=["viewer.css", "map.css"],
+        scripts=["stage.js", "viewer.js", "map.js"],
         data=data,
         title=f"Stiffness map, load {found.load}",
         about=" · ".join(about),

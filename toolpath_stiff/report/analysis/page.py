@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
 from toolpath_stiff.nc.moves import MOTION_NAMES
-from toolpath_stiff.report.figure import CLASSES, legend_extend, scale_limits
+from toolpath_stiff.report.figure import legend_extend, page_colours, scale_limits
 from toolpath_stiff.report.pages import bullets, markup, render, table
 from toolpath_stiff.report.profile import extremes_by_column, profile_curve
 from toolpath_stiff.report.words import (
@@ -69,7 +69,7 @@ def page(
     data = page_data(analysis, required, other)
     return render(
         "analysis.html",
-        styles=["report.css"],
+        styles=["viewer.css", "analysis.css"],
         scripts=SCRIPTS,
         data=data,
         title=f"{summary['program']}: stiffness along the path",
@@ -320,8 +320,7 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "scale": _scale(analysis, False),
         "scale_with_plunges": _scale(analysis, True) if analysis.set_aside.any() else None,
         "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
-        "colours": class_colours(0.0, 0.93),  # the lightest yellow does not show on white,
-        "colours_dark": class_colours(0.22, 1.0),  # nor the darkest violet on black
+        **page_colours(),
         "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
         "required": None if required is None else n_per_mm_from_n_per_m(required),
         "other": None if other is None else _other_curve(other),
@@ -394,11 +393,3 @@ def _quantised(values: FloatArray, low: Any, high: Any, steps: int) -> NDArray[n
 
 def _base64(array: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
-
-
-def class_colours(start: float, end: float) -> list[str]:
-    """CSS colours of the classes, weakest first: viridis, perceptually uniform."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(start, end, CLASSES))]

@@ -16,7 +16,7 @@ from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.document import placement_of
 from toolpath_stiff.placement.evaluator import Keepout
 from toolpath_stiff.placement.paths import DrawnPath, drawn_path
-from toolpath_stiff.report.analysis.page import class_colours
+from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.words import machine_text, number, plain
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
@@ -67,8 +67,7 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
         "keepouts": [{"name": plain(box.name), "box": _box(box.low, box.high)} for box in keepouts],
         "workspace": _workspace(best),
         **_drawn(path),
-        "colours": class_colours(0.0, 0.93),
-        "colours_dark": class_colours(0.22, 1.0),
+        **page_colours(),
     }
     return render(
         "place.html",
