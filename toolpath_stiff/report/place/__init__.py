@@ -71,8 +71,8 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
     }
     return render(
         "place.html",
-        styles=["place.css"],
-        scripts=["place.js"],
+        styles=["viewer.css", "place.css"],
+        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
         data=data,
         title=f"Placements of {summary['program']}",
         about=f"machine {machine_text(summary)} · load {summary['load']}, {summary['force_N']:g} N",
