@@ -6,12 +6,11 @@ Everything here takes entries of `diagnose.json`; whatever is absent or None is 
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from toolpath_stiff.hints import parted
-from toolpath_stiff.report.words import machine_text, number, plain, shortened
+from toolpath_stiff.report.words import WIDTH, labelled, machine_text, number, plain, shortened
 from toolpath_stiff.updating.inference.candidates import choice_text
 
 # Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
@@ -247,7 +246,6 @@ def plausible_text(names: Sequence[str]) -> str:
     return ", ".join("none (nothing is missing)" if name == NONE else plain(str(name)) for name in names)
 
 
-WIDTH = 100
 LABEL = 12  # columns of the left-hand words
 FEW_REASONS = 3  # of the poses proposed, on the terminal
 MOST_CANDIDATES = 5  # in the table; all are in diagnose.json
@@ -286,13 +284,7 @@ def text(document: Mapping[str, Any]) -> str:
 
 
 def _entry(label: str, text: str) -> list[str]:
-    return textwrap.wrap(
-        plain(text),
-        WIDTH,
-        initial_indent=f"{label:<{LABEL}}  ",
-        subsequent_indent=" " * (LABEL + 2),
-        break_on_hyphens=False,
-    )
+    return labelled(label, text, LABEL)
 
 
 def _listed(label: str, sentences: Sequence[object]) -> list[str]:

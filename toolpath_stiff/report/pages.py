@@ -20,7 +20,7 @@ from markupsafe import Markup
 from toolpath_stiff import __version__
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report.figure import Drawing
-from toolpath_stiff.report.words import plain
+from toolpath_stiff.report.words import machine_text, plain
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -133,6 +133,25 @@ def picture(name: str, pictures: Mapping[str, bytes | str], questions: Mapping[s
 def table(head: Sequence[str], rows: Sequence[Row], numeric: Iterable[int] = ()) -> Markup:
     """A table; the columns `numeric` are aligned to the right. Nothing without rows."""
     return _part("table", head, rows, list(numeric)) if rows else Markup()
+
+
+def readings_page(
+    title: str, command: str, document: Mapping[str, Any], verdict: str, headline: str,
+    figures: Iterable[tuple[str, str]], sections: Iterable[Markup],
+) -> str:  # fmt: skip
+    """The page of a result on readings: text, data, machine, warnings and seed are those of its document."""
+    files = ", ".join(document["data"])
+    return page(
+        title=f"{title}: {files}",
+        verdict=verdict,
+        headline=headline,
+        text=document["text"],
+        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
+        figures=figures,
+        warnings=document["warnings"],
+        sections=sections,
+        footer=f"tps {command}, seed {document['seed']}",
+    )
 
 
 def page(

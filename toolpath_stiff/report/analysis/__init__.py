@@ -17,6 +17,7 @@ from toolpath_stiff.report.words import (
     aligned,
     duration,
     first_column_fitted,
+    labelled,
     length_in_moves,
     machine_text,
     number,
@@ -206,14 +207,8 @@ def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> st
 
 
 def _entry(label: str, text: str) -> list[str]:
-    """A labelled entry, wrapped and indented."""
-    return textwrap.wrap(
-        plain(text),
-        WIDTH,
-        initial_indent=f"{label:<{LABEL}}  ",
-        subsequent_indent=" " * (LABEL + 2),
-        break_on_hyphens=False,
-    ) or [label]
+    """A labelled entry, of nothing its label."""
+    return labelled(label, text) or [label]
 
 
 def _origin(summary: Mapping[str, Any]) -> str:

@@ -14,8 +14,8 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.report.compare.machine import machine_png
 from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare.variables import load_path_png, variables_png
-from toolpath_stiff.report.pages import bullets, markup, page, picture, section, table
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, plain
+from toolpath_stiff.report.pages import bullets, markup, picture, readings_page, section, table
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison import Comparison
 from toolpath_stiff.updating.comparison.residuals import directions, planes
@@ -75,7 +75,6 @@ def compare_pictures(found: Comparison) -> dict[str, bytes]:
 def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
     """The page's text, the pictures within."""
     document = found.document
-    files = ", ".join(document["data"])
     sections = [
         section("Findings" if document["findings"] else "No pattern stands out from scatter", _findings(document)),
         picture("measured_modelled.png", pictures, QUESTIONS),
@@ -92,17 +91,8 @@ def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
         section("Not tested", bullets(document["not_tested"])),
         section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
     ]
-    return page(
-        title=f"Comparison: {files}",
-        verdict="Where does the model fail?",
-        headline=_headline(document),
-        text=document["text"],
-        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
-        figures=_figures(document),
-        warnings=document["warnings"],
-        sections=sections,
-        footer=f"tps compare, seed {document['seed']}",
-    )
+    question = "Where does the model fail?"
+    return readings_page("Comparison", "compare", document, question, _headline(document), _figures(document), sections)
 
 
 def _headline(document: Mapping[str, Any]) -> str:

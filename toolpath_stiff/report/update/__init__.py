@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine import machine_toml
-from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
+from toolpath_stiff.report.pages import bullets, hint_list, markup, picture, readings_page, section, table
 from toolpath_stiff.report.residuals import before_after_png
 from toolpath_stiff.report.update.pictures import error_ladder_png, figure3_png
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, number, plain
@@ -62,7 +62,6 @@ def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]
     pictures
         File name -> PNG; they are put into the page.
     """
-    files = ", ".join(document["data"])
     provenance = document["provenance"]
     record = [
         f"command: {provenance['command']}",
@@ -78,17 +77,8 @@ def update_html(document: Mapping[str, Any], pictures: Mapping[str, bytes | str]
         section("Where it comes from", bullets(record)),
         section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
     ]
-    return page(
-        title=f"Update: {files}",
-        verdict=VERDICTS[document["verdict"]],
-        headline=_headline(document),
-        text=document["text"],
-        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
-        figures=_figures(document),
-        warnings=document["warnings"],
-        sections=sections,
-        footer=f"tps update, seed {document['seed']}",
-    )
+    verdict = VERDICTS[document["verdict"]]
+    return readings_page("Update", "update", document, verdict, _headline(document), _figures(document), sections)
 
 
 def _headline(document: Mapping[str, Any]) -> str:
