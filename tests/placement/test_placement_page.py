@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.browser import needs_browser, opened, painted
 from tests.placement.test_placement_search import headline_figures
 from toolpath_stiff.analysis import analyse
 from toolpath_stiff.cli.main import main
@@ -129,31 +128,7 @@ def test_more_cuts_than_points_leaves_whole_cuts_out():
     assert (np.bincount(cut[kept])[np.unique(cut[kept])] == 2).all()  # where a hole begins and where it ends
 
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
-
-
-# Every opaque colour of each drawing, on the element itself.
-PAINTED = """
-for (const stage of document.querySelectorAll(".stage")) {
-  const canvas = stage.querySelector("canvas"), found = new Set();
-  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-  for (let i = 0; i < pixels.length; i += 4) if (pixels[i + 3] === 255)
-    found.add("#" + [0, 1, 2].map((k) => pixels[i + k].toString(16).padStart(2, "0")).join(""));
-  stage.dataset.painted = [...found].join(" ");
-}
-"""
-
-
-def opened(address: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """What Chromium makes of a page: its document on stdout, its console on stderr."""
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
-    return subprocess.run(
-        [str(BROWSER), *options, f"--user-data-dir={folder / 'profile'}", "--dump-dom", address],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
-
-
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+@needs_browser
 def test_a_browser_draws_the_placement_of_the_address(tilted, tmp_path):
     folder, data = tilted
     chosen = 3 if data["recommended"] == 2 else 2  # the recommended one is called so
@@ -166,15 +141,10 @@ def test_a_browser_draws_the_placement_of_the_address(tilted, tmp_path):
     assert front.count('aria-checked="true"') == 1
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+@needs_browser
 def test_both_placements_and_the_profile_are_painted(tilted, tmp_path):
     """What the canvases show: the classes' colours in both drawings, the curve's in the profile."""
-    page = re.sub("<meta http-equiv[^>]*>", "", (tilted[0] / "report.html").read_text(encoding="utf-8"))
-    file = tmp_path / "report.html"
-    file.write_text(page.replace("</body>", f"<script>{PAINTED}</script></body>"), encoding="utf-8")
-    done = opened(file.as_uri(), tmp_path)
-    assert "CONSOLE" not in done.stderr
-    painted = {name: set(text.split()) for name, text in re.findall(r'id="(\w+)" data-painted="([^"]*)"', done.stdout)}
+    found = painted((tilted[0] / "report.html").read_text(encoding="utf-8"), tmp_path)
     for name in ("chosen", "before"):
-        assert len(painted[name] & {*tilted[1]["colours"], *tilted[1]["colours_dark"]}) > 3
-    assert painted["profile"]
+        assert len(found[name][0].keys() & {*tilted[1]["colours"], *tilted[1]["colours_dark"]}) > 3
+    assert found["profile"][0]

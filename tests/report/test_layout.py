@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
+from tests.browser import needs_browser, painted
 from tests.report import diagnose_documents as documents
 from tests.report.factory import short
 from tests.stiffness.cases import nist
@@ -24,7 +25,7 @@ from toolpath_stiff.report.batch import batch_page
 from toolpath_stiff.report.compare import pictures as compare_pictures
 from toolpath_stiff.report.diagnose import diagnose_html
 from toolpath_stiff.report.diagnose import pictures as diagnose_pictures
-from toolpath_stiff.report.figure import INK
+from toolpath_stiff.report.figure import INK, page_colours
 from toolpath_stiff.report.map import map_page
 from toolpath_stiff.report.pages import asset
 from toolpath_stiff.stiffness.model import build_model
@@ -211,6 +212,15 @@ def test_all_pages_have_one_style_sheet_with_a_dark_half(mapped):
         # Every colour that a rule names is declared.
         used, declared = set(re.findall(r"var\((--[a-z-]+)", text)), set(re.findall(r"(--[a-z-]+):", text))
         assert used <= declared | {"--natural", "--digits"}, name
+
+
+@needs_browser
+def test_surfaces_of_a_map_stand_above_their_planes(mapped, tmp_path):
+    """All of a surface lies in the box from the lowest plane upwards, which the view is fitted to with a rim below."""
+    rows, height = painted(map_page(nist(), mapped), tmp_path)["view"]
+    drawn = [row for colour, row in rows.items() if colour in {c for part in page_colours().values() for c in part}]
+    assert len(drawn) > 10
+    assert max(drawn) <= height - 30
 
 
 def test_a_picture_in_a_page_takes_the_page_s_colours(compared):
