@@ -21,7 +21,6 @@ for (const stage of document.querySelectorAll(".stage")) {
   for (let i = 0; i < pixels.length; i += 4) if (pixels[i + 3] === 255)
     rows.set("#" + hex(pixels[i]) + hex(pixels[i + 1]) + hex(pixels[i + 2]), rowOf(i));
   stage.dataset.painted = [...rows].map((entry) => entry.join(":")).join(" ");
-  stage.dataset.height = canvas.height;
 }
 """
 
@@ -43,10 +42,9 @@ def run_in(page: str, script: str, folder: Path) -> subprocess.CompletedProcess[
     return opened(file.as_uri(), folder)
 
 
-def painted(page: str, folder: Path) -> dict[str, tuple[dict[str, int], int]]:
-    """Drawing -> lowest row of each opaque colour, and how many rows there are."""
-    done = run_in(page, PAINTED, folder)
+def painted(page: str, folder: Path, script: str = "") -> dict[str, dict[str, int]]:
+    """Drawing -> the lowest row of pixels, counted from above, of each opaque colour; after a script has run."""
+    done = run_in(page, f"{script}; setTimeout(() => {{{PAINTED}}}, 500)", folder)
     assert "CONSOLE" not in done.stderr
-    found = re.findall(r'id="(\w+)" data-painted="([^"]*)" data-height="(\d+)"', done.stdout)
-    pairs = {name: [pair.split(":") for pair in text.split()] for name, text, _ in found}
-    return {name: ({c: int(row) for c, row in pairs[name]}, int(height)) for name, _, height in found}
+    found = re.findall(r'id="(\w+)" data-painted="([^"]*)"', done.stdout)
+    return {name: {c: int(row) for c, row in (pair.split(":") for pair in text.split())} for name, text in found}

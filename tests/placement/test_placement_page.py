@@ -146,5 +146,5 @@ def test_both_placements_and_the_profile_are_painted(tilted, tmp_path):
     """What the canvases show: the classes' colours in both drawings, the curve's in the profile."""
     found = painted((tilted[0] / "report.html").read_text(encoding="utf-8"), tmp_path)
     for name in ("chosen", "before"):
-        assert len(found[name][0].keys() & {*tilted[1]["colours"], *tilted[1]["colours_dark"]}) > 3
-    assert found["profile"][0]
+        assert len(found[name].keys() & {*tilted[1]["colours"], *tilted[1]["colours_dark"]}) > 3
+    assert found["profile"]
