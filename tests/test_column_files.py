@@ -1,5 +1,6 @@
 """Columns to files: Arrow's rows against Python's own formatting, Parquet against pyarrow's reader."""
 
+import csv
 import io
 
 import numpy as np
@@ -9,7 +10,8 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 
 from toolpath_stiff import column_files
-from toolpath_stiff.column_files import csv_pieces, csv_rows, parquet_pieces
+from toolpath_stiff.column_files import csv_pieces, csv_rows, csv_text, parquet_pieces
+from toolpath_stiff.tables import Columns, read_table
 
 DECIMALS = {"line": None, "word": None, "a": 6, "b": 3, "c": 0}
 
@@ -69,3 +71,20 @@ def test_no_rows_are_a_heading():
     empty = columns_of([])
     assert text_of(csv_pieces(lambda rows: empty, 0, DECIMALS)) == "line,word,a,b,c\n"
     assert parquet.read_table(io.BytesIO(b"".join(parquet_pieces(lambda rows: empty, 0)))).num_rows == 0
+
+
+def test_words_that_a_spreadsheet_would_run_are_written_as_text():
+    """`=HYPERLINK(...)` in a comment must stay a comment; numbers keep their signs."""
+    words = ["=1+1", "+A1", "-A1", "@SUM(A1)", "\t=1", 'plain, "quoted"']
+    numbers = ["-1.5", "+3", "-inf", -2, 7.5, None]
+    rows = list(csv.reader(io.StringIO(csv_text(["a"] * 6, [words, numbers]))))
+    assert rows[1] == ["'=1+1", "'+A1", "'-A1", "'@SUM(A1)", "'\t=1", 'plain, "quoted"']
+    assert rows[2] == ["-1.5", "+3", "-inf", "-2", "7.5", ""]
+
+
+def test_such_words_are_read_back_as_they_were(tmp_path):
+    """Points called -A1 and =B are the same points in a plan, in the file of its readings and in the next plan."""
+    file = tmp_path / "points.csv"
+    file.write_text(csv_text(["point", "x_mm"], [["-A1", "-1.5"], ["=B", "2"], ["it's", "3"]]))
+    rows = read_table(str(file), "points", Columns(("x_mm",), ("point",))).rows
+    assert [list(cells) for _, cells in rows] == [["-A1", "-1.5"], ["=B", "2"], ["it's", "3"]]

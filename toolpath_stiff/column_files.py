@@ -6,14 +6,13 @@ three times faster, and loading it costs a tenth of a second.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+import csv
+import io
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    pass
 
 Columns = Mapping[str, NDArray[Any]]
 Decimals = Mapping[str, int | None]  # None: a whole number or a word
@@ -21,6 +20,32 @@ Decimals = Mapping[str, int | None]  # None: a whole number or a word
 BLOCK = 65_536  # rows
 FEWEST_FOR_ARROW = 20_000  # rows
 LARGEST = 2.0**53  # beyond, a double does not hold every whole number
+
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet takes for a formula when a cell begins with it
+
+
+def csv_text(heading: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
+    """A short table with words in it as CSV: None is an empty cell, quotes stand where they are needed.
+
+    A word that a spreadsheet would run as a formula ("=cmd()", a point called "-A1") gets an apostrophe before it,
+    which spreadsheets take for "this is text"; numbers, with their signs, stay as they are. OWASP, "CSV Injection".
+    """
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(heading)
+    writer.writerows([_harmless(cell) for cell in row] for row in rows)
+    return stream.getvalue()
+
+
+def _harmless(cell: object) -> object:
+    if not isinstance(cell, str) or not cell.startswith(FORMULA):
+        return cell
+    try:
+        float(cell)
+    except ValueError:
+        return f"'{cell}"
+    return cell
 
 
 def csv_pieces(columns_of: Callable[[slice], Columns], rows: int, decimals: Decimals) -> Iterator[bytes]:

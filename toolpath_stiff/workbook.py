@@ -36,8 +36,12 @@ class Grid:
 
 
 def typed(cell: str) -> str:
-    """A cell without space around it; the printer's minus as a keyboard's."""
-    return cell.strip().replace("\u2212", "-")
+    """A cell without space around it; the printer's minus as a keyboard's.
+
+    The apostrophe that keeps spreadsheets from running a word (`column_files.csv_text`) is no part of the word.
+    """
+    found = cell.strip().replace("\u2212", "-")
+    return found[1:] if found[:2] in ("'=", "'+", "'-", "'@") else found
 
 
 def counts(cells: list[str]) -> bool:

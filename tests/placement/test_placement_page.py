@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.browser import needs_browser, opened, painted
 from tests.placement.test_placement_search import headline_figures
 from toolpath_stiff.analysis import analyse
 from toolpath_stiff.cli.main import main
@@ -129,34 +128,23 @@ def test_more_cuts_than_points_leaves_whole_cuts_out():
     assert (np.bincount(cut[kept])[np.unique(cut[kept])] == 2).all()  # where a hole begins and where it ends
 
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
-
-
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+@needs_browser
 def test_a_browser_draws_the_placement_of_the_address(tilted, tmp_path):
     folder, data = tilted
     chosen = 3 if data["recommended"] == 2 else 2  # the recommended one is called so
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
-    done = subprocess.run(
-        [
-            str(BROWSER),
-            *options,
-            f"--user-data-dir={tmp_path / 'profile'}",
-            "--dump-dom",
-            f"{(folder / 'report.html').as_uri()}#{chosen + 1},workspace",
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
+    done = opened(f"{(folder / 'report.html').as_uri()}#{chosen + 1},workspace", tmp_path)
     assert "CONSOLE" not in done.stderr  # neither an error nor a blocked script
     assert f"Placement {chosen + 1} of {len(data['front'])}" in done.stdout
     assert f"{data['front'][chosen]['x_mm']:.3f}" in done.stdout
-    drawings = dict(re.findall(r'<svg id="(\w+)"[^>]*>(.*?)</svg>', done.stdout, re.S))
+    (front,) = re.findall(r'<svg id="front"[^>]*>(.*?)</svg>', done.stdout, re.S)
+    assert front.count("<circle") == len(data["front"])
+    assert front.count('aria-checked="true"') == 1
+
+
+@needs_browser
+def test_both_placements_and_the_profile_are_painted(tilted, tmp_path):
+    """What the canvases show: the classes' colours in both drawings, the curve's in the profile."""
+    found = painted((tilted[0] / "report.html").read_text(encoding="utf-8"), tmp_path)
     for name in ("chosen", "before"):
-        assert drawings[name].count('class="tool"') == 3  # the tool leans in all three views
-        assert drawings[name].count('class="frame"') == 3
-        assert set(re.findall(r'stroke="(#\w+)"', drawings[name])) <= {*data["colours"], *data["colours_dark"]}
-    assert drawings["front"].count("<circle") == len(data["front"])
-    assert drawings["front"].count('aria-checked="true"') == 1
+        assert len(found[name].keys() & {*tilted[1]["colours"], *tilted[1]["colours_dark"]}) > 3
+    assert found["profile"]

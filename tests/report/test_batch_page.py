@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 import re
-import subprocess
 from html import unescape
 from urllib.parse import unquote
 
 import pytest
 
-from tests.report.test_report_page import BROWSER, EVIL, Page
+from tests.browser import needs_browser, run_in
+from tests.report.test_report_page import EVIL, Page
 from toolpath_stiff.report.batch import batch_page
 from toolpath_stiff.report.batch.outcome import Outcome, summary_csv, terminal_summary
 from toolpath_stiff.report.pages import script_hash
@@ -151,7 +151,7 @@ def test_the_terminal_keeps_to_its_width_but_for_reasons():
     assert lines[-1] == f"  {BAD.reason}"
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+@needs_browser
 @pytest.mark.parametrize(
     ("column", "clicks", "expected"),
     [
@@ -165,14 +165,7 @@ def test_headings_sort(column, clicks, expected, tmp_path):
     nothing = outcome("turn.nc", None, None, None, weakest_line=None, weakest_text=None)
     click = f'document.querySelectorAll("thead button")[{column}].click();' * clicks
     told = 'document.title = [...document.querySelectorAll("#programs a")].map((link) => link.textContent).join(" ");'
-    page = batch_page([nothing, SOFT, STIFF])
-    page = re.sub("<meta http-equiv[^>]*>", "", page).replace("</body>", f"<script>{click}{told}</script></body>")
-    (tmp_path / "index.html").write_text(page, encoding="utf-8")
-    done = subprocess.run(
-        [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr",
-         f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", (tmp_path / "index.html").as_uri()],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
+    done = run_in(batch_page([nothing, SOFT, STIFF]), click + told, tmp_path)
     assert "CONSOLE" not in done.stderr
     assert f"<title>{expected}</title>" in done.stdout
     assert len(re.findall("<th [^>]*aria-sort=", done.stdout)) == (1 if clicks < 3 else 0)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
+from tests.browser import needs_browser, painted
 from tests.report import diagnose_documents as documents
 from tests.report.factory import short
 from tests.stiffness.cases import nist
@@ -24,7 +25,7 @@ from toolpath_stiff.report.batch import batch_page
 from toolpath_stiff.report.compare import pictures as compare_pictures
 from toolpath_stiff.report.diagnose import diagnose_html
 from toolpath_stiff.report.diagnose import pictures as diagnose_pictures
-from toolpath_stiff.report.figure import INK
+from toolpath_stiff.report.figure import INK, page_colours
 from toolpath_stiff.report.map import map_page
 from toolpath_stiff.report.pages import asset
 from toolpath_stiff.stiffness.model import build_model
@@ -211,6 +212,17 @@ def test_all_pages_have_one_style_sheet_with_a_dark_half(mapped):
         # Every colour that a rule names is declared.
         used, declared = set(re.findall(r"var\((--[a-z-]+)", text)), set(re.findall(r"(--[a-z-]+):", text))
         assert used <= declared | {"--natural", "--digits"}, name
+
+
+@needs_browser
+def test_surfaces_of_a_map_stand_above_their_planes(tmp_path):
+    """Seen from the front a surface rises from its plane: the stiffest is higher on the screen than the softest."""
+    one = map_stiffness(build_model(nist()), (-0.1, 0.1), (-0.1, 0.1), [0.8], parse_load("radial"), 9)
+    front = "document.querySelector('[data-view=front]').click()"
+    rows = painted(map_page(nist(), one), tmp_path, front)["view"]
+    ramp = [rows[colour] for colour in page_colours()["colours"] if colour in rows]  # softest first
+    assert len(ramp) > 5
+    assert ramp[-1] < ramp[0] - 50
 
 
 def test_a_picture_in_a_page_takes_the_page_s_colours(compared):

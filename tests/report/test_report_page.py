@@ -4,13 +4,12 @@ import base64
 import hashlib
 import json
 import re
-import shutil
-import subprocess
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
+from tests.browser import needs_browser, opened, run_in
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.nc.moves import ToolUse, Unsupported
 from toolpath_stiff.report.analysis import page as page_module
@@ -232,28 +231,13 @@ def rotary_axis_alone():
     return make_analysis([{"end": (0.0, 0.0, 0.0, 0.1, 0.0, 0.0)}])
 
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
-
-
-def opened(file):
-    """What Chromium makes of a page: its document on stdout, its console on stderr."""
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=3000"]
-    return subprocess.run(
-        [BROWSER, *options, f"--user-data-dir={file.parent / 'profile'}", "--dump-dom", file.as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
-
-
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+@needs_browser
 @pytest.mark.parametrize("make", [spiral, evil_analysis, rotary_axis_alone])
 def test_a_browser_draws_the_page_without_complaint(make, tmp_path):
     file = tmp_path / "report.html"
     analysis = make()
     file.write_text(render(analysis), encoding="utf-8")
-    done = opened(file)
+    done = opened(file.as_uri(), tmp_path)
     assert "CONSOLE" not in done.stderr
     dom = Page(done.stdout)
     rows = [attrs for _, attrs in dom.elements if "data-line" in attrs and attrs.get("class") == "row"]
@@ -276,15 +260,12 @@ def test_the_page_knows_which_samples_are_set_aside_and_both_scales(analysis, pa
     assert "checked" in switch
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+@needs_browser
 def test_the_switch_puts_the_plunges_on_the_scale(tmp_path):
     analysis = spiral()
     legends = []
     for click in ("", "document.getElementById('plunges').click()"):
-        text = re.sub("<meta http-equiv[^>]*>", "", render(analysis))
-        file = tmp_path / "report.html"
-        file.write_text(text.replace("</body>", f"<script>{click}</script></body>"), encoding="utf-8")
-        done = opened(file)
+        done = run_in(render(analysis), click, tmp_path)
         assert "CONSOLE" not in done.stderr
         dom = Page(done.stdout)
         legends.append(
@@ -298,14 +279,9 @@ def test_the_switch_puts_the_plunges_on_the_scale(tmp_path):
     assert [float(re.sub(r"\D", "", legend)) for legend in legends] == pytest.approx(ends, abs=0.5)
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+@needs_browser
 def test_a_click_shows_one_operation_alone(tmp_path):
-    # The page's policy forbids this script as any other: it goes without the policy here.
-    text = re.sub("<meta http-equiv[^>]*>", "", render(spiral()))
-    click = "<script>document.querySelector('[data-operation=\"1\"]').click()</script></body>"
-    file = tmp_path / "report.html"
-    file.write_text(text.replace("</body>", click), encoding="utf-8")
-    done = opened(file)
+    done = run_in(render(spiral()), "document.querySelector('[data-operation=\"1\"]').click()", tmp_path)
     assert "CONSOLE" not in done.stderr
     dom = Page(done.stdout)
     assert [attrs.get("class") for name, attrs in dom.elements if name == "tr"].count("chosen") == 1

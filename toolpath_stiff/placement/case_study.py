@@ -14,6 +14,7 @@ from typing import Any
 
 from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.statistics import stiffness_figures
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.nc import Program, parse_program
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated, machine_words
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
@@ -180,8 +181,7 @@ def region_rows(study: CaseStudy) -> str:
         "min_N_per_mm",
         "max_N_per_mm",
     )
-    rows = [",".join(f"{row[key]}" for key in keys) for row in study.summary["regions"]]
-    return "\n".join([",".join(keys), *rows, ""])
+    return csv_text(keys, ([str(row[key]) for key in keys] for row in study.summary["regions"]))
 
 
 def study_text(study: CaseStudy) -> str:

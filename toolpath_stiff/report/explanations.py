@@ -6,12 +6,11 @@ Everything here takes entries of `diagnose.json`; whatever is absent or None is 
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.hints import parted
-from toolpath_stiff.report.words import machine_text, number, plain, shortened
+from toolpath_stiff.report.words import WIDTH, labelled, machine_text, number, plain, shortened
 from toolpath_stiff.updating.inference.candidates import choice_text
 
 if TYPE_CHECKING:
@@ -250,7 +249,6 @@ def plausible_text(names: Sequence[str]) -> str:
     return ", ".join("none (nothing is missing)" if name == NONE else plain(str(name)) for name in names)
 
 
-WIDTH = 100
 LABEL = 12  # columns of the left-hand words
 FEW_REASONS = 3  # of the poses proposed, on the terminal
 MOST_CANDIDATES = 5  # in the table; all are in diagnose.json
@@ -289,13 +287,7 @@ def text(document: DiagnosisDocument) -> str:
 
 
 def _entry(label: str, text: str) -> list[str]:
-    return textwrap.wrap(
-        plain(text),
-        WIDTH,
-        initial_indent=f"{label:<{LABEL}}  ",
-        subsequent_indent=" " * (LABEL + 2),
-        break_on_hyphens=False,
-    )
+    return labelled(label, text, LABEL)
 
 
 def _listed(label: str, sentences: Sequence[object]) -> list[str]:
@@ -346,34 +338,35 @@ def _table(document: DiagnosisDocument) -> list[str]:
     candidates, pairs = entries(document, "candidates"), entries(document, "pairs")
     shown = [*models, *pairs[:MOST_PAIRS], *candidates[:MOST_CANDIDATES]]
     shown += [entry for entry in candidates[MOST_CANDIDATES:] if is_plausible(entry, document)]
-    rows = [["", "probab.", "error %", "left out %", "gain/SE", "", ""]]
-    for entry in shown:
-        mark = "* " if is_plausible(entry, document) else "  "
-        figures = [figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out")]
-        gain = figure_of(entry, "held_out_gain_in_se")
-        remark = str(entry.get("remark") or "") or ("" if is_offered(entry, document) else "not offered")
-        rows.append(
-            [
-                shortened(mark + row_name(entry), LONGEST_NAME),
-                probability_text(figure_of(entry, "probability")),
-                *("-" if value is None else f"{value:.2f}" for value in figures),
-                "-" if gain is None else f"{gain:.1f}",
-                plain(str(entry.get("words") or "")),
-                "; ".join(part for part in (", ".join(parameter_texts(entry, intervals=False)), plain(remark)) if part),
-            ]
-        )
+    rows = [["", "probab.", "error %", "left out %", "gain/SE", "", ""], *(_row(entry, document) for entry in shown)]
     widths = [max(len(row[i]) for row in rows) for i in range(5)]
-    lines = []
-    for row in rows:
-        figures_text = "  ".join(f"{cell:>{width}}" for cell, width in zip(row[1:5], widths[1:], strict=True))
-        left = f"{row[0]:<{widths[0]}}  {figures_text}  "
-        lines.append((left + shortened(row[5], WIDTH - len(left))).rstrip())
-        if row[6]:
-            lines.append(shortened("      " + row[6], WIDTH))
+    lines = [line for row in rows for line in _row_lines(row, widths)]
     more = len(candidates) + len(pairs) + len(models) - len(shown)
-    if more > 0:
-        lines.append(f"  and {more} less likely, in diagnose.json")
-    return lines
+    return [*lines, f"  and {more} less likely, in diagnose.json"] if more > 0 else lines
+
+
+def _row(entry: Mapping[str, Any], document: Mapping[str, Any]) -> list[str]:
+    """Name, four figures, words, and what stands on a line of its own below: sizes and a remark."""
+    mark = "* " if is_plausible(entry, document) else "  "
+    figures = [figure_of(entry, f"{key}_error_percent") for key in ("mean_abs", "held_out")]
+    gain = figure_of(entry, "held_out_gain_in_se")
+    remark = str(entry.get("remark") or "") or ("" if is_offered(entry, document) else "not offered")
+    sizes = ", ".join(parameter_texts(entry, intervals=False))
+    return [
+        shortened(mark + row_name(entry), LONGEST_NAME),
+        probability_text(figure_of(entry, "probability")),
+        *("-" if value is None else f"{value:.2f}" for value in figures),
+        "-" if gain is None else f"{gain:.1f}",
+        plain(str(entry.get("words") or "")),
+        "; ".join(part for part in (sizes, plain(remark)) if part),
+    ]
+
+
+def _row_lines(row: Sequence[str], widths: Sequence[int]) -> list[str]:
+    figures = "  ".join(f"{cell:>{width}}" for cell, width in zip(row[1:5], widths[1:], strict=True))
+    left = f"{row[0]:<{widths[0]}}  {figures}  "
+    first = (left + shortened(row[5], WIDTH - len(left))).rstrip()
+    return [first, shortened("      " + row[6], WIDTH)] if row[6] else [first]
 
 
 def _by_noise(document: DiagnosisDocument) -> list[str]:

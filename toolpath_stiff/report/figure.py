@@ -255,6 +255,20 @@ def legend_extend(analysis: Analysis, limits: tuple[float, float]) -> str:
 
 # Colour that is drawn -> property of page.css. Behind text, a colour of data is more opaque the larger its figure: the
 # text may follow the page.
+def _class_colours(start: float, end: float) -> list[str]:
+    """CSS colours of the classes, weakest first: a part of viridis, perceptually uniform."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colour) for colour in colormaps[COLOUR_MAP](np.linspace(start, end, CLASSES))]
+
+
+def page_colours() -> dict[str, list[str]]:
+    """The classes' colours for the script of a page, on light and on dark."""
+    # The lightest yellow does not show on white, nor the darkest violet on black.
+    return {"colours": _class_colours(0.0, 0.93), "colours_dark": _class_colours(0.22, 1.0)}
+
+
 PAGE_COLOURS = {
     "#ffffff": "card",
     INK: "ink",

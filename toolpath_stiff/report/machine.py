@@ -134,10 +134,10 @@ def _finish(axes: Any, points: FloatArray) -> None:
     span = np.maximum(high - low, 0.05 * (high - low).max())
     for axis, lo, width in zip("xyz", low, span, strict=True):
         getattr(axes, f"set_{axis}lim")(lo - 0.05 * width, lo + 1.05 * width)
-        getattr(axes, f"set_{axis}label")(f"{axis.upper()} mm", fontsize=9, color="#4b5563")
+        pad = 8.0 if axis == "z" else None  # clear of the figures
+        getattr(axes, f"set_{axis}label")(f"{axis.upper()} mm", fontsize=9, color="#4b5563", labelpad=pad)
         getattr(axes, f"{axis}axis").pane.set_facecolor("#f8fafc")
     axes.patch.set_visible(False)
-    axes.zaxis.labelpad = 8.0
     axes.tick_params(labelsize=7.5, colors="#6b7280")
     axes.locator_params(nbins=5)
     axes.view_init(elev=18, azim=-62)

@@ -13,8 +13,8 @@ from toolpath_stiff.analysis.poses import StiffnessMap, turning_points
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, picture
-from toolpath_stiff.report.pages import asset, escaped, filled, json_for_script, script_hash, style
+from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, page_colours, picture
+from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.words import machine_text, number, plain
 from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -37,26 +37,23 @@ def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()
         "x": np.round(mm_from_m(found.x[::step]), 3).tolist(),
         "y": np.round(mm_from_m(found.y[::step]), 3).tolist(),
         "z": np.round(mm_from_m(found.z), 3).tolist(),
+        **page_colours(),
         "values": [[None if np.isnan(v) else round(float(v)) for v in layer.ravel()] for layer in stiffness],
     }
-    script = '\n"use strict";\n(() => {\n' + asset("map.js") + "})();\n"
     tilt = ", ".join(f"{deg_from_rad(v):g}" for v in found.abc)
     about = [
         machine.title,
         f"slices at z = {', '.join(f'{z:g}' for z in data['z'])} mm",
         *([f"roll, pitch, yaw {tilt} degrees"] if any(found.abc) else []),
     ]
-    return filled(
-        asset("map.html"),
-        {
-            "title": escaped(f"Stiffness map, load {found.load}"),
-            "about": escaped(" · ".join(about)),
-            "warnings": "\n".join(f'<p class="warning">Warning: {escaped(text)}</p>' for text in warnings),
-            "style": style("map.css"),
-            "script": script,
-            "script_hash": script_hash(script),
-            "data": json_for_script(data),
-        },
+    return render(
+        "map.html",
+        styles=["viewer.css", "map.css"],
+        scripts=["stage.js", "viewer.js", "map.js"],
+        data=data,
+        title=f"Stiffness map, load {found.load}",
+        about=" · ".join(about),
+        warnings=[f"Warning: {text}" for text in warnings],
     )
 
 

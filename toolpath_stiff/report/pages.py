@@ -1,134 +1,80 @@
-"""Pages that are a headline, a few figures and sections below each other: comparison, diagnosis, update. No network.
+"""Pages: templates, style sheets and scripts from `assets/`, and the parts that several pages have.
 
-Everything from a file is escaped, and a content security policy lets the page load nothing and run nothing but a
-script of its own, where it has one.
+A page is one file that loads nothing. Whatever is put into a template is escaped and cleared of control characters
+unless it is `Markup`; a content security policy lets nothing run but the page's own script.
 """
 
 from __future__ import annotations
 
 import base64
 import hashlib
-import html
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
+from toolpath_stiff import __version__
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report.figure import Drawing
-from toolpath_stiff.report.words import plain
+from toolpath_stiff.report.words import machine_text, plain
 
 if TYPE_CHECKING:
-    pass
+    from jinja2 import Environment
 
-Row = tuple[str, Sequence[str]]  # class of the row, its cells
-
-
-def escaped(value: object) -> str:
-    """Text as HTML."""
-    return html.escape(plain(str(value)))
+Row = tuple[str, Sequence[str]]  # class of the row, its cells: text, or `Markup`
 
 
-def section(title: str, body: str) -> str:
-    """A titled section; nothing where there is no body."""
-    return f"<section><h2>{escaped(title)}</h2>{body}</section>" if body else ""
+def render(
+    template: str, *, styles: Sequence[str] = (), scripts: Sequence[str] = (), data: Any = None, **values: Any
+) -> str:
+    """A page.
 
-
-def bullets(sentences: Sequence[object]) -> str:
-    """A list; nothing without sentences."""
-    return "<ul>" + "".join(f"<li>{escaped(sentence)}</li>" for sentence in sentences) + "</ul>" if sentences else ""
-
-
-def hint_list(hints: Sequence[object]) -> str:
-    """As `bullets`, a hint's command set as one, to be copied."""
-    rows = []
-    for sentence, line in (parted(str(text)) for text in hints):
-        rows.append(f"<li>{escaped(sentence)}" + (f"<pre><code>{escaped(line)}</code></pre>" if line else "") + "</li>")
-    return f"<ul>{''.join(rows)}</ul>" if rows else ""
-
-
-def picture(name: str, pictures: Mapping[str, bytes | str], questions: Mapping[str, tuple[str, str]]) -> str:
-    """A picture under the question that it answers, with how it is read; nothing where it was not drawn."""
-    content = pictures.get(name)
-    if not isinstance(content, bytes):
-        return ""
-    question, reading = questions[name]
-    if isinstance(content, Drawing):
-        image = content.svg
-    else:
-        image = f'<img alt="" src="data:image/png;base64,{base64.b64encode(content).decode("ascii")}">'
-    # The picture shows its question itself, for whoever opens it alone. A tabindex lets the keyboard scroll it.
-    return (
-        f'<section><h2 class="unseen">{escaped(question)}</h2>'
-        f'<div class="picture" role="img" aria-label="{escaped(question)}" tabindex="0">{image}</div>'
-        f'<p class="muted">{escaped(reading)}</p></section>'
-    )
-
-
-def table(head: Sequence[str], rows: Sequence[Row], numeric: Iterable[int] = ()) -> str:
-    """A table of cells that are HTML already; the columns `numeric` are aligned to the right. Nothing without rows."""
-    right = set(numeric)
-
-    def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(f"<{tag}{' class=num' if i in right else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
-
-    body = "".join(
-        f'<tr class="{kind}">{cells("td", row)}</tr>' if kind else f"<tr>{cells('td', row)}</tr>" for kind, row in rows
-    )
-    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>" if rows else ""
-
-
-def text_table(head: Sequence[str], rows: Sequence[Row], numeric: Iterable[int] = ()) -> str:
-    """A table of plain texts."""
-    return table([*map(escaped, head)], [(kind, [*map(escaped, row)]) for kind, row in rows], numeric)
-
-
-def figures(found: Iterable[tuple[str, str]]) -> str:
-    """The few figures that say it all: (figure, what it is)."""
-    return "".join(f"<li><b>{escaped(value)}</b><span>{escaped(name)}</span></li>" for value, name in found)
-
-
-def page(
-    title: str, verdict: str, headline: str, text: str, about: Sequence[str], figures: str, warnings: Sequence[str],
-    sections: Iterable[str], footer: str, verdict_class: str = "", styles: Sequence[str] = (), script: str = "",
-) -> str:  # fmt: skip
-    """The whole page. `figures`, `sections` and `footer` are HTML, the others text.
-
-    `styles`: style sheets in `assets/` beyond those of all such pages. `script` is the only one that may run; most
-    pages have none.
+    Parameters
+    ----------
+    template
+        File in `assets/` that extends `page.html`.
+    styles
+        Style sheets beyond the one of all pages.
+    scripts
+        Scripts, which share one scope and are the only ones that may run.
+    data
+        What they read, as JSON.
+    values
+        What the template names.
     """
-    parts = {
-        "title": escaped(title),
-        "verdict": escaped(verdict),
-        "verdict_class": verdict_class,
-        "headline": escaped(headline),
-        "text": escaped(text),
-        "about": escaped("   ·   ".join(part for part in about if part)),
-        "figures": figures,
-        "warnings": "\n".join(f'<p class="warning">{escaped(warning)}</p>' for warning in warnings),
-        "sections": "\n".join(part for part in sections if part),
-        "footer": footer,
-        "style": style("sections.css", *styles),
-        "script": f"<script>{script}</script>\n" if script else "",
-        "script_policy": f"; script-src '{script_hash(script)}'" if script else "",
-    }
-    return filled(asset("sections.html"), parts)
+    script = '\n"use strict";\n(() => {\n' + "".join(map(asset, scripts)) + "})();\n" if scripts else ""
+    return _templates().get_template(template).render(
+        style=Markup("".join(map(asset, ("page.css", *styles)))),
+        script=Markup(script),
+        script_hash=script_hash(script),
+        data=None if data is None else Markup(json_for_script(data)),
+        version=__version__,
+        **values,
+    )  # fmt: skip
+
+
+@cache
+def _templates() -> Environment:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    return Environment(
+        loader=FunctionLoader(asset), autoescape=True, undefined=StrictUndefined, finalize=_shown,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+
+
+def _shown(value: object) -> object:
+    """What a template shows of a value: text without control characters, HTML as it is."""
+    return value if isinstance(value, Markup) else plain(str(value))
 
 
 def asset(name: str) -> str:
     """Text of a file in `assets/`."""
     return resources.files("toolpath_stiff.report").joinpath("assets", name).read_text(encoding="utf-8")
-
-
-def style(*names: str) -> str:
-    """The style sheet of all pages, and further ones after it."""
-    return "".join(map(asset, ("page.css", *names)))
-
-
-def filled(template: str, parts: Mapping[str, str]) -> str:
-    """The template with its {{names}} replaced in one pass, so that nothing inserted is looked at again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], template)
 
 
 def script_hash(script: str) -> str:
@@ -143,3 +89,81 @@ def json_for_script(value: Any) -> str:
         text = text.replace(character, f"\\u{ord(character):04x}")
     # A lone surrogate (a byte that was no text) cannot be written as UTF-8, and browsers stumble over it.
     return re.sub("[\ud800-\udfff]", "\N{REPLACEMENT CHARACTER}", text)
+
+
+def markup(template: str, *values: object) -> Markup:
+    """A bit of HTML with values in the place of {}: as a template, for what is smaller than one."""
+    return Markup(template).format(*map(_shown, values))
+
+
+# -- parts -------------------------------------------------------------------------------------------------------------
+
+
+def _part(name: str, *values: object) -> Markup:
+    """What a macro of `parts.html` makes."""
+    found: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
+    return found
+
+
+def section(title: str, body: Markup) -> Markup:
+    """A titled section; nothing where there is no body."""
+    return _part("section", title, body) if body else Markup()
+
+
+def bullets(sentences: Sequence[object]) -> Markup:
+    """A list; nothing without sentences."""
+    return _part("bullets", sentences) if sentences else Markup()
+
+
+def hint_list(hints: Sequence[object]) -> Markup:
+    """As `bullets`, a hint's command set as one, to be copied."""
+    return _part("hints", [parted(str(text)) for text in hints]) if hints else Markup()
+
+
+def picture(name: str, pictures: Mapping[str, bytes | str], questions: Mapping[str, tuple[str, str]]) -> Markup:
+    """A picture under the question that it answers, with how it is read; nothing where it was not drawn."""
+    content = pictures.get(name)
+    if not isinstance(content, bytes):
+        return Markup()
+    drawn = isinstance(content, Drawing)
+    shown = Markup(content.svg) if isinstance(content, Drawing) else base64.b64encode(content).decode("ascii")
+    return _part("picture", *questions[name], shown, drawn)
+
+
+def table(head: Sequence[str], rows: Sequence[Row], numeric: Iterable[int] = ()) -> Markup:
+    """A table; the columns `numeric` are aligned to the right. Nothing without rows."""
+    return _part("table", head, rows, list(numeric)) if rows else Markup()
+
+
+def readings_page(
+    title: str, command: str, document: Mapping[str, Any], verdict: str, headline: str,
+    figures: Iterable[tuple[str, str]], sections: Iterable[Markup],
+) -> str:  # fmt: skip
+    """The page of a result on readings: text, data, machine, warnings and seed are those of its document."""
+    files = ", ".join(document["data"])
+    return page(
+        title=f"{title}: {files}",
+        verdict=verdict,
+        headline=headline,
+        text=document["text"],
+        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
+        figures=figures,
+        warnings=document["warnings"],
+        sections=sections,
+        footer=f"tps {command}, seed {document['seed']}",
+    )
+
+
+def page(
+    title: str, verdict: str, headline: str, text: str, about: Sequence[str], figures: Iterable[tuple[str, str]],
+    warnings: Sequence[str], sections: Iterable[Markup], footer: str, verdict_class: str = "",
+) -> str:  # fmt: skip
+    """A page of sections below each other; `sections` are HTML, the others text.
+
+    `figures`: the few that say it all, each with what it is.
+    """
+    return render(
+        "sections.html", styles=["sections.css"], title=title, verdict=verdict, headline=headline, text=text,
+        about="   ·   ".join(part for part in about if part), figures=list(figures), warnings=warnings,
+        sections=[part for part in sections if part], footer=footer, verdict_class=verdict_class,
+    )  # fmt: skip

@@ -90,30 +90,12 @@ def before_after_png(
     with house_style():
         figure = new_figure(width, height)
         figure.text(0.25 / width, 1.0 - 0.4 / height, question, size=14, weight="bold")
-        figure.text(
-            0.25 / width, 1.0 - 0.66 / height, note,
-            size=9.5, color=MUTED,
-        )  # fmt: skip
+        figure.text(0.25 / width, 1.0 - 0.66 / height, note, size=9.5, color=MUTED)
         for half, residual in enumerate(halves):
             left = 0.95 + half * block
-            figure.text(
-                left / width,
-                1.0 - 1.0 / height,
-                _half_title(called[half], known[half], residual),
-                size=10.5,
-                weight="bold",
-            )
-            for i, level in enumerate(rows):
-                for j, direction in enumerate(columns):
-                    bottom = height - 1.35 - MAP * (i + 1) + 0.1
-                    axes = figure.add_axes(
-                        ((left + MAP * j) / width, bottom / height, (MAP - 0.15) / width, (MAP - 0.3) / height)
-                    )
-                    chosen = (levels == level) & (directions == direction)
-                    points = _map(axes, data, residual, chosen, limit)
-                    axes.set_title(direction if i == 0 else "", size=9.5, color=MUTED)
-                    if half == 0 and j == 0:
-                        axes.set_ylabel(_level_text(data, levels == level), size=9)
+            title = _half_title(called[half], known[half], residual)
+            figure.text(left / width, 1.0 - 1.0 / height, title, size=10.5, weight="bold")
+            points = _half(figure, data, residual, left, limit)
         bar = figure.add_axes(
             ((0.95 + len(halves) * block) / width, (height - 1.35 - MAP * len(rows) + 0.1) / height, 0.16 / width,
              (MAP * len(rows) - 0.3) / height)
@@ -124,6 +106,23 @@ def before_after_png(
         places = [(beside, 0.55, width - beside - 0.3, height - 1.85)] if alone else _below(width, len(halves))
         _scatter_pair(figure, data, halves, directions, places)
         return figure
+
+
+def _half(figure: Figure, data: Measurements, residual: FloatArray, left: float, limit: float) -> Any:
+    """The maps of one model, `left` inches from the edge: a row a height, a column a direction; its points."""
+    width, height = figure.get_size_inches()
+    directions, levels = _directions(data), _levels(data)
+    for i, level in enumerate(np.unique(levels)):
+        for j, direction in enumerate(d for d in DIRECTION_COLOURS if (directions == d).any()):
+            bottom = height - 1.35 - MAP * (i + 1) + 0.1
+            axes = figure.add_axes(
+                ((left + MAP * j) / width, bottom / height, (MAP - 0.15) / width, (MAP - 0.3) / height)
+            )
+            points = _map(axes, data, residual, (levels == level) & (directions == direction), limit)
+            axes.set_title(direction if i == 0 else "", size=9.5, color=MUTED)
+            if left < 1.0 and j == 0:  # of the first half
+                axes.set_ylabel(_level_text(data, levels == level), size=9)
+    return points
 
 
 def last_model(document: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +12,9 @@ from toolpath_stiff.stiffness.model import machine_words
 
 # Who read a program, for headings (`Program.interpreter`).
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
+
+# Of an analysis, in the order of every table.
+FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
 
 # The sign of every residual that is shown, for axes and legends.
 DEVIATION = "(measured - modelled) / modelled"
@@ -86,6 +90,17 @@ def machine_text(document: Mapping[str, Any]) -> str:
 WIDTH = 100
 LABEL = 14  # columns of the left-hand words
 LEAST_NAME = 24  # columns for the number and name of an operation, however wide the figures are
+
+
+def labelled(label: str, text: str, column: int = LABEL) -> list[str]:
+    """An entry of a list on the terminal, wrapped and indented; the label is `column` wide."""
+    return textwrap.wrap(
+        plain(text),
+        WIDTH,
+        initial_indent=f"{label:<{column}}  ",
+        subsequent_indent=" " * (column + 2),
+        break_on_hyphens=False,
+    )
 
 
 def first_column_fitted(rows: list[list[str]], indent: int = 0) -> list[list[str]]:

@@ -19,6 +19,7 @@ from typing import TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.tables import Columns, Table, read_table
 from toolpath_stiff.units import m_from_um, n_per_mm_from_n_per_m, um_from_m
@@ -370,16 +371,11 @@ def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> st
     there = [name for name in FIGURES if all(math.isfinite(one[name]) for one in shown)]
     place = [name for name in PLACE if name in loops[0].place]
     conditions = [name for name in CONDITIONS if all(name in loop.conditions for loop in loops)]
-    lines = [",".join([*place, "stiffness_N_per_mm", "force_N", *conditions, *there])]
+    rows = []
     for loop, one, own in zip(loops, figures, shown, strict=True):
-        cells = [_quoted(loop.place[name]) for name in place]
+        cells = [loop.place[name] for name in place]
         cells += [f"{n_per_mm_from_n_per_m(one.stiffness):.1f}", f"{one.force:.2f}"]
         cells += [f"{loop.conditions[name]:.6g}" for name in conditions]
         cells += [f"{own[name] + 0.0:.3f}" for name in there]
-        lines.append(",".join(cells))
-    return "\n".join(lines) + "\n"
-
-
-def _quoted(text: str) -> str:
-    """A cell with a comma or a quote, as CSV wants it."""
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"') else text
+        rows.append(cells)
+    return csv_text([*place, "stiffness_N_per_mm", "force_N", *conditions, *there], rows)

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.words import (
+    FIGURES,
     LABEL,
     READERS,
     WIDTH,
     aligned,
     duration,
     first_column_fitted,
+    labelled,
     length_in_moves,
     machine_text,
     number,
@@ -205,14 +207,8 @@ def comparison_table(summary: Mapping[str, Any], other: Mapping[str, Any]) -> st
 
 
 def _entry(label: str, text: str) -> list[str]:
-    """A labelled entry, wrapped and indented."""
-    return textwrap.wrap(
-        plain(text),
-        WIDTH,
-        initial_indent=f"{label:<{LABEL}}  ",
-        subsequent_indent=" " * (LABEL + 2),
-        break_on_hyphens=False,
-    ) or [label]
+    """A labelled entry, of nothing its label."""
+    return labelled(label, text) or [label]
 
 
 def _origin(summary: Mapping[str, Any]) -> str:
@@ -334,9 +330,6 @@ def _operations(per_operation: Sequence[Mapping[str, Any]]) -> list[str]:
     return (
         aligned(first_column_fitted(rows)) + notes + ([f"and {more} more operations in summary.json"] if more else [])
     )
-
-
-FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
 
 
 def compare_summaries(summary: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,27 +2,27 @@
 
 The path is drawn on a 2-D canvas by our own script (assets/): it needs no graphics driver, prints, and adds 30 kB where
 a plotting library would add megabytes. Everything that comes from the program or a file name is escaped: in tables by
-`html.escape`, in the script's data as JSON without `<`, `>`, `&`; the script writes it as text, never as HTML; and a
+the templates, in the script's data as JSON without `<`, `>`, `&`; the script writes it as text, never as HTML; and a
 content security policy lets only our own script run.
 """
 
 from __future__ import annotations
 
 import base64
-import html
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
 from toolpath_stiff.nc.moves import MOTION_NAMES
-from toolpath_stiff.report.analysis import FIGURES
-from toolpath_stiff.report.figure import CLASSES, legend_extend, scale_limits
-from toolpath_stiff.report.pages import asset, filled, json_for_script, script_hash, style
+from toolpath_stiff.report.figure import legend_extend, page_colours, scale_limits
+from toolpath_stiff.report.pages import bullets, markup, render, table
 from toolpath_stiff.report.profile import extremes_by_column, profile_curve
 from toolpath_stiff.report.words import (
+    FIGURES,
     ONLY_PLUNGES,
     READERS,
     duration,
@@ -40,7 +40,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 if TYPE_CHECKING:
     from toolpath_stiff.analysis import Analysis
 
-SCRIPTS = ("path_data.js", "path_view.js", "profile_view.js", "listing.js", "operations.js")
+SCRIPTS = ("stage.js", "viewer.js", "profile.js", "analysis.js")
 
 
 def page(
@@ -67,30 +67,24 @@ def page(
         How the switch stands that lets plunges set the axis and the colour scale.
     """
     data = page_data(analysis, required, other)
-    script = '\n"use strict";\n(() => {\n' + "".join(asset(name) for name in SCRIPTS) + "})();\n"
-    program = html.escape(plain(str(summary["program"])))
-    return filled(
-        asset("report.html"),
-        {
-            "title": f"{program}: stiffness along the path",
-            "program": program,
-            "heading": html.escape(_heading(summary)),
-            "style": style("report.css"),
-            "script": script,
-            "script_hash": script_hash(script),
-            "data": json_for_script(data),
-            "plunges_shown": " checked" if show_plunges else "",
-            "warnings": "\n".join(f'<p class="warning">{html.escape(plain(w))}</p>' for w in summary["warnings"]),
-            "note": _thinned_note(data["count"], len(analysis.samples)),
-            "tables": page_tables(summary, data["weakest"]),
-            "version": html.escape(str(summary["version"])),
-        },
+    return render(
+        "analysis.html",
+        styles=["viewer.css", "analysis.css"],
+        scripts=SCRIPTS,
+        data=data,
+        title=f"{summary['program']}: stiffness along the path",
+        program=summary["program"],
+        heading=_heading(summary),
+        plunges_shown=show_plunges,
+        warnings=summary["warnings"],
+        note=_thinned_note(data["count"], len(analysis.samples)),
+        tables=page_tables(summary, data["weakest"]),
     )
 
 
 def _heading(summary: Mapping[str, Any]) -> str:
     return (
-        f"machine {plain(str(summary['machine']))} · load {summary['load']}, {summary['force_N']:g} N · "
+        f"machine {summary['machine']} · load {summary['load']}, {summary['force_N']:g} N · "
         f"{headline_text(summary, ' · ')}"
     )
 
@@ -99,55 +93,38 @@ def _thinned_note(shown: int, samples: int) -> str:
     if shown == samples:
         return ""
     return (
-        f'<p class="muted">The drawing holds {number(shown)} of the {number(samples)} samples, the highest and lowest '
-        "stiffness of every stretch among them; the tables are of all.</p>"
+        f"The drawing holds {number(shown)} of the {number(samples)} samples, the highest and lowest "
+        "stiffness of every stretch among them; the tables are of all."
     )
 
 
 TITLES = ("mean N/mm", "min N/mm", "max N/mm", "range N/mm", "mean deflection um")
 PLUNGES_TITLE = "plunges N/mm"
+PLACE = '<button type="button" class="place" data-line="{}" data-sample="{}">line {}</button>'
+OPERATION = '<button type="button" class="operation" data-operation="{}">{}</button>'
 MOST_ROWS = 200  # of lines below the required stiffness; all are in summary.json
 
 
-def page_tables(summary: Mapping[str, Any], weakest: Sequence[int]) -> str:
-    """Figures, weakest places, tools, operations, required level, comparison, assumptions, words not acted upon.
+def page_tables(summary: Mapping[str, Any], weakest: Sequence[int]) -> list[tuple[str, Markup, bool]]:
+    """Title, content and whether it is wide, of each: figures, weakest places, tools, operations and all the rest.
 
     `weakest` holds the page's rows of the weakest places.
     """
-    sections = [
+    several = len(summary["per_operation"]) > 1
+    found = [
         ("Tools", _tools(summary["per_tool"]), True),
-        *((("Operations", _operations(summary["per_operation"]), True),) if len(summary["per_operation"]) > 1 else ()),
+        ("Operations", _operations(summary["per_operation"]) if several else Markup(), True),
         ("Figures", _figures(summary), False),
         ("Weakest places", _places(summary["weakest_places"], weakest), False),
+        ("Required stiffness", _required(summary["required"]) if "required" in summary else Markup(), False),
+        ("Comparison", _comparison(summary) if "compare" in summary else Markup(), False),
+        ("Assumptions", bullets(summary["assumptions"]), False),
+        ("Read, but not acted upon", _unsupported(summary["unsupported"]), False),
     ]
-    if "required" in summary:
-        sections.append(("Required stiffness", _required(summary["required"]), False))
-    if "compare" in summary:
-        sections.append(("Comparison", _comparison(summary), False))
-    sections.append(("Assumptions", _bullets(summary["assumptions"]), False))
-    if summary["unsupported"]:
-        sections.append(("Read, but not acted upon", _unsupported(summary["unsupported"]), False))
-    return "\n".join(
-        f"<section{' class=wide' if wide else ''}><h2>{title}</h2>{body}</section>" for title, body, wide in sections
-    )
+    return [entry for entry in found if entry[1]]
 
 
-def _text(value: object) -> str:
-    return html.escape(plain(str(value)))
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numeric: Sequence[int]) -> str:
-    """A table of cells that are HTML already; the columns `numeric` are aligned to the right."""
-
-    def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(f"<{tag}{' class=num' if i in numeric else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
-
-    heading = f"<thead><tr>{cells('th', head)}</tr></thead>" if head else ""
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table>{heading}<tbody>{body}</tbody></table>"
-
-
-def _figures(summary: Mapping[str, Any]) -> str:
+def _figures(summary: Mapping[str, Any]) -> Markup:
     origin = " ".join(f"{axis}{v:.10g}" for axis, v in zip("XYZABC", summary["origin_mm_deg"], strict=True))
     rows = [
         (title[0].upper() + title[1:], number(summary[name], 2 if name.endswith("_um") else 0))
@@ -168,7 +145,7 @@ def _figures(summary: Mapping[str, Any]) -> str:
         ("Out of reach", f"{number(summary['out_of_reach_samples'])} cutting samples"),
         ("Nearest limit", f"line {summary['min_margin_line']}: {summary['min_margin_limit']}"),
     ]
-    return _table((), [(_text(name), _text(value)) for name, value in rows], ())
+    return table((), [("", row) for row in rows])
 
 
 def _plunges(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -193,106 +170,107 @@ def _beside(row: Mapping[str, Any]) -> str:
     return number(plunges["mean_N_per_mm"] if plunges else None)
 
 
-def _places(places: Sequence[Mapping[str, Any]], weakest: Sequence[int]) -> str:
+def _places(places: Sequence[Mapping[str, Any]], weakest: Sequence[int]) -> Markup:
     rows = []
     for place, row in zip(places, weakest, strict=True):
         where = " ".join(f"{axis.upper()}{place[f'{axis}_mm']:.2f}" for axis in "xyz")
         if any(place[f"{axis}_deg"] for axis in "abc"):
             where += " " + " ".join(f"{axis.upper()}{place[f'{axis}_deg']:.2f}" for axis in "abc")
-        button = (
-            f'<button type="button" class="place" data-line="{place["line"]}" data-sample="{row}">'
-            f"line {place['line']}</button>"
+        button = markup(PLACE, place["line"], row, place["line"])
+        rows.append(
+            ("", (button, number(place["stiffness_N_per_mm"]), where, markup("<code>{}</code>", place["text"])))
         )
-        rows.append((button, number(place["stiffness_N_per_mm"]), where, f"<code>{_text(place['text'])}</code>"))
-    return _table(("", "N/mm", "position mm", "program"), rows, (1,))
+    return table(("", "N/mm", "position mm", "program"), rows, (1,))
 
 
-def _tools(per_tool: Sequence[Mapping[str, Any]]) -> str:
+def _tools(per_tool: Sequence[Mapping[str, Any]]) -> Markup:
     rows = [
         (
-            f"T{row['tool']}",
-            _text(row["remark"]),
-            "reference" if row["length_mm"] is None else number(row["length_mm"], 2),
-            number(row["cutting_length_mm"], 1),
-            duration(row["time_s"]),
-            *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
-            _beside(row),
-            _weakest(row["weakest"]),
+            "",
+            (
+                f"T{row['tool']}",
+                row["remark"],
+                "reference" if row["length_mm"] is None else number(row["length_mm"], 2),
+                *_part_figures(row),
+            ),
         )
         for row in per_tool
     ]
     head = ("tool", "remark", "length mm", "cutting mm", "time", *TITLES, PLUNGES_TITLE, "weakest")
-    return _table(head, rows, range(2, 11))
+    return table(head, rows, range(2, 11))
+
+
+def _part_figures(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Length, time, stiffness and weakest place of a tool or an operation."""
+    return (
+        number(row["cutting_length_mm"], 1),
+        duration(row["time_s"]),
+        *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
+        _beside(row),
+        _weakest(row["weakest"]),
+    )
 
 
 def _weakest(place: Mapping[str, Any] | None) -> str:
     if place is None:
         return "-"
-    return f'line {place["line"]} <code class="cut">{_text(shortened(place["text"], 26))}</code>'
+    return markup('line {} <code class="cut">{}</code>', place["line"], shortened(place["text"], 26))
 
 
-def _operations(per_operation: Sequence[Mapping[str, Any]]) -> str:
+def _operations(per_operation: Sequence[Mapping[str, Any]]) -> Markup:
     rows = []
     for part, row in enumerate(per_operation[:MOST_ROWS]):
-        name = f"{row['operation']} {_text(row['name'])}"
-        rows.append(
-            (
-                f'<button type="button" class="operation" data-operation="{part}">{name}</button>',
-                f"T{row['tool']}" if row["tool"] else "-",
-                f"{row['first_line']}-{row['last_line']}",
-                number(row["cutting_length_mm"], 1),
-                duration(row["time_s"]),
-                *(number(row[name], 2 if name.endswith("_um") else 0) for name in FIGURES),
-                _beside(row),
-                _weakest(row["weakest"]),
-                "-" if row["min_margin"] is None else f"{row['min_margin']:.3f}",
-            )
+        cells = (
+            markup(OPERATION, part, f"{row['operation']} {row['name']}"),
+            f"T{row['tool']}" if row["tool"] else "-",
+            f"{row['first_line']}-{row['last_line']}",
+            *_part_figures(row),
+            "-" if row["min_margin"] is None else f"{row['min_margin']:.3f}",
         )
+        rows.append(("", cells))
     more = len(per_operation) - len(rows)
     head = ("operation", "tool", "lines", "cutting mm", "time", *TITLES, PLUNGES_TITLE, "weakest", "margin")
-    return _table(head, rows, (*range(2, 11), 12)) + (
-        f"<p>and {more} more operations in summary.json</p>" if more > 0 else ""
-    )
+    return table(head, rows, (*range(2, 11), 12)) + _and_more(more, " operations in summary.json")
 
 
-def _required(required: Mapping[str, Any]) -> str:
+def _required(required: Mapping[str, Any]) -> Markup:
     below = required["below"]
     level = number(required["required_N_per_mm"])
     if not below:
-        return f"<p>Every cutting move has the required {level} N/mm.</p>"
+        return markup("<p>Every cutting move has the required {} N/mm.</p>", level)
     more = f", the {MOST_ROWS} weakest of them here" if len(below) > MOST_ROWS else ""
-    rows = [(f"line {entry['line']}", number(entry["min_N_per_mm"])) for entry in below[:MOST_ROWS]]
-    return f"<p>{number(len(below))} lines are below the required {level} N/mm{more}:</p>" + _table(
-        ("", "lowest N/mm"), rows, (1,)
-    )
+    rows = [("", (f"line {entry['line']}", number(entry["min_N_per_mm"]))) for entry in below[:MOST_ROWS]]
+    text = f"{number(len(below))} lines are below the required {level} N/mm{more}:"
+    return markup("<p>{}</p>", text) + table(("", "lowest N/mm"), rows, (1,))
 
 
-def _comparison(summary: Mapping[str, Any]) -> str:
+def _comparison(summary: Mapping[str, Any]) -> Markup:
     other = summary["compare"]
     rows = []
     for title, name, change in zip(TITLES, FIGURES, other["difference_percent"].values(), strict=True):
         digits = 2 if name.endswith("_um") else 0
         difference = "-" if change is None else f"{change:+.1f} %"
-        rows.append((title, number(summary[name], digits), number(other[name], digits), difference))
+        rows.append(("", (title, number(summary[name], digits), number(other[name], digits), difference)))
     plunges = [plunges_beside(one) for one in (summary, other)]
     if any(plunges):
         first, second = (number(one["mean_N_per_mm"] if one else None) for one in plunges)
         change = other["plunges_difference_percent"]
-        rows.append((f"mean of the {PLUNGES_TITLE}", first, second, "-" if change is None else f"{change:+.1f} %"))
-    return _table(("", _text(summary["machine"]), _text(other["machine"]), "difference"), rows, (1, 2, 3))
+        shown = "-" if change is None else f"{change:+.1f} %"
+        rows.append(("", (f"mean of the {PLUNGES_TITLE}", first, second, shown)))
+    return table(("", str(summary["machine"]), str(other["machine"]), "difference"), rows, (1, 2, 3))
 
 
-def _bullets(sentences: Sequence[str]) -> str:
-    return "<ul>" + "".join(f"<li>{_text(sentence)}</li>" for sentence in sentences) + "</ul>"
-
-
-def _unsupported(entries: Sequence[Mapping[str, Any]]) -> str:
+def _unsupported(entries: Sequence[Mapping[str, Any]]) -> Markup:
     rows = [
-        (f"{entry['line']}:{entry['column']}", f"<code>{_text(entry['word'])}</code>", _text(entry["reason"]))
+        ("", (f"{entry['line']}:{entry['column']}", markup("<code>{}</code>", entry["word"]), entry["reason"]))
         for entry in entries[:MOST_ROWS]
     ]
     more = len(entries) - len(rows)
-    return _table(("line:column", "word", "why"), rows, ()) + (f"<p>and {more} more</p>" if more > 0 else "")
+    return table(("line:column", "word", "why"), rows) + _and_more(more, "")
+
+
+def _and_more(count: int, what: str) -> Markup:
+    return markup("<p>and {} more{}</p>", count, what) if count > 0 else Markup()
 
 
 FloatArray = NDArray[np.float64]
@@ -342,8 +320,7 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "scale": _scale(analysis, False),
         "scale_with_plunges": _scale(analysis, True) if analysis.set_aside.any() else None,
         "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
-        "colours": class_colours(0.0, 0.93),  # the lightest yellow does not show on white,
-        "colours_dark": class_colours(0.22, 1.0),  # nor the darkest violet on black
+        **page_colours(),
         "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
         "required": None if required is None else n_per_mm_from_n_per_m(required),
         "other": None if other is None else _other_curve(other),
@@ -416,11 +393,3 @@ def _quantised(values: FloatArray, low: Any, high: Any, steps: int) -> NDArray[n
 
 def _base64(array: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
-
-
-def class_colours(start: float, end: float) -> list[str]:
-    """CSS colours of the classes, weakest first: viridis, perceptually uniform."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(start, end, CLASSES))]

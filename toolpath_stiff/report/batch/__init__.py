@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
 
+from markupsafe import Markup
+
 from toolpath_stiff import __version__
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.batch.outcome import Outcome, summary_csv, terminal_summary
-from toolpath_stiff.report.pages import asset, escaped, figures, page, section
+from toolpath_stiff.report.pages import markup, render
 from toolpath_stiff.report.words import ONLY_PLUNGES, duration, number, only_plunges, plain, shortened
 
 INDEX, SUMMARY = "index.html", "summary.csv"
@@ -24,10 +26,6 @@ TICKS = 5  # of the scale, about
 MOST_LABELS = 4  # on the scale, or they would touch on a narrow page
 DRAWN = ("min_N_per_mm", "max_N_per_mm", "required_N_per_mm", "compare_mean_N_per_mm")
 PLUNGES = ("plunge_min_N_per_mm", "plunge_max_N_per_mm")
-SWITCH = (  # a style switches the drawings: no script
-    '<input type="checkbox" id="with-plunges"> '
-    '<label for="with-plunges">plunges along the tool axis on the scale</label>'
-)
 PLUNGES_ASIDE = "Plunges along the tool axis have a column of their own; bars and scale are of all other cuts."
 PLUNGES_HINT = "mean of the cuts along the tool axis, which the other figures leave out unless nothing else is cut"
 OTHER_MEAN, CHANGE = "mean on the other machine, N/mm", "how much higher the mean is on the other machine"
@@ -42,19 +40,22 @@ def batch_page(outcomes: Sequence[Outcome]) -> str:
     """The page's text, in the order of `outcomes`; links are relative to the folder of all reports."""
     good = [one for one in outcomes if one.figures is not None]
     failed = [one for one in outcomes if one.figures is None]
-    return page(
+    table = _table(good)
+    return render(
+        "batch.html",
+        styles=["sections.css", "batch.css"],
+        scripts=["batch.js"] if table else [],
         title=f"Stiffness of {_programs(len(outcomes))}",
         verdict=_verdict(good, failed),
         headline=_headline(good),
         text="Every program that could be analysed has its own report: its name opens it." if good else "",
-        about=_about(good),
-        figures=figures(_totals(good, failed)),
+        about="   ·   ".join(_about(good)),
+        figures=_totals(good, failed),
         warnings=[],
-        sections=[_failures(failed), _table(good)],
+        failures=[one.reason for one in failed],
+        table=table,
         footer=f"toolpath_stiff {__version__}. Stiffness is that of the tool tip along the load.",
         verdict_class="unexplained" if failed else "",
-        styles=["batch.css"],
-        script=asset("batch.js") if good else "",
     )
 
 
@@ -104,13 +105,6 @@ def _totals(good: Sequence[Outcome], failed: Sequence[Outcome]) -> list[tuple[st
     return found
 
 
-def _failures(failed: Sequence[Outcome]) -> str:
-    if not failed:
-        return ""
-    listed = "".join(f"<li>{escaped(one.reason)}</li>" for one in failed)
-    return section("Failed", f'<ul class="failures">{listed}</ul>')
-
-
 @dataclass(frozen=True)
 class Scale:
     """One scale of stiffness for all bars, N/mm: its ends, which are ticks, and the ticks."""
@@ -125,6 +119,7 @@ class Scale:
         return f"{100.0 * (value - self.low) / (self.high - self.low):.2f}%"
 
 
+Cell = tuple[str, str | list[Markup]]  # what it is sorted by; what it shows, drawings without and with the plunges
 Scales = tuple[Scale, Scale | None]  # without and with the plunges; None where nothing plunges
 
 
@@ -154,13 +149,13 @@ def _round_step(least: float) -> float:
     return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least * (1.0 - 1e-9))
 
 
-def _axis(scale: Scale) -> str:
+def _axis(scale: Scale) -> Markup:
     shown = scale.ticks[:: 1 if len(scale.ticks) <= MOST_LABELS else 2]
     texts = "".join(f'<text x="{scale.at(tick)}" y="14">{number(tick)}</text>' for tick in shown)
-    return f'<svg height="18" aria-hidden="true">{texts}</svg>'
+    return Markup(f'<svg height="18" aria-hidden="true">{texts}</svg>')  # numbers and words of our own
 
 
-def _bar(one: Outcome, scale: Scale, with_plunges: bool = False) -> str:
+def _bar(one: Outcome, scale: Scale, with_plunges: bool = False) -> Markup:
     low, mean, high = (_figure(one, f"{name}_N_per_mm") for name in ("min", "mean", "max"))
     lines = "".join(_line(scale, tick, "tick") for tick in scale.ticks)
     if low is not None and (low > scale.high or high < scale.low):  # only plunges, and these are not on the scale
@@ -177,7 +172,7 @@ def _bar(one: Outcome, scale: Scale, with_plunges: bool = False) -> str:
         lines += _line(scale, other, "other", (3, 19))
     if scale.required is not None:
         lines += _line(scale, scale.required, "required")
-    return f'<svg height="22" aria-hidden="true">{lines}</svg>'
+    return Markup(f'<svg height="22" aria-hidden="true">{lines}</svg>')  # numbers and words of our own
 
 
 def _span(scale: Scale, low: float, high: float, kind: str) -> str:
@@ -200,10 +195,11 @@ class Column:
     hint: str = ""
 
 
-def _table(good: Sequence[Outcome]) -> str:
+def _table(good: Sequence[Outcome]) -> dict[str, Any] | None:
+    """What the template makes the table of; None where there is nothing to draw."""
     scale = _scale(good)
     if scale is None:
-        return ""
+        return None
     compared = _figure(good[0], "compare_machine") is not None
     plunging = any(_figure(one, "plunge_mean_N_per_mm") is not None for one in good)
     beside = plunging and not all(_only_plunges(one) for one in good)
@@ -224,59 +220,33 @@ def _table(good: Sequence[Outcome]) -> str:
         Column("out of\nreach", "num", "cutting samples that were left out"),
         Column("warn-\nings", "num", "in the program's own report"),
     ]
-    head = "".join(_heading(column, scales) for column in columns)
-    rows = "".join(_row(one, columns, scales, compared, plunging) for one in good)
-    key = _key(scale, _figure(good[0], "compare_machine"), beside)
-    how, switch = (f"{HOW_TO_READ} {PLUNGES_ASIDE}", SWITCH) if beside else (HOW_TO_READ, "")
-    body = (
-        f'<p class="muted">{escaped(how)}</p><p class="muted">{key}</p>{switch}'
-        # A box that scrolls by itself keeps the headings in sight; with a tabindex the keyboard can scroll it.
-        '<div class="scroll" role="region" aria-label="Table of programs" tabindex="0">'
-        f'<table id="programs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-    )
-    return section("Stiffness of each program", body)
+    return {
+        "how": f"{HOW_TO_READ} {PLUNGES_ASIDE}" if beside else HOW_TO_READ,
+        "key": _key(scale, _figure(good[0], "compare_machine"), beside),
+        "switch": beside,
+        "columns": columns,
+        "axes": [_axis(one) for one in scales if one],
+        "rows": [_row(one, scales, compared, plunging) for one in good],
+    }
 
 
-def _key(scale: Scale, other: str | None, plunging: bool) -> str:
-    bar = '<rect class="span" x="0" width="34" y="2" height="10" rx="2"/>'
-    mean = '<line class="mean" x1="17" x2="17" y1="0" y2="14"/>'
-    entries = [(bar, "lowest to highest, N/mm"), (mean, "mean")]
-    if other is not None:
-        entries.append((mean.replace('"mean"', '"other"'), f"mean on the other machine, {other}"))
-    if scale.required is not None:
-        entries.append(('<line class="required" x1="17" x2="17" y1="0" y2="14"/>', "required"))
-        entries.append((bar.replace('"span"', '"span below"'), "below it somewhere"))
-    if plunging:
-        entries.append((bar.replace('"span"', '"span plunge"'), "plunges along the tool axis"))
-    return "".join(
-        f'<span class="key"><svg aria-hidden="true">{drawing}</svg>{escaped(text)}</span>' for drawing, text in entries
-    )
+def _key(scale: Scale, other: str | None, plunging: bool) -> list[tuple[str, str]]:
+    """Kind of drawing and what it stands for."""
+    return [
+        ("span", "lowest to highest, N/mm"),
+        ("mean", "mean"),
+        *([("other", f"mean on the other machine, {other}")] if other is not None else []),
+        *([("required", "required"), ("span below", "below it somewhere")] if scale.required is not None else []),
+        *([("span plunge", "plunges along the tool axis")] if plunging else []),
+    ]
 
 
-def _both(without: str, with_plunges: str) -> str:
-    """Two drawings of which the page shows one: without plunges on the scale, and with them."""
-    if not with_plunges:
-        return without
-    return f'<div class="without">{without}</div><div class="with">{with_plunges}</div>'
-
-
-def _heading(column: Column, scales: Scales) -> str:
-    if column.kind == "bar":
-        first, second = scales
-        drawings = _both(_axis(first), _axis(second) if second else "")
-        return f'<th class="bar"><span class="unseen">drawing</span>{drawings}</th>'
-    title = "<br>".join(map(escaped, column.title.split("\n")))
-    hint = f' title="{escaped(column.hint)}"' if column.hint else ""
-    button = f'<button type="button"{hint}>{title}</button>'
-    kind = f' class="{column.kind}"' if column.kind else ""
-    return f'<th scope="col"{kind}>{button}</th>'
-
-
-def _row(one: Outcome, columns: Sequence[Column], scales: Scales, compared: bool, plunging: bool) -> str:
+def _row(one: Outcome, scales: Scales, compared: bool, plunging: bool) -> list[Cell]:
+    """What each column is sorted by, and what it shows."""
     scale, second = scales
-    cells = [
-        (one.name, f'<a href="{_link(one.opens)}" title="{escaped(one.file)}">{escaped(one.name)}</a>'),
-        ("", _both(_bar(one, scale), _bar(one, second, with_plunges=True) if second else "")),
+    return [
+        (one.name, markup('<a href="{}" title="{}">{}</a>', _link(one.opens), one.file, one.name)),
+        ("", [_bar(one, scale), *([_bar(one, second, with_plunges=True)] if second else [])]),
         *(_number(one, f"{name}_N_per_mm") for name in ("min", "mean", "max", "range")),
         *((_plunges(one),) if plunging else ()),
         *((_flagged(one, "lines_below_required"),) if scale.required is not None else ()),
@@ -287,11 +257,10 @@ def _row(one: Outcome, columns: Sequence[Column], scales: Scales, compared: bool
         ),
         (_value(one, "weakest_line"), _place(one)),
         _number(one, "cutting_length_mm", 1),
-        (_value(one, "time_s"), escaped(duration(_figure(one, "time_s")))),
+        (_value(one, "time_s"), duration(_figure(one, "time_s"))),
         _flagged(one, "out_of_reach_samples"),
         _flagged(one, "warnings"),
     ]
-    return "<tr>" + "".join(_cell(column, *cell) for column, cell in zip(columns, cells, strict=True)) + "</tr>\n"
 
 
 def _plunges(one: Outcome) -> tuple[str, str]:
@@ -309,23 +278,17 @@ def _place(one: Outcome) -> str:
     if _figure(one, "weakest_line") is None:
         return "-"
     text = plain(_figure(one, "weakest_text"))
-    return f'{_figure(one, "weakest_line")} <code title="{escaped(text)}">{escaped(shortened(text, TEXT))}</code>'
-
-
-def _cell(column: Column, value: str, shown: str) -> str:
-    kind = f' class="{column.kind}"' if column.kind else ""
-    sort = "" if column.kind == "bar" else f' data-v="{escaped(value)}"'
-    return f"<td{kind}{sort}>{shown}</td>"
+    return markup('{} <code title="{}">{}</code>', _figure(one, "weakest_line"), text, shortened(text, TEXT))
 
 
 def _number(one: Outcome, name: str, digits: int = 0) -> tuple[str, str]:
-    return _value(one, name), escaped(number(_figure(one, name), digits))
+    return _value(one, name), number(_figure(one, name), digits)
 
 
 def _flagged(one: Outcome, name: str) -> tuple[str, str]:
     """A count that had better be zero."""
     value, shown = _number(one, name)
-    return value, f'<span class="flag">{shown}</span>' if _figure(one, name) else shown
+    return value, markup('<span class="flag">{}</span>', shown) if _figure(one, name) else shown
 
 
 def _value(one: Outcome, name: str) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.report.words import duration, number, only_plunges, plain, shortened
 
 WIDTH = 100  # columns of the terminal
@@ -121,14 +120,12 @@ def figures_of(summary: Mapping[str, Any]) -> dict[str, Any]:
 
 def summary_csv(outcomes: Sequence[Outcome]) -> str:
     """`summary.csv`: one row a program, failures too; a figure that does not exist is an empty cell."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["program", "file", "status", "reason", "report", *COLUMNS])
+    rows = []
     for one in outcomes:
         figures = one.figures or {}
         told = [plain(word) for word in (one.name, one.file, one.status, one.reason, one.opens)]
-        writer.writerow([*told, *(_cell(figures.get(name), digits) for name, digits in COLUMNS.items())])
-    return text.getvalue()
+        rows.append([*told, *(_cell(figures.get(name), digits) for name, digits in COLUMNS.items())])
+    return csv_text(["program", "file", "status", "reason", "report", *COLUMNS], rows)
 
 
 def _cell(value: Any, digits: int | None) -> str:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.compare.machine import machine_png
 from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare.variables import load_path_png, variables_png
-from toolpath_stiff.report.pages import bullets, escaped, figures, page, picture, section, text_table
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, plain
+from toolpath_stiff.report.pages import bullets, markup, picture, readings_page, section, table
+from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison import Comparison
 from toolpath_stiff.updating.comparison.residuals import directions, planes
@@ -76,7 +76,6 @@ def compare_pictures(found: Comparison) -> dict[str, bytes]:
 def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
     """The page's text, the pictures within."""
     document = found.document
-    files = ", ".join(document["data"])
     sections = [
         section("Findings" if document["findings"] else "No pattern stands out from scatter", _findings(document)),
         picture("measured_modelled.png", pictures, QUESTIONS),
@@ -93,17 +92,8 @@ def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
         section("Not tested", bullets(document["not_tested"])),
         section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
     ]
-    return page(
-        title=f"Comparison: {files}",
-        verdict="Where does the model fail?",
-        headline=_headline(document),
-        text=document["text"],
-        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
-        figures=_figures(document),
-        warnings=document["warnings"],
-        sections=sections,
-        footer=f"tps compare, seed {document['seed']}",
-    )
+    question = "Where does the model fail?"
+    return readings_page("Comparison", "compare", document, question, _headline(document), _figures(document), sections)
 
 
 def _headline(document: ComparisonDocument) -> str:
@@ -113,13 +103,13 @@ def _headline(document: ComparisonDocument) -> str:
     return f"{document['baseline']['mean_abs_error_percent']:.2f} % off in the mean as given, without a pattern"
 
 
-def _figures(document: ComparisonDocument) -> str:
+def _figures(document: ComparisonDocument) -> list[tuple[str, str]]:
     """The few figures that say it all."""
     base, noise = document["baseline"], document["noise"]
     refit = base["strut_law_refitted"]
     scatter = " to ".join(f"{base['scatter_rms_percent'][one['name']]:.1f}" for one in noise)
     share = " to ".join(f"{base['explained_by_scatter_percent'][one['name']]:.0f}" for one in noise)
-    found = [
+    return [
         (f"{base['mean_abs_error_percent']:.2f} %", "mean |modelled - measured| / measured, as given"),
         *([(f"{refit['mean_abs_error_percent']:.2f} %", "the same, strut law refitted")] if refit else []),
         (f"{base['bias_percent']:+.1f} %", f"bias: {DEVIATION}, {MINUS_IS_SOFTER}"),
@@ -127,20 +117,19 @@ def _figures(document: ComparisonDocument) -> str:
         (f"{scatter} %", "rms that scatter alone would leave"),
         (f"{share} %", "of the mean square is scatter"),
     ]
-    return figures(found)
 
 
-def _findings(document: ComparisonDocument) -> str:
+def _findings(document: ComparisonDocument) -> Markup:
     """Findings with their probabilities, or the strongest hints."""
     if not document["findings"]:
         hints = [("out", (*_said(one), _alike(one))) for one in document["hints"]]
-        return text_table(("the strongest hints", "t", "p, corrected", "looks the same in these data"), hints, (1, 2))
+        return table(("the strongest hints", "t", "p, corrected", "looks the same in these data"), hints, (1, 2))
     rows = []
     for one in document["findings"]:
         after = one.get("after_strut_law_refit")
         rows.append(("finding", (*_said(one), f"{after['p_adjusted']:.2g}" if after else "-", _alike(one))))
     head = ("finding", "t", "p, corrected", "p if the strut law is refitted", "looks the same in these data")
-    return text_table(head, rows, range(1, 4))
+    return table(head, rows, range(1, 4))
 
 
 def _said(one: Mapping[str, Any]) -> tuple[str, str, str]:
@@ -156,7 +145,7 @@ def _groups(document: ComparisonDocument) -> list[tuple[str, Mapping[str, Figure
     return [("direction", document["by_direction"]), ("", document["by_plane"]), ("set-up", document["by_setup"])]
 
 
-def _errors(document: ComparisonDocument) -> str:
+def _errors(document: ComparisonDocument) -> Markup:
     """Errors by direction, plane and set-up, beside those of scatter alone."""
     levels: list[tuple[str, Figures]] = [("all readings", document["baseline"])]
     for title, by in _groups(document):
@@ -179,10 +168,10 @@ def _errors(document: ComparisonDocument) -> str:
     ]
     head = ["", "readings", "mean error", "bias", "rms", *(f"rms of scatter alone ({name})" for name in names)]
     remark = f"Machine file as given. Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."
-    return text_table(head, rows, range(1, len(head))) + f'<p class="muted">{escaped(remark)}</p>'
+    return table(head, rows, range(1, len(head))) + markup('<p class="muted">{}</p>', remark)
 
 
-def _far_off(document: ComparisonDocument) -> str:
+def _far_off(document: ComparisonDocument) -> Markup:
     rows = [
         (
             "",
@@ -197,10 +186,10 @@ def _far_off(document: ComparisonDocument) -> str:
         for one in document["far_off"][:MOST_FAR_OFF]
     ]
     head = ("line", "direction", "point", "with the findings taken out", "standard deviations")
-    return text_table(head, rows, (3, 4))
+    return table(head, rows, (3, 4))
 
 
-def _model_free(document: ComparisonDocument) -> str:
+def _model_free(document: ComparisonDocument) -> Markup:
     """Checks that need no stiffness model, and why others cannot be made."""
     found = document["model_free"]
     rows = [
@@ -211,10 +200,10 @@ def _model_free(document: ComparisonDocument) -> str:
         for one in found["checks"]
     ]
     rows += [("out", (one["check"], f"not checked: {one['reason']}", "", "")) for one in found["cannot_check"]]
-    return text_table(("principle", "result", "t", "p, corrected"), rows, (2, 3))
+    return table(("principle", "result", "t", "p, corrected"), rows, (2, 3))
 
 
-def _tests(document: ComparisonDocument) -> str:
+def _tests(document: ComparisonDocument) -> Markup:
     """The strongest patterns, each on its own."""
     tests = document["tests"]
     rows = [
@@ -230,15 +219,15 @@ def _tests(document: ComparisonDocument) -> str:
         )
         for one in tests[:MOST_ROWS]
     ]
-    table = text_table(("pattern", "kind", "readings", "t", "p, corrected"), rows, (2, 3, 4))
-    if not table:
-        return ""
+    listed = table(("pattern", "kind", "readings", "t", "p, corrected"), rows, (2, 3, 4))
+    if not listed:
+        return Markup()
     remark = f"{len(tests)} patterns were looked for, each on its own here"
     remark += f"; the strongest {MOST_ROWS} are shown, all are in compare.json." if len(tests) > MOST_ROWS else "."
-    return f"<details><summary>{escaped(remark)}</summary>{table}</details>"
+    return markup("<details><summary>{}</summary>{}</details>", remark, listed)
 
 
-def _noise(document: ComparisonDocument) -> str:
+def _noise(document: ComparisonDocument) -> Markup:
     base = document["baseline"]
     rows = [
         (
@@ -257,7 +246,7 @@ def _noise(document: ComparisonDocument) -> str:
     ]
     head = ("noise", "reading", "clamping", "struts", "beyond it, place to place", "p of residuals this large",
             "origin")  # fmt: skip
-    return text_table(head, rows, range(1, 6))
+    return table(head, rows, range(1, 6))
 
 
 MOST_NAMED = 5  # readings far off, on the terminal
@@ -337,14 +326,12 @@ def residuals_csv(found: Comparison) -> str:
         *(_with_unit(one.name, one.unit) for one in own),
     ]  # fmt: skip
     along, where = directions(data), planes(data)
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(head)
+    rows = []
     for i in range(len(data)):
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
         modelled = float(n_per_mm_from_n_per_m(np.exp(found.log_model[i])))
-        table.writerow(
+        rows.append(
             [
                 data.file[i], data.line[i], data.point[i], data.setup[i], data.clamp[i], where[i], along[i],
                 *(f"{value + 0.0:.6g}" for value in pose),
@@ -353,7 +340,7 @@ def residuals_csv(found: Comparison) -> str:
                 *("" if np.isnan(one.values[i]) else f"{one.values[i]:.6g}" for one in own),
             ]
         )  # fmt: skip
-    return out.getvalue()
+    return csv_text(head, rows)
 
 
 def names(plots: bool = True) -> tuple[str, ...]:

@@ -120,45 +120,67 @@ def _key(figure: object, found: Comparison) -> None:
 def _panel(axes: Axes, found: Comparison, one: Variable | Label, limits: tuple[float, float]) -> None:
     """Points by direction; a trend line a direction, or the means of levels."""
     residual, along = deviation_percent(found.residual), directions(found.data)
-    if one.values.dtype.kind == "f":
-        x = np.asarray(one.values, dtype=float)
-        names: list[str] = []
-    else:
-        names = sorted(set(one.values.tolist()), key=_rank)
-        x = np.array([names.index(level) for level in one.values.tolist()], dtype=float)
+    x, names = _places(one)
     present = [axis for axis in DIRECTION_COLOURS if (along == axis).any()]
     for k, axis in enumerate(present):
         rows = (along == axis) & np.isfinite(x)
         if not rows.any():
             continue
         shift = 0.16 * (k - (len(present) - 1) / 2.0) if 0 < len(names) <= MOST_NAMES else 0.0
-        colour = DIRECTION_COLOURS[axis]
-        size = 2.6 if len(x) > 100 else 4.0
-        off = np.sign(residual) * ((residual < limits[0]) | (residual > limits[1]))
-        for side, marker in ((0, "o"), (1, "^"), (-1, "v")):
-            chosen = rows & (off == side)
-            seen = np.clip(residual[chosen], limits[0] + 0.3, limits[1] - 0.3) if side else residual[chosen]
-            axes.plot(x[chosen] + shift, seen, marker, color=colour, ms=size + abs(side), mew=0, alpha=0.55)
-        if names:
-            for level in range(len(names)) if len(names) <= MOST_NAMES else []:
-                chosen = rows & (x == level)
-                if chosen.any():
-                    mean = float(np.clip(residual[chosen], *limits).mean())
-                    at = level + shift
-                    axes.plot([at - 0.09, at + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
-        elif float(np.ptp(x[rows])) > 0.0 and rows.sum() > 2:
-            slope, level = np.polyfit(x[rows] - x[rows].mean(), np.clip(residual[rows], *limits), 1)
-            ends = np.array([x[rows].min(), x[rows].max()])
-            axes.plot(ends, level + slope * (ends - x[rows].mean()), color=colour, lw=1.3, zorder=4)
-    if names and len(names) <= MOST_NAMES:
+        _points(axes, x[rows] + shift, residual[rows], limits, DIRECTION_COLOURS[axis], 2.6 if len(x) > 100 else 4.0)
+        held = np.clip(residual[rows], *limits)
+        if not names:
+            _trend(axes, x[rows], held, DIRECTION_COLOURS[axis])
+        elif len(names) <= MOST_NAMES:
+            _level_means(axes, x[rows], held, shift, DIRECTION_COLOURS[axis])
+    _name_levels(axes, names)
+
+
+def _places(one: Variable | Label) -> tuple[FloatArray, list[str]]:
+    """Where the readings stand across a panel, and the names of the levels there, if it has any."""
+    if one.values.dtype.kind == "f":
+        return np.asarray(one.values, dtype=float), []
+    names = sorted(set(one.values.tolist()), key=_rank)
+    return np.array([names.index(level) for level in one.values.tolist()], dtype=float), names
+
+
+def _points(
+    axes: Axes, x: FloatArray, residual: FloatArray, limits: tuple[float, float], colour: str, size: float
+) -> None:
+    """Readings as dots; those beyond the axis as arrowheads at its edge."""
+    off = np.sign(residual) * ((residual < limits[0]) | (residual > limits[1]))
+    for side, marker in ((0, "o"), (1, "^"), (-1, "v")):
+        chosen = off == side
+        seen = np.clip(residual[chosen], limits[0] + 0.3, limits[1] - 0.3) if side else residual[chosen]
+        axes.plot(x[chosen], seen, marker, color=colour, ms=size + abs(side), mew=0, alpha=0.55)
+
+
+def _level_means(axes: Axes, x: FloatArray, held: FloatArray, shift: float, colour: str) -> None:
+    """A short bar at the mean of each level."""
+    for level in np.unique(x):
+        mean, at = float(held[x == level].mean()), float(level) + shift
+        axes.plot([at - 0.09, at + 0.09], [mean, mean], color=colour, lw=2.4, zorder=4)
+
+
+def _trend(axes: Axes, x: FloatArray, held: FloatArray, colour: str) -> None:
+    """The straight line of least squares, where two places and more than two readings make one."""
+    if float(np.ptp(x)) > 0.0 and len(x) > 2:
+        slope, level = np.polyfit(x - x.mean(), held, 1)
+        ends = np.array([x.min(), x.max()])
+        axes.plot(ends, level + slope * (ends - x.mean()), color=colour, lw=1.3, zorder=4)
+
+
+def _name_levels(axes: Axes, names: list[str]) -> None:
+    """Ticks: the levels' names, the first and the last of many, or numbers."""
+    if not names:
+        axes.locator_params(axis="x", nbins=4)
+    elif len(names) <= MOST_NAMES:
         room = max(int(46 / len(names)) - 2, 4)
         axes.set_xticks(range(len(names)), [shortened(plain(_brief(name)) or "(none)", room) for name in names])
         axes.set_xlim(-0.5, len(names) - 0.5)
-    elif names:
+    else:
         axes.set_xticks([0, len(names) - 1], ["first", f"last of {len(names)}"])
         axes.get_xticklabels()[1].set(ha="right")
-    else:
-        axes.locator_params(axis="x", nbins=4)
 
 
 def _rank(name: str) -> tuple[float, str]:

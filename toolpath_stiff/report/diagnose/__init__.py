@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from markupsafe import Markup
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, envelope_png, ladder_png
 from toolpath_stiff.report.explanations import (
@@ -33,7 +35,7 @@ from toolpath_stiff.report.explanations import (
     significant,
     text,
 )
-from toolpath_stiff.report.pages import bullets, escaped, figures, hint_list, page, picture, section, table
+from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
 from toolpath_stiff.report.residuals import before_after_png
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, number
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -110,12 +112,12 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
         figures=_figures(document),
         warnings=entries(document, "warnings"),
         sections=sections,
-        footer=f"<code>{escaped(document.get('command') or '')}</code> seed {escaped(document.get('seed', '-'))}",
+        footer=markup("<code>{}</code> seed {}", document.get("command") or "", document.get("seed", "-")),
         verdict_class=verdict if verdict in HEADLINES else "",
     )
 
 
-def _figures(document: DiagnosisDocument) -> str:
+def _figures(document: DiagnosisDocument) -> list[tuple[str, str]]:
     """The few figures that say it all."""
     base = document["baseline"]
     best = best_explanation(document)
@@ -129,10 +131,10 @@ def _figures(document: DiagnosisDocument) -> str:
     standing = explanations(document)
     remark = "is the explanation" if len(standing) == 1 else "are left standing"
     found.append((plausible_text(standing), remark) if standing else ("no effect", "of the catalogue is left standing"))
-    return figures(found)
+    return found
 
 
-def _candidates(document: DiagnosisDocument) -> str:
+def _candidates(document: DiagnosisDocument) -> Markup:
     """As given, strut law refitted, pairs and all candidates."""
     rows = []
     for entry in [*model_rows(document), *entries(document, "pairs"), *entries(document, "candidates")]:
@@ -143,14 +145,15 @@ def _candidates(document: DiagnosisDocument) -> str:
             (
                 kind,
                 (
-                    f"{escaped(name)}<small>{escaped(title)}</small>",
-                    "<br>".join(f"<span class=whole>{escaped(size)}</span>" for size in parameter_texts(entry)) or "-",
-                    escaped(probability_text(figure_of(entry, "probability"))),
-                    escaped(percent(figure_of(entry, "mean_abs_error_percent"), 2)),
-                    escaped(percent(figure_of(entry, "held_out_error_percent"), 2)),
+                    markup("{}<small>{}</small>", name, title),
+                    Markup("<br>").join(markup('<span class="whole">{}</span>', s) for s in parameter_texts(entry))
+                    or "-",
+                    probability_text(figure_of(entry, "probability")),
+                    percent(figure_of(entry, "mean_abs_error_percent"), 2),
+                    percent(figure_of(entry, "held_out_error_percent"), 2),
                     "-" if gain is None else f"{gain:.1f}",
-                    escaped({True: "yes", False: "no"}.get(entry.get("adequate"), "-")),
-                    escaped(remark_text(entry)),
+                    {True: "yes", False: "no"}.get(entry.get("adequate"), "-"),
+                    remark_text(entry),
                 ),
             )
         )
@@ -159,7 +162,7 @@ def _candidates(document: DiagnosisDocument) -> str:
     return table(head, rows, range(2, 6))
 
 
-def _next(document: DiagnosisDocument) -> str:
+def _next(document: DiagnosisDocument) -> Markup:
     """What to do, and the readings that tell most."""
     readings = [entry for entry in entries(document, "next_measurements") if isinstance(entry, Mapping)]
     body = hint_list(entries(document, "next"))
@@ -168,7 +171,7 @@ def _next(document: DiagnosisDocument) -> str:
         keys = [key for key in keys if any(entry.get(key) not in ("", None) for entry in readings)]
         rows = [("", [*(_cell(entry.get(key)) for key in keys), _cell(entry.get("why"))]) for entry in readings]
         numeric = [i for i, key in enumerate(keys) if all(_is_number(entry.get(key)) for entry in readings)]
-        body += table([*map(escaped, keys), "why"], rows, numeric)
+        body += table([*keys, "why"], rows, numeric)
     return body
 
 
@@ -178,43 +181,43 @@ def _is_number(value: object) -> bool:
 
 def _cell(value: object) -> str:
     if value is None:
-        return ""
-    return escaped(f"{value:.6g}" if isinstance(value, float) else value)
+        return Markup()
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _cannot_test(document: DiagnosisDocument) -> str:
+def _cannot_test(document: DiagnosisDocument) -> Markup:
     rows = []
     for entry in entries(document, "cannot_test"):
-        columns = ", ".join(f"<code>{escaped(name)}</code>" for name in entry.get("missing") or [])
-        rows.append(("", [escaped(entry.get("effect", "?")), columns or "nothing in these data depends on it"]))
+        columns = Markup(", ").join(markup("<code>{}</code>", name) for name in entry.get("missing") or [])
+        rows.append(("", [str(entry.get("effect", "?")), columns or "nothing in these data depends on it"]))
     # 80 % power is what `detectable` asks for.
     never = [e for e in entries(document, "detectable") if isinstance(e, Mapping) and e.get("detectable") is False]
     rows += [
         (
             "",
             [
-                escaped(hidden_name(e)),
+                hidden_name(e),
                 "even at its largest possible size these data would show it less than four times in five",
             ],
         )
         for e in never
     ]
-    return table(("effect", "the column that is missing"), rows) if rows else ""
+    return table(("effect", "the column that is missing"), rows) if rows else Markup()
 
 
-def _path(document: DiagnosisDocument) -> str:
+def _path(document: DiagnosisDocument) -> Markup:
     """What the plausible explanations predict on the path."""
     text = path_text(document)
     if not text:
-        return ""
+        return Markup()
     explanations = (document.get("path") or {}).get("explanations") or {}
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
-    rows = [("", [escaped(name), *(number(figure_of(one, key)) for key in keys)]) for name, one in explanations.items()]
-    listed = table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3)) if rows else ""
-    return f"<p>{escaped(text[0].upper() + text[1:])}.</p>{listed}"
+    rows = [("", [name, *(number(figure_of(one, key)) for key in keys)]) for name, one in explanations.items()]
+    listed = table(("explanation", "mean N/mm", "range N/mm", "weakest N/mm"), rows, (1, 2, 3)) if rows else Markup()
+    return markup("<p>{}.</p>", text[0].upper() + text[1:]) + listed
 
 
-def _noise(document: DiagnosisDocument) -> str:
+def _noise(document: DiagnosisDocument) -> Markup:
     """Where the noise comes from, and the verdict under each guess."""
     noise = document["noise"]
     parts = [
@@ -226,7 +229,7 @@ def _noise(document: DiagnosisDocument) -> str:
     if (joints := figure_of(noise, "joint_error_mm")) is not None:
         parts.append(f"joints {significant(joints, 2)} mm")
     origin = str(noise.get("origin") or "")
-    body = f"<p>Standard deviations: {escaped(', '.join(parts))}. {escaped(origin)}</p>" if parts else ""
+    body = markup("<p>Standard deviations: {}. {}</p>", ", ".join(parts), origin) if parts else Markup()
     found = document.get("by_noise") or {}
     if found:
         rows = []
@@ -234,14 +237,16 @@ def _noise(document: DiagnosisDocument) -> str:
             likely = one.get("probability")
             shown = [f"{key} {probability_text(value)}" for key, value in likely.items()] if likely else []
             rows.append(
-                ("", [escaped(cell) for cell in (
+                ("", [str(cell) for cell in (
                     name, percent(figure_of(one, "noise_percent")), one.get("verdict", "-"),
                     plausible_text(one.get("plausible") or []), ", ".join(shown[:4]),
                 )])
             )  # fmt: skip
         body += table(("noise", "one reading", "verdict", "plausible", "probability"), rows, (1,))
     if len(found) > 1:
-        body += '<p class="muted">The noise is a guess: the verdict is what both guesses have in common.</p>'
+        body += markup(
+            '<p class="muted">{}</p>', "The noise is a guess: the verdict is what both guesses have in common."
+        )
     return body
 
 
@@ -277,11 +282,13 @@ def _pictures(document: DiagnosisDocument, diagnosis: Diagnosis) -> dict[str, Co
 def residuals_csv(diagnosis: Diagnosis) -> str:
     """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
     data = diagnosis.data
-    lines = [
-        "file,line,point,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,dx,dy,dz,stiffness_N_per_mm,as_given_N_per_mm,"
-        "law_refitted_N_per_mm,after_N_per_mm,as_given_deviation_percent,law_refitted_deviation_percent,"
-        "after_deviation_percent"
-    ]
+    models = ("as_given", "law_refitted", "after")
+    head = [
+        "file", "line", "point", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz",
+        "stiffness_N_per_mm", *(f"{name}_N_per_mm" for name in models),
+        *(f"{name}_deviation_percent" for name in models),
+    ]  # fmt: skip
+    rows = []
     for i in range(len(data)):
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
@@ -290,7 +297,5 @@ def residuals_csv(diagnosis: Diagnosis) -> str:
         numbers = [f"{value:.6g}" for value in pose]
         numbers += [f"{value:.1f}" for value in (measured, *modelled)]
         numbers += [f"{float(deviation_percent(np.array(r))):.3f}" for r in own]
-        name = '"' + str(data.file[i]).replace('"', '""') + '"'
-        point = '"' + str(data.point[i]).replace('"', '""') + '"'
-        lines.append(",".join([name, str(data.line[i]), point, *numbers]))
-    return "\n".join(lines) + "\n"
+        rows.append([str(data.file[i]), int(data.line[i]), str(data.point[i]), *numbers])
+    return csv_text(head, rows)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -11,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis import Analysis
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.document import placement_of
 from toolpath_stiff.placement.evaluator import Keepout
 from toolpath_stiff.placement.paths import DrawnPath, drawn_path
-from toolpath_stiff.report.analysis.page import class_colours
-from toolpath_stiff.report.pages import asset, filled, json_for_script, script_hash, style
+from toolpath_stiff.report.figure import page_colours
+from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.words import machine_text, number, plain
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
@@ -67,26 +67,19 @@ def place_page(summary: dict[str, Any], best: Analysis, program: Program, keepou
         "keepouts": [{"name": plain(box.name), "box": _box(box.low, box.high)} for box in keepouts],
         "workspace": _workspace(best),
         **_drawn(path),
-        "colours": class_colours(0.0, 0.93),
-        "colours_dark": class_colours(0.22, 1.0),
+        **page_colours(),
     }
-    script = '\n"use strict";\n(() => {\n' + asset("place.js") + "})();\n"
-    name = html.escape(plain(summary["program"]))
-    about = f"machine {machine_text(summary)} · load {summary['load']}, {summary['force_N']:g} N"
-    return filled(
-        asset("place.html"),
-        {
-            "program": name,
-            "about": html.escape(plain(about)),
-            "objective": html.escape(summary["objective"]),
-            "load": html.escape(summary["load"]),
-            "note": _note(path),
-            "warnings": _warnings(summary),
-            "style": style(),
-            "script": script,
-            "script_hash": script_hash(script),
-            "data": json_for_script(data),
-        },
+    return render(
+        "place.html",
+        styles=["viewer.css", "place.css"],
+        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
+        data=data,
+        title=f"Placements of {summary['program']}",
+        about=f"machine {machine_text(summary)} · load {summary['load']}, {summary['force_N']:g} N",
+        objective=summary["objective"],
+        load=summary["load"],
+        note=_note(path),
+        warnings=summary["warnings"],
     )
 
 
@@ -129,12 +122,6 @@ def _lengths(path: DrawnPath) -> FloatArray:
     step = np.where(np.diff(path.cut) == 0, np.diff(path.s), 0.0)
     length = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
     return np.asarray(length if length.any() else np.ones(len(length)))
-
-
-def _warnings(summary: dict[str, Any]) -> str:
-    """What has to be said, as a list at the head of the page; nothing if there is nothing."""
-    items = "".join(f"<li>{html.escape(plain(text))}</li>" for text in summary["warnings"])
-    return f'<section class="warnings" role="note"><h2>Before it is run</h2><ul>{items}</ul></section>' if items else ""
 
 
 def _workspace(best: Analysis) -> list[list[float | None]]:
@@ -236,9 +223,9 @@ def files(placed: Placed, *, plots: bool = True) -> dict[str, Content]:
     from toolpath_stiff.placement.document import COLUMNS
 
     summary = placed.summary
-    rows = [",".join(_cell(row[name]) for name in COLUMNS) for row in summary["front"]]
+    rows = [[_cell(row[name]) for name in COLUMNS] for row in summary["front"]]
     contents: dict[str, Content] = {
-        "placements.csv": "\n".join([",".join(COLUMNS), *rows, ""]),
+        "placements.csv": csv_text(COLUMNS, rows),
         "placement.json": json.dumps(summary, indent=2) + "\n",
     }
     if plots:

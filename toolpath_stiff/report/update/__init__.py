@@ -8,9 +8,11 @@ from collections.abc import Mapping
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine import machine_toml
-from toolpath_stiff.report.pages import bullets, figures, hint_list, page, picture, section, text_table
+from toolpath_stiff.report.pages import bullets, hint_list, markup, picture, readings_page, section, table
 from toolpath_stiff.report.residuals import before_after_png
 from toolpath_stiff.report.update.pictures import error_ladder_png, figure3_png
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, number, plain
@@ -61,7 +63,6 @@ def update_html(document: UpdateDocument, pictures: Mapping[str, bytes | str]) -
     pictures
         File name -> PNG; they are put into the page.
     """
-    files = ", ".join(document["data"])
     provenance = document["provenance"]
     record = [
         f"command: {provenance['command']}",
@@ -77,17 +78,8 @@ def update_html(document: UpdateDocument, pictures: Mapping[str, bytes | str]) -
         section("Where it comes from", bullets(record)),
         section("Assumptions", bullets([*document["assumptions"], *document["notes"]])),
     ]
-    return page(
-        title=f"Update: {files}",
-        verdict=VERDICTS[document["verdict"]],
-        headline=_headline(document),
-        text=document["text"],
-        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
-        figures=_figures(document),
-        warnings=document["warnings"],
-        sections=sections,
-        footer=f"tps update, seed {document['seed']}",
-    )
+    verdict = VERDICTS[document["verdict"]]
+    return readings_page("Update", "update", document, verdict, _headline(document), _figures(document), sections)
 
 
 def _headline(document: UpdateDocument) -> str:
@@ -100,7 +92,7 @@ def _headline(document: UpdateDocument) -> str:
     return f"Mean error {first['mean_abs_error_percent']:.2f} % as given, {last['mean_abs_error_percent']:.2f} % after"
 
 
-def _figures(document: UpdateDocument) -> str:
+def _figures(document: UpdateDocument) -> list[tuple[str, str]]:
     last = document["steps"][-1]
     found = [(_percent(document["steps"][0]["mean_abs_error_percent"]), "mean error as given")]
     if document["objective"] == "likelihood":
@@ -112,10 +104,10 @@ def _figures(document: UpdateDocument) -> str:
         found.append((_percent(last["mean_abs_error_percent"]), called))
     found.append((_percent(last["held_out_error_percent"]), "the same at left-out points"))
     found.append((_percent(document["noise_floor_percent"]), "would be left by scatter alone"))
-    return figures(found)
+    return found
 
 
-def _by_direction(document: UpdateDocument) -> str:
+def _by_direction(document: UpdateDocument) -> Markup:
     first, last = document["steps"][0]["by_direction"], result_step(document)["by_direction"]
     rows = [
         (
@@ -131,10 +123,10 @@ def _by_direction(document: UpdateDocument) -> str:
     ]
     head = ("direction", "readings", "as given", "after", "after, left out", "bias as given", "bias after")
     remark = f"Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."
-    return text_table(head, [("", row) for row in rows], range(1, len(head))) + f'<p class="muted">{remark}</p>'
+    return table(head, [("", row) for row in rows], range(1, len(head))) + markup('<p class="muted">{}</p>', remark)
 
 
-def _fitted(document: UpdateDocument) -> str:
+def _fitted(document: UpdateDocument) -> Markup:
     last = result_step(document)
     rows = [
         ("strut law", f"at {end['length_mm']:.1f} mm", f"{end['stiffness']:.2f} N/um", f"sd {end['sd']:.2g} N/um")
@@ -148,10 +140,10 @@ def _fitted(document: UpdateDocument) -> str:
                 rows.append((effect, key, f"{_value(value['value'])} {value['unit']}", f"{low} to {high}"))
             else:
                 rows.append((effect, key, str(value), "chosen"))
-    return text_table(("effect", "parameter", "value", "95 % interval, or sd"), [("", row) for row in rows], (2, 3))
+    return table(("effect", "parameter", "value", "95 % interval, or sd"), [("", row) for row in rows], (2, 3))
 
 
-def _support(document: UpdateDocument) -> str:
+def _support(document: UpdateDocument) -> Markup:
     rows = []
     for one in (*document["support"], *document["turned_down"]):
         gain = one["held_out_gain_in_se"]
@@ -165,7 +157,7 @@ def _support(document: UpdateDocument) -> str:
             )
         )
     head = ("effect", "supported", "fall at left-out points", "gain in twice the log likelihood", "what is against it")
-    return text_table(head, [("", row) for row in rows], (2, 3))
+    return table(head, [("", row) for row in rows], (2, 3))
 
 
 def _percent(value: float | None) -> str:

@@ -22,6 +22,7 @@ from toolpath_stiff.report.figure import (
 from toolpath_stiff.report.words import plain, shortened
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
@@ -62,16 +63,7 @@ def error_ladder_png(
             )
             for key in ("held_out_error_percent", "mean_abs_error_percent")
         )
-        axes.plot(at[:taken], held[:taken], "o-", color=BLUE, lw=2.0, ms=9, label="at points left out", zorder=4)
-        axes.plot(
-            at[:taken], inside[:taken], "s--", color=MUTED, lw=1.3, ms=6, mfc="white", label="in sample", zorder=3
-        )
-        if taken < len(steps):
-            axes.axvspan(taken - 0.5, len(steps) - 0.3, color=WITHIN, lw=0, zorder=0)
-            axes.text(taken - 0.45, 0.97, "tried from there, not taken", color=MUTED, size=9, va="top",
-                      transform=axes.get_xaxis_transform())  # fmt: skip
-            axes.plot(at[taken:], held[taken:], "o", color=BLUE, ms=9, mfc="white", zorder=4)
-            axes.plot(at[taken:], inside[taken:], "s", color=MUTED, ms=6, mfc="white", zorder=3)
+        _draw_steps(axes, held, inside, taken)
         spread = np.array([figure_of(step, "held_out_se_percent") or 0.0 for step in steps])
         if spread.any():
             axes.errorbar(at, held, yerr=spread, fmt="none", ecolor=BLUE, elinewidth=1.5, capsize=4, zorder=4)
@@ -82,20 +74,8 @@ def error_ladder_png(
             )  # fmt: skip
         known = np.array([*held, *inside, noise_floor_percent or 0.0])
         top = float(np.nanmax(known)) if np.isfinite(known).any() else 1.0
-        for x, value in zip(at, held, strict=True):
-            if np.isfinite(value):
-                axes.annotate(percent(float(value)), (x, value), xytext=(9, 7), textcoords="offset points", color=BLUE)
-        for x, value in zip(at, inside, strict=True):
-            if np.isfinite(value):
-                axes.annotate(
-                    percent(float(value)),
-                    (x, value),
-                    xytext=(-9, -14),
-                    textcoords="offset points",
-                    color=MUTED,
-                    size=9,
-                    ha="right",
-                )
+        _name_values(axes, held, {"xytext": (9, 7), "color": BLUE})
+        _name_values(axes, inside, {"xytext": (-9, -14), "color": MUTED, "size": 9, "ha": "right"})
         axes.set_ylim(0.0, 1.25 * top or 1.0)
         axes.set_xlim(-0.4, len(steps) - 0.3)
         axes.set_xticks(at, [_step_text(step) for step in steps], color=INK, size=9)
@@ -104,6 +84,26 @@ def error_ladder_png(
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(frameon=False, ncol=3, loc="lower left", bbox_to_anchor=(-0.01, 1.0))
         return figure
+
+
+def _draw_steps(axes: Axes, held: FloatArray, inside: FloatArray, taken: int) -> None:
+    """Errors at left-out points and in sample: the first `taken` joined, those that were not taken apart."""
+    at = np.arange(len(held))
+    axes.plot(at[:taken], held[:taken], "o-", color=BLUE, lw=2.0, ms=9, label="at points left out", zorder=4)
+    axes.plot(at[:taken], inside[:taken], "s--", color=MUTED, lw=1.3, ms=6, mfc="white", label="in sample", zorder=3)
+    if taken < len(held):
+        axes.axvspan(taken - 0.5, len(held) - 0.3, color=WITHIN, lw=0, zorder=0)
+        axes.text(taken - 0.45, 0.97, "tried from there, not taken", color=MUTED, size=9, va="top",
+                  transform=axes.get_xaxis_transform())  # fmt: skip
+        axes.plot(at[taken:], held[taken:], "o", color=BLUE, ms=9, mfc="white", zorder=4)
+        axes.plot(at[taken:], inside[taken:], "s", color=MUTED, ms=6, mfc="white", zorder=3)
+
+
+def _name_values(axes: Axes, values: FloatArray, style: dict[str, Any]) -> None:
+    """The figures beside the points."""
+    for x, value in enumerate(values.tolist()):
+        if np.isfinite(value):
+            axes.annotate(percent(value), (x, value), textcoords="offset points", **style)
 
 
 def _step_text(step: Mapping[str, Any]) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -344,22 +343,19 @@ def residuals_csv(update: Update) -> str:
     """One row a reading: measured, modelled as given and after, deviations, that where its point was left out."""
     data, before, after = update.data, update.steps[0].fit.residual, update.last.fit.residual
     held = update.last.held.residual
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(
-        [
-            "file", "line", "point", "setup", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx",
-            "dy", "dz", "measured_N_per_mm", "as_given_N_per_mm", "after_N_per_mm", "as_given_deviation_percent",
-            "after_deviation_percent", "left_out_deviation_percent", "wild",
-        ]
-    )  # fmt: skip
+    head = [
+        "file", "line", "point", "setup", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx",
+        "dy", "dz", "measured_N_per_mm", "as_given_N_per_mm", "after_N_per_mm", "as_given_deviation_percent",
+        "after_deviation_percent", "left_out_deviation_percent", "wild",
+    ]  # fmt: skip
+    rows = []
     along = directions(data)
     for i in range(len(data)):
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
         modelled = [measured * float(np.exp(-residual[i])) for residual in (before, after)]
         errors = [float(deviation_percent(residual[i])) for residual in (before, after, held)]
-        table.writerow(
+        rows.append(
             [
                 data.file[i], data.line[i], data.point[i], data.setup[i], along[i],
                 *(f"{value + 0.0:.6g}" for value in pose), f"{measured:.1f}", *(f"{value:.1f}" for value in modelled),
@@ -367,4 +363,4 @@ def residuals_csv(update: Update) -> str:
                 int(i in update.last.fit.scatter.wild),
             ]
         )  # fmt: skip
-    return out.getvalue()
+    return csv_text(head, rows)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -13,6 +11,7 @@ from typing import Any, NotRequired, TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 from toolpath_stiff.updating.planning import Plan, Proposal, matters
@@ -367,12 +366,8 @@ def _whole(name: str) -> list[int]:
 
 def plan_csv(rows: Sequence[dict[str, Any]]) -> str:
     """The rows as CSV."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(rows[0])
-    for row in rows:
-        writer.writerow([value if isinstance(value, str) else f"{value:.10g}" for value in row.values()])
-    return stream.getvalue()
+    cells = [[value if isinstance(value, str) else f"{value:.10g}" for value in row.values()] for row in rows]
+    return csv_text(rows[0], cells)
 
 
 # -- map ---------------------------------------------------------------------------------------------------------------

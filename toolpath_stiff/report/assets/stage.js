@@ -1,0 +1,110 @@
+// What the viewer and the profile stand on: figures as text, colours of the page, a pair of stacked canvases.
+// Nothing here knows a page: elements, data and what to do when something is pointed at are handed in.
+
+// "45 123": groups of thousands by thin spaces, as in the tables.
+function group(v, digits = 0) {
+  if (!Number.isFinite(v)) return "-";
+  const [integer, fraction] = v.toFixed(digits).split(".");
+  return integer.replace(/\B(?=(\d{3})+$)/g, "\u202f") + (fraction ? "." + fraction : "");
+}
+// Round values from low to high, at most so many steps, and the digits that they need.
+function ticks(low, high, most) {
+  const rough = (high - low) / Math.max(1, most), power = 10 ** Math.floor(Math.log10(rough));
+  const pitch = power * [1, 2, 2.5, 5, 10].find((m) => m * power >= rough), out = [];
+  for (let k = Math.ceil(low / pitch); k * pitch <= high; k++) out.push(k * pitch);
+  return { values: out, digits: Math.max(0, Math.min(4, Math.ceil(-Math.log10(pitch) + (pitch / power === 2.5 ? 1 : 0)))) };
+}
+// First row of an ascending array that is not below `value`.
+function rowAt(array, value) {
+  let low = 0, high = array.length;
+  while (low < high) { const middle = (low + high) >> 1; if (array[middle] < value) low = middle + 1; else high = middle; }
+  return low;
+}
+// The text, cut to so many pixels; if next to nothing of it is left, `least`, or nothing at all.
+function fitting(g, text, least, room) {
+  if (g.measureText(text).width <= room) return text;
+  let length = Math.floor(text.length * room / g.measureText(text).width);
+  while (length > least.length + 3 && g.measureText(`${text.slice(0, length)}\u2026`).width > room) length--;
+  if (length > least.length + 3) return `${text.slice(0, length).trimEnd()}\u2026`;
+  return g.measureText(least).width <= room ? least : "";
+}
+function ring(g, x, y, radius, colour, width) {
+  g.beginPath();
+  g.arc(x, y, radius, 0, 2 * Math.PI);
+  g.strokeStyle = colour;
+  g.lineWidth = width;
+  g.stroke();
+}
+
+// ---------------------------------------------------------------- the colours of the page, light, dark or on paper
+const INKS = { panel: "card", ink: "ink", muted: "muted", line: "line", soft: "soft", accent: "pink", curve: "blue",
+  second: "orange", bad: "red", "bad-soft": "pale-red", rapid: "grey", plunge: "slate" };
+const ink = {};
+const theme = { dark: false };
+function watchTheme(changed) {
+  const root = document.documentElement, query = matchMedia("(prefers-color-scheme: dark)");
+  const read = () => {
+    theme.dark = query.matches && !root.classList.contains("printing");
+    const style = getComputedStyle(root);
+    for (const [name, variable] of Object.entries(INKS)) ink[name] = style.getPropertyValue("--" + variable).trim();
+  };
+  const again = (printing) => () => {
+    if (printing !== undefined) root.classList.toggle("printing", printing);
+    read();
+    changed();
+  };
+  read();
+  query.addEventListener("change", again());
+  // Paper is white, whatever the screen is.
+  addEventListener("beforeprint", again(true));
+  addEventListener("afterprint", again(false));
+}
+const ramp = (colours) => `linear-gradient(to right, ${colours.join(",")})`;
+
+// ---------------------------------------------------------------- a pair of stacked canvases, and a tip over them
+class Stage {
+  constructor(element) {
+    this.element = element;
+    [this.base, this.overlay] = element.querySelectorAll("canvas");
+    this.tip = element.querySelector(".tip");
+    this.waiting = false;
+    new ResizeObserver(() => this.resize()).observe(element);
+  }
+  resize() {
+    this.width = this.element.clientWidth;
+    this.height = this.element.clientHeight;
+    const scale = devicePixelRatio || 1;
+    for (const canvas of [this.base, this.overlay]) {
+      canvas.width = Math.max(1, Math.round(this.width * scale));
+      canvas.height = Math.max(1, Math.round(this.height * scale));
+      canvas.getContext("2d").setTransform(scale, 0, 0, scale, 0, 0);
+    }
+    this.resized();
+    this.draw();
+    this.drawOverlay();
+  }
+  resized() {}
+  redraw(coarse = false) {
+    this.coarse = coarse;
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => { this.waiting = false; this.draw(); this.drawOverlay(); });
+  }
+  clear(canvas) {
+    const g = canvas.getContext("2d");
+    g.clearRect(0, 0, this.width, this.height);
+    g.lineJoin = g.lineCap = "round";
+    g.font = "12px system-ui, 'DejaVu Sans', sans-serif";
+    return g;
+  }
+  // A tip beside a place; without lines there is none.
+  tell([x, y], lines) {
+    const tip = this.tip;
+    tip.hidden = !lines;
+    if (!lines) return;
+    tip.textContent = lines.join("\n");
+    const left = x + 18 + tip.offsetWidth > this.width ? x - 18 - tip.offsetWidth : x + 18;
+    tip.style.left = Math.max(0, left) + "px";
+    tip.style.top = Math.max(0, Math.min(this.height - tip.offsetHeight, y + 14)) + "px";
+  }
+}
