@@ -214,7 +214,6 @@ def circles(graph: dict[str, set[str]]) -> list[list[str]]:
 LEFT = [
     {"toolpath_stiff.api.inputs", "toolpath_stiff.api.machines"},
     {"toolpath_stiff.cli.analyze", "toolpath_stiff.cli.batch"},
-    {"toolpath_stiff.report.analysis", "toolpath_stiff.report.analysis.page"},
 ]
 
 
