@@ -329,7 +329,7 @@ class Scatter:
         return np.asarray(-0.5 * (squared + self.log_determinant) - len(self.wild) * self.price)
 
 
-# -- least squares under this scatter ------------------------------------------------------------------------------------
+# -- least squares under this scatter ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
