@@ -28,7 +28,6 @@ from toolpath_stiff.updating.inference.prediction import scaled_law
 
 FloatArray = NDArray[np.float64]
 
-MEAN_OVER_SD = 0.80  # mean absolute value of a normal deviate over its standard deviation: sqrt(2 / pi)
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
 
 
@@ -145,7 +144,7 @@ def document(correction: Correction) -> UpdateDocument:
         "support": [_support(one) for one in update.supports],
         "turned_down": [_support(one) for one in update.turned_down],
         "noise_percent": json_number(100.0 * update.noise.typical),
-        "noise_floor_percent": json_number(100.0 * MEAN_OVER_SD * update.noise.typical),
+        "noise_floor_percent": json_number(update.noise.floor_percent),
         "noise": {"name": update.noise.name, "origin": update.noise.origin},
         "widening": json_number(update.widening),
         "uncertainty": None

@@ -290,7 +290,7 @@ def _baseline(diagnosis: Diagnosis) -> BaselineEntry:
         "held_out_error_percent": json_number(100.0 * held.mean_error),
         "held_out_rms_percent": json_number(100.0 * held.rms),
         "noise_percent": json_number(100.0 * diagnosis.noise.typical),
-        "noise_floor_percent": json_number(80.0 * diagnosis.noise.typical),
+        "noise_floor_percent": json_number(diagnosis.noise.floor_percent),
         "probability": json_number(diagnosis.main.probability.get(NONE, 0.0)),
         "probability_outside": json_number(diagnosis.main.probability.get(OUTSIDE, 0.0)),
         "adequate": bool(diagnosis.main.base_gate.probability > FALSE_ALARM),

@@ -36,7 +36,7 @@ def verdict_text(diagnosis: Diagnosis) -> str:
     form = diagnosis.main.form
     return (
         "Something is missing, and nothing in the catalogue accounts for it. Mean error: "
-        f"{_errors(diagnosis)}; scatter alone leaves {80.0 * diagnosis.noise.typical:.2f} %."
+        f"{_errors(diagnosis)}; scatter alone leaves {diagnosis.noise.floor_percent:.2f} %."
         + (f" What is left forms a pattern {form}." if form else "")
         + _closest(diagnosis)
     )

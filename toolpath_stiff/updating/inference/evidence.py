@@ -25,7 +25,14 @@ from toolpath_stiff.updating.inference.candidates import (
     likely_interval,
     log_comparable,
 )
-from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance
+from toolpath_stiff.updating.inference.noise import (
+    Noise,
+    NormalEquations,
+    Scatter,
+    covariance,
+    gauss_newton,
+    scaled_inverse,
+)
 from toolpath_stiff.updating.inference.prediction import Predictor
 
 FloatArray = NDArray[np.float64]
@@ -34,6 +41,7 @@ LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stif
 GRID = 24  # sizes a sign
 ZOOMS = 3
 MOST_ROUNDS = 3  # searches for wild readings
+TABLE_STEPS, TABLE_TOLERANCE = 12, 1e-4  # of a fit on tables; standard deviations
 BEYOND = 0.05  # share of a bound by which a search may overshoot it
 
 
@@ -387,38 +395,41 @@ class Problem:
         law: FloatArray,
         inverse: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+        """Law, residual, information and jacobian after fitting the chosen sizes, in place; None where that fails."""
         prior = np.zeros((2 + len(chosen), 2 + len(chosen)))
         prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
-        for _ in range(12):
+
+        def compliance_at(law: FloatArray) -> FloatArray:
             delta = sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
-            compliance = self.compliance(law, delta)
-            residual = self.observed + np.log(compliance)
-            jacobian = np.empty((len(residual), 2 + len(chosen)))
+            return self.compliance(law, delta)
+
+        def equations(law: FloatArray) -> NormalEquations:
+            compliance = compliance_at(law)
+            jacobian = np.empty((len(self.observed), 2 + len(chosen)))
             jacobian[:, :2] = self.law_jacobian(law, compliance)
             slopes = {id(t): t.slope(sizes[id(t)]) for t in tables}
             for i, (table, j) in enumerate(chosen):
                 jacobian[:, 2 + i] = -slopes[id(table)][:, j] / compliance
-            information = jacobian.T @ inverse @ jacobian + prior
-            gradient = jacobian.T @ (inverse @ residual)
+            gradient = jacobian.T @ (inverse @ (self.observed + np.log(compliance)))
             gradient[:2] -= law / LAW_PRIOR**2
-            scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-            try:
-                step = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
-            except np.linalg.LinAlgError:
-                return None
+            return NormalEquations(jacobian, jacobian.T @ inverse @ jacobian + prior, gradient)
+
+        def move(law: FloatArray, here: NormalEquations) -> tuple[FloatArray, FloatArray]:
+            scale = here.scale
+            step = np.linalg.solve(here.information / np.outer(scale, scale), here.gradient / scale) / scale
             if not np.isfinite(step).all():
-                return None
+                raise np.linalg.LinAlgError
             # A step may change no reading by more than half: beyond that the linearisation means nothing.
-            worst = float(np.abs(jacobian @ step).max())
-            step *= min(1.0, 0.5 / max(worst, 1e-12))
-            law = law + step[:2]
+            step *= min(1.0, 0.5 / max(float(np.abs(here.jacobian @ step).max()), 1e-12))
             for i, (table, j) in enumerate(chosen):
                 sizes[id(table)][j] += step[2 + i]
-            if np.abs(step * scale).max() < 1e-4:
-                break
-        delta = sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
-        residual = self.observed + np.log(self.compliance(law, delta))
-        return law, residual, information, jacobian
+            return law + step[:2], step
+
+        try:
+            law, last = gauss_newton(law, equations, move, TABLE_STEPS, TABLE_TOLERANCE)
+        except np.linalg.LinAlgError:
+            return None
+        return law, self.observed + np.log(compliance_at(law)), last.information, last.jacobian
 
 
 @dataclass(frozen=True)
@@ -444,12 +455,6 @@ class _Scan:
         x, y = self.sizes[peak - 1 : peak + 2], self.profile[peak - 1 : peak + 2]
         curvature = 2.0 * ((y[2] - y[1]) / (x[2] - x[1]) - (y[1] - y[0]) / (x[1] - x[0])) / (x[2] - x[0])
         return float(1.0 / np.sqrt(max(-curvature, 1e-2 / x[1] ** 2)))
-
-
-def scaled_inverse(matrix: FloatArray) -> FloatArray:
-    """Inverse of a covariance or information matrix (p, p) whose rows may have very different units."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
 
 
 def _starting_sizes(tables: Sequence[Table], start: Fit) -> dict[int, FloatArray]:

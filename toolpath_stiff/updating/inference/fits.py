@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem, scaled_inverse
-from toolpath_stiff.updating.inference.noise import Scatter
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.updating.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
 
 FloatArray = NDArray[np.float64]
 
@@ -62,27 +62,27 @@ def fit_effects(
     residual = search.residual(law, flat)
     if scatter is None:
         scatter = problem.scatter.with_wild(residual)
-    for _ in range(STEPS):
-        jacobian = search.jacobian(law, flat, residual)
-        information, gradient = _normal_equations(jacobian, residual, law, scatter, law_free)
-        step = search.newton_step(flat, information, gradient)
-        scale = np.sqrt(np.diag(information))
-        law, flat, new = search.step(law, flat, residual, step, scatter)
-        if new is None:
-            break
-        residual = new
-        if np.abs(step * scale).max() < TOLERANCE:
-            break
-    jacobian = search.jacobian(law, flat, residual)
-    information, _ = _normal_equations(jacobian, residual, law, scatter, law_free)
+    Point = tuple[FloatArray, FloatArray, FloatArray]  # law, all sizes, residual
+
+    def equations(at: Point) -> NormalEquations:
+        jacobian = search.jacobian(*at)
+        return NormalEquations(jacobian, *_normal_equations(jacobian, at[2], at[0], scatter, law_free))
+
+    def move(at: Point, here: NormalEquations) -> tuple[Point, FloatArray] | None:
+        step = search.newton_step(at[1], here.information, here.gradient)
+        law, flat, residual = search.step(*at, step, scatter)
+        return None if residual is None else ((law, flat, residual), step)
+
+    (law, flat, residual), _ = gauss_newton((law, flat, residual), equations, move, STEPS, TOLERANCE)
+    last = equations((law, flat, residual))
     return Fit(
         tuple(candidates),
         tuple(search.split(flat)),
         tuple(free),
         law,
         residual,
-        jacobian,
-        scaled_inverse(information),
+        last.jacobian,
+        scaled_inverse(last.information),
         scatter,
         law_free,
         _pulls_on_absent(replace(search, free=tuple(range(len(flat)))), law, flat, residual, scatter, tuple(free)),

@@ -17,7 +17,9 @@ guessed low and high.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,7 @@ from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
+At = TypeVar("At")  # where a fit stands
 
 STRUT_SPREAD = 0.01  # relative sd; assumed, the user may say otherwise
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
@@ -40,6 +43,7 @@ LARGEST = 0.5  # relative sd that a user may state
 # states it, within a third where it is guessed; assumed.
 STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
+MEAN_OVER_SD = 0.80  # mean size of a normal deviate over its standard deviation: sqrt(2 / pi), to two digits
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
@@ -81,6 +85,11 @@ class Noise:
     def reading(self) -> FloatArray:
         """(n,) relative standard deviation of one reading, re-clamping included."""
         return np.hypot(self.repeat, self.clamping)
+
+    @property
+    def floor_percent(self) -> float:
+        """Mean error that scatter alone would leave, %."""
+        return 100.0 * MEAN_OVER_SD * self.typical
 
     @property
     def typical_repeat(self) -> float:
@@ -318,3 +327,62 @@ class Scatter:
         """(...,) of residuals (..., n), the price of wild readings included, without the constant n ln(2 pi) / 2."""
         squared = np.einsum("...i,...i->...", residual @ self.inverse, residual)
         return np.asarray(-0.5 * (squared + self.log_determinant) - len(self.wild) * self.price)
+
+
+# -- least squares under this scatter ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """At one point: jacobian (n, q) of ln k to q unknowns, information (q, q) and gradient (q,), priors included."""
+
+    jacobian: FloatArray
+    information: FloatArray
+    gradient: FloatArray
+
+    @property
+    def scale(self) -> FloatArray:
+        """(q,) of the unknowns, whose units may be very different."""
+        return np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+
+
+def gauss_newton(
+    start: At,
+    equations: Callable[[At], NormalEquations],
+    move: Callable[[At, NormalEquations], tuple[At, FloatArray] | None],
+    steps: int,
+    tolerance: float,
+) -> tuple[At, NormalEquations]:
+    """Least squares step by step: on tables (`evidence`) and with the model itself (`fits`).
+
+    Parameters
+    ----------
+    start
+        Where to begin, whatever `equations` and `move` understand.
+    equations
+        The normal equations at a point.
+    move
+        The next point and the step (q,) that was wanted; None where no step helps.
+    steps, tolerance
+        At most so many, and until a step is so small in standard deviations.
+
+    Returns
+    -------
+    The last point, and the equations of the last step.
+    """
+    at = start
+    for _ in range(steps):
+        here = equations(at)
+        moved = move(at, here)
+        if moved is None:
+            break
+        at, step = moved
+        if np.abs(step * here.scale).max() < tolerance:
+            break
+    return at, here
+
+
+def scaled_inverse(matrix: FloatArray) -> FloatArray:
+    """Inverse of a covariance or information matrix (p, p) whose rows may have very different units."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale))
