@@ -13,6 +13,7 @@ import pytest
 from tests.placement.test_placement_search import MODEL, TANGENTIAL, headline_figures, program_of
 from toolpath_stiff.analysis import analyse
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
@@ -20,7 +21,7 @@ from toolpath_stiff.path import place
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import telling_path, work_path
-from toolpath_stiff.placement.search import NO_FLOORS, OBJECTIVES, SearchRules, search_placements
+from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parents[2]

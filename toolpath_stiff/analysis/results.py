@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import RULES, Load, parse_load
 from toolpath_stiff.analysis.poses import PoseStiffness, Progress, evaluate
 from toolpath_stiff.analysis.statistics import (
@@ -25,11 +25,11 @@ from toolpath_stiff.analysis.statistics import (
     share,
     weakest_places,
 )
+from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
 from toolpath_stiff.path import Samples, place, sample_moves
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import (
     StiffnessModel,
     acting_effects,
@@ -42,11 +42,6 @@ from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
-DEFAULT_STEP = 1e-3  # m; 1 mm resolves any feature that a mill can cut, and costs microseconds
 
 
 @dataclass(frozen=True)
@@ -100,9 +95,9 @@ def analyse(
     program: Program,
     *,
     origin: Pose | None = None,
-    load: Load | str = "tangential",
-    step: float = DEFAULT_STEP,
-    force: float = DEFAULT_FORCE,
+    load: Load | str = defaults.LOAD,
+    step: float = defaults.STEP,
+    force: float = defaults.FORCE,
     partial: bool = False,
     progress: Progress | None = None,
 ) -> Analysis:
@@ -207,7 +202,7 @@ def _warnings(samples: Samples, at: PoseStiffness) -> list[str]:
     return found
 
 
-def _lines(lines: NDArray[np.int64], most: int = 5) -> str:
+def _lines(lines: IntArray, most: int = 5) -> str:
     """Line numbers in words: "lines 3, 4, 9 and 12 more"."""
     shown = ", ".join(str(line) for line in lines[:most])
     more = f" and {len(lines) - most} more" if len(lines) > most else ""

@@ -16,20 +16,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, StrutLaw, read_uncertainty
 from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
-from toolpath_stiff.units import Pose, m_from_mm, m_per_s_from_mm_per_min, mm_from_m, rad_from_deg
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.units import (
+    Pose,
+    m_from_mm,
+    m_per_s_from_mm_per_min,
+    mm_from_m,
+    rad_from_deg,
+)
 
 INFINITY = math.inf
 
-DEFAULT_MACHINE = "nist"
 # Smallest singular value of the six strut screws (arms in units of the platform's size) that is no singularity.
 SINGULAR = 1e-6
 
@@ -139,7 +143,7 @@ def packaged_machines() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def load_machine(name_or_file: str | Path = DEFAULT_MACHINE) -> Machine:
+def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
     """Load a machine by the name of a packaged one or from a machine file.
 
     Parameters
@@ -230,7 +234,7 @@ class _Reader:
             platform_bar_stiffness=values.get("platform", {}).get("bar_stiffness_N_per_m", INFINITY),
             limits=self.limits(values),
             default_origin=_pose(setup.get("default_origin_mm", np.zeros(3))),
-            rapid_feed=m_per_s_from_mm_per_min(setup.get("rapid_mm_per_min", 10000.0)),
+            rapid_feed=m_per_s_from_mm_per_min(setup["rapid_mm_per_min"]) if setup else defaults.RAPID_FEED,
             setup=setup.get("name"),
             temperature=setup.get("temperature_C"),
             setups=setup.get("names", ()),

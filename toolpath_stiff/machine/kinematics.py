@@ -13,14 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import mm_from_m
-
-FloatArray = NDArray[np.float64]
 
 LENGTH_TOLERANCE = 1e-12  # m, a few units in the last place of a strut's length
 MOST_STEPS = 50

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.kinematics import Struts, joint_angles, singularity_index
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import deg_from_rad, mm_from_m
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ class Reach:
     limits: tuple[Limit, ...]
 
     @property
-    def reachable(self) -> NDArray[np.bool_]:
+    def reachable(self) -> BoolArray:
         """(n,) whether every limit is kept."""
         return np.asarray(self.margin >= 0.0)
 

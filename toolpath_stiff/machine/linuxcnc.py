@@ -12,14 +12,12 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm, rad_from_deg
-
-FloatArray = NDArray[np.float64]
 
 SETP = re.compile(r"^\s*setp\s+genhexkins\.(\S+?)\s*(?:=\s*|\s+)(\S+)\s*$")
 JOINT = re.compile(r"(base|platform)\.([0-5])\.([xyz])$")

@@ -13,12 +13,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import Pose
-
-FloatArray = NDArray[np.float64]
 
 ORIGINS = ("published", "recovered", "assumed", "fitted")
 
@@ -60,7 +59,7 @@ class StrutLaw:
         low, high = sorted((self.length_1, self.length_2))
         return np.asarray(np.minimum(length - (low - slack), (high + slack) - length))
 
-    def extrapolates(self, length: FloatArray) -> NDArray[np.bool_]:
+    def extrapolates(self, length: FloatArray) -> BoolArray:
         """Whether a length lies outside the range that the law was given for."""
         return np.asarray(self.room(length) < 0.0)
 
@@ -160,7 +159,7 @@ class Machine:
     platform_bar_stiffness: float = np.inf
     limits: Limits = field(default_factory=Limits)
     default_origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    rapid_feed: float = 10.0 / 60.0
+    rapid_feed: float = defaults.RAPID_FEED
     setup: str | None = None
     temperature: float | None = None
     setups: tuple[str, ...] = ()

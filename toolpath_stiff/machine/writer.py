@@ -8,12 +8,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import EffectEntry, Machine, Uncertainty
 from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
-
-FloatArray = NDArray[np.float64]
 
 # `tps machine new` puts it in every section; what still has it was not replaced.
 TEMPLATE_REMARK = "value of the template, not of this machine"

@@ -12,6 +12,7 @@ from importlib import resources
 from itertools import pairwise
 from typing import Any
 
+from toolpath_stiff import defaults
 from toolpath_stiff.analysis import Analysis, analyse
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.nc import Program, parse_program
@@ -66,7 +67,7 @@ def origin_of(x_mm: float, y_mm: float, z_mm: float, turn_deg: float) -> Pose:
     return (m_from_mm(x_mm), m_from_mm(y_mm), m_from_mm(z_mm), 0.0, 0.0, rad_from_deg(turn_deg))
 
 
-def run_case_study(model: StiffnessModel, step: float = 1e-3) -> CaseStudy:
+def run_case_study(model: StiffnessModel, step: float = defaults.STEP) -> CaseStudy:
     """Analyse the path in every region, over the heights, and its non-planar variants.
 
     Raises

@@ -10,20 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.loads import Load, load_directions
 from toolpath_stiff.analysis.poses import evaluate
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.kinematics import neutral_axes, solve_struts, solve_struts_at
 from toolpath_stiff.machine.limits import machine_limits, reach
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import StiffnessModel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 POSES_AT_A_TIME = 30_000  # fits the processor's cache
 # Evaluations of the whole path in a search, about: says whether numba's half a second is earned back.

@@ -12,23 +12,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.analysis.poses import evaluate
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 Read = Callable[[Pose], Program]  # the program as it is read where its zero sits there
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others
@@ -236,7 +231,7 @@ def _leg(
         count = int(np.clip(np.ceil(length / 5e-3), 2, LEG_SAMPLES))
     u = np.linspace(0.0, 1.0, count)
 
-    def repeated(values: NDArray[Any]) -> NDArray[Any]:
+    def repeated(values: AnyArray) -> AnyArray:
         return np.repeat(values[:, None], count, axis=1)
 
     return Anchored(

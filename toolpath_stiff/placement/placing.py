@@ -12,7 +12,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.results import Analysis, analyse
@@ -39,8 +38,6 @@ from toolpath_stiff.placement.search import SearchRules, search_placements
 from toolpath_stiff.rewriting import Rewritten, check_decimals, check_rewritable, rewrite_program
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose, mm_from_m
-
-FloatArray = NDArray[np.float64]
 
 COMPARED = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_per_mm"}
 

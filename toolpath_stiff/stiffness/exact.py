@@ -30,17 +30,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 WHOLE_STEPS, MOST_STEPS, LINE_STEPS = 25, 200, 40
 SETTLED = 1e-8  # of the load: the tip's compliance is then certain to some 1e-8 of itself
@@ -84,7 +81,7 @@ class SharedLoad:
         return np.maximum(slope, LEAST_TANGENT * here), here, form
 
 
-def settle(load: SharedLoad, first: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def settle(load: SharedLoad, first: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Strut forces that agree with the compliances that they cause.
 
     Parameters
@@ -376,7 +373,7 @@ def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wren
     assert part.strut_forces is not None
     wrench = wrenches[regular] * part.force[:, None]
 
-    def compliance(forces: FloatArray, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    def compliance(forces: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
         links = assemble_links(model, replace(part.take(rows), strut_forces=forces))
         return links.strut, np.zeros((len(rows), 6, 12)) if links.loads is None else links.loads[:, :6]
 

@@ -15,15 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Machine, with_parameter
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.effects import find_effect, guard, known_effects
 from toolpath_stiff.stiffness.effects.contract import (
-    DEFAULT_FORCE,
     SETUP,
     Conditions,
     Effect,
@@ -32,8 +33,6 @@ from toolpath_stiff.stiffness.effects.contract import (
 )
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.units import mm_from_m
-
-FloatArray = NDArray[np.float64]
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
 TOOL = "tool_extension_mm"
@@ -234,8 +233,8 @@ def load_path(
     position: ArrayLike,
     rotation: ArrayLike | None = None,
     tool_length: ArrayLike = np.nan,
-    force: ArrayLike = DEFAULT_FORCE,
-    setup: NDArray[np.str_] | None = None,
+    force: ArrayLike = defaults.FORCE,
+    setup: TextArray | None = None,
     time: FloatArray | None = None,
     temperature: FloatArray | None = None,
     direction: FloatArray | None = None,

@@ -13,12 +13,11 @@ elimination, k = F / x (equation 4). It knows neither effects nor batches: it ex
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
-
-FloatArray = NDArray[np.float64]
 
 HUB, TIP = 6, 7
 

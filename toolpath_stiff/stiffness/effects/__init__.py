@@ -17,11 +17,10 @@ from types import ModuleType
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, LINKS, Conditions, Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import LINKS, Conditions, Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.effects.guard import check_declarations, line_in, line_of
 
 __all__ = [
-    "DEFAULT_FORCE",
     "LINKS",
     "Conditions",
     "Effect",

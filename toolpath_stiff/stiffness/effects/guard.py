@@ -19,14 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import EffectFault, InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import LINKS, Effect, LoadPath, Parameter
 from toolpath_stiff.units import mm_from_m
-
-FloatArray = NDArray[np.float64]
 
 # What each hook returns for n poses: shape beyond n, and in words.
 SHAPES: dict[str, tuple[tuple[int, ...], str]] = {
@@ -180,7 +178,7 @@ def _refuse_not_finite(effect: Effect, hook: str, found: FloatArray, path: LoadP
         raise _fault(effect, hook, f"returns {found[first]:g}{_at(path, int(first[0]))}", "finite numbers")
 
 
-def _largest_gap(found: FloatArray, bad: NDArray[np.bool_]) -> int:
+def _largest_gap(found: FloatArray, bad: BoolArray) -> int:
     gap = np.abs(found - np.swapaxes(found, 1, 2))
     gap[~bad] = -1.0
     return int(np.argmax(gap))

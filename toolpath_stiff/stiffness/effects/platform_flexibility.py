@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 from toolpath_stiff.stiffness.truss import free_platform_flexibility
-
-FloatArray = NDArray[np.float64]
 
 
 class PlatformFlexibility(Effect):

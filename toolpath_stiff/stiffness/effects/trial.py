@@ -9,18 +9,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectFault, InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path
-
-FloatArray = NDArray[np.float64]
 
 POSES, DRAWN, TIMED = 24, 600, 512
 SETUPS = ("riser", "table")
@@ -137,7 +136,7 @@ def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
     setup = np.array([SETUPS[i % 2] for i in range(n)])
     direction = np.eye(3)[np.arange(n) % 3]
     return load_path(
-        model, poses[:, :3], rotation_matrices(poses[:, 3:]), force=DEFAULT_FORCE, setup=setup, time=3600.0 * ramp,
+        model, poses[:, :3], rotation_matrices(poses[:, 3:]), force=defaults.FORCE, setup=setup, time=3600.0 * ramp,
         temperature=20.0 + 5.0 * ramp, direction=direction,
     )  # fmt: skip
 

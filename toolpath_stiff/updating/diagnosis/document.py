@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.hints import Asked
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, joined
+from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.diagnosis.words import next_steps, verdict_text, why
@@ -345,5 +346,5 @@ def assumptions(diagnosis: Diagnosis) -> list[str]:
         f"the plausible set holds {100 * HELD:g} %",
     ]
     if "force_N" in diagnosis.data.missing:
-        found.append(f"load of every reading: {DEFAULT_FORCE:g} N, assumed because force_N is missing")
+        found.append(f"load of every reading: {defaults.FORCE:g} N, assumed because force_N is missing")
     return found
