@@ -36,6 +36,7 @@ from toolpath_stiff.units import (
     mm_from_m,
     mm_per_min_from_m_per_s,
     n_per_mm_from_n_per_m,
+    n_per_um_from_n_per_m,
     um_from_m,
 )
 
@@ -415,7 +416,7 @@ def _struts(machine: Machine) -> Iterator[str]:
 
 def _implausible(where: str, struts: list[tuple[float, float]]) -> Iterator[str]:
     for length, stiffness in struts:
-        value = stiffness / 1e6
+        value = n_per_um_from_n_per_m(stiffness)
         if STRUT_SOFTEST <= value <= STRUT_STIFFEST:
             continue
         per, other = ("N/mm", value / 1e3) if value > STRUT_STIFFEST else ("kN/um", value * 1e3)
@@ -427,7 +428,7 @@ def _implausible(where: str, struts: list[tuple[float, float]]) -> Iterator[str]
 
 
 def _stiffness(report: PoseReport) -> list[str]:
-    softest = float(report.softest_stiffness[0]) / 1e6
+    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
     if ROBOT <= softest <= BEYOND:
         return []
     beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
@@ -442,7 +443,7 @@ def neutral_words(machine: Machine, report: PoseReport) -> str:
     kx, ky, kz = (n_per_mm_from_n_per_m(float(v)) for v in report.along_axes[0])
     along = (um_from_m(defaults.FORCE / float(k)) for k in report.along_axes[0])
     moved = ", ".join(f"{moved:.3g} um along {axis}" for axis, moved in zip("XYZ", along, strict=True))
-    softest = float(report.softest_stiffness[0]) / 1e6
+    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
     if softest < ROBOT:
         words = "as soft as a robot arm"
     elif softest <= MACHINING_CENTRE:

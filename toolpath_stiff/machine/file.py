@@ -29,6 +29,7 @@ from toolpath_stiff.units import (
     m_from_mm,
     m_per_s_from_mm_per_min,
     mm_from_m,
+    n_per_m_from_n_per_um,
     rad_from_deg,
 )
 
@@ -381,7 +382,7 @@ class _Reader:
         return m_from_mm(rows)
 
     def strut_law(self, values: dict[str, Any]) -> StrutLaw:
-        lengths, stiffnesses = m_from_mm(values["length_mm"]), values["stiffness_N_per_um"] * 1e6
+        lengths, stiffnesses = m_from_mm(values["length_mm"]), n_per_m_from_n_per_um(values["stiffness_N_per_um"])
         if lengths[0] == lengths[1]:
             raise self.fail("strut_law", "length_mm", ": both lengths are equal", "two lengths apart")
         return StrutLaw(float(lengths[0]), float(stiffnesses[0]), float(lengths[1]), float(stiffnesses[1]))

@@ -17,7 +17,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.units import Pose
+from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
 
 ORIGINS = ("published", "recovered", "assumed", "fitted")
 
@@ -238,7 +238,7 @@ def with_parameter(machine: Machine, name: str, change: float) -> Machine:
     if name in STRUT_LAW:
         law = machine.strut_law
         values = [law.stiffness_1, law.stiffness_2]
-        values[STRUT_LAW.index(name)] += change * 1e6
+        values[STRUT_LAW.index(name)] += n_per_m_from_n_per_um(change)
         return machine.with_changes(strut_law=replace(law, stiffness_1=values[0], stiffness_2=values[1]))
     owner, _, key = name.partition(".")
     for kind in ("effects", "instruments"):

@@ -23,13 +23,13 @@ from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose
+from toolpath_stiff.units import Pose, rad_from_deg
 
 Read = Callable[[Pose], Program]  # the program as it is read where its zero sits there
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others
 LEG_SAMPLES = 40  # of an anchored rapid, at most; 25 mm apart over a metre, and reach changes slowly
 
-CORNER = np.deg2rad(10.0)  # a sharper one is kept before samples along straight cuts are
+CORNER = rad_from_deg(10.0)  # a sharper one is kept before samples along straight cuts are
 SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
 
 

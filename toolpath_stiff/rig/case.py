@@ -33,7 +33,7 @@ from toolpath_stiff.rig.hidden import (
     readings,
 )
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, reachable
-from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
+from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 Table = dict[str, Any]
 
@@ -174,7 +174,7 @@ def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows
         direction=direction,
         force=column("force_N", defaults.FORCE),
         extension=m_from_mm(column("tool_extension_mm", 0.0)),
-        time=60.0 * column("time_min", 0.0),
+        time=s_from_min(column("time_min", 0.0)),
         elapsed=np.linspace(0.0, 1.0, n) if elapsed is None else elapsed,
         setup=np.array(table["setup"] if "setup" in table else [DEFAULT_SETUP] * n, dtype=np.str_),
     )

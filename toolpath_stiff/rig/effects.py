@@ -20,11 +20,10 @@ from numpy.random import Generator
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, Oddity, Rows, readings
 from toolpath_stiff.rig.nominal import Nominal
-from toolpath_stiff.units import m_from_mm, m_from_um
+from toolpath_stiff.units import m_from_mm, m_from_um, per_s_from_per_min
 
 Parameters = dict[str, Any]
 NM_PER_N = 1e-9  # m/N in nm/N
-SECONDS_PER_MINUTE = 60.0
 
 # Largest compliances that are tried, nm/N: far beyond 30 % of a tip that gives 8 to 31 nm/N.
 SOFT = 60.0
@@ -170,7 +169,7 @@ CATALOGUE: dict[str, Change] = {
         "gauge_target": p["setup"] or "XYZ"[p["direction"] - 1],
         "gauge_factor": 1.0 + p["scale"] / 100.0,
     },
-    "thermal_drift": lambda h, p: {"drift": m_from_um(p["rate"]) / SECONDS_PER_MINUTE},
+    "thermal_drift": lambda h, p: {"drift": per_s_from_per_min(m_from_um(p["rate"]))},
 }
 
 

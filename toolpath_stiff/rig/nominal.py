@@ -21,7 +21,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_text
-from toolpath_stiff.units import m_from_mm, rad_from_deg
+from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_um, rad_from_deg
 
 # Joints of one vertex of the frame lie within this angle about the machine's axis; vertices are far more apart.
 VERTEX_WIDTH = rad_from_deg(15.0)
@@ -126,7 +126,7 @@ def parse_nominal(text: str, file: str) -> Nominal:
         platform_joints=_joints(table, "platform_joints", file),
         tool_length=m_from_mm(float(_numbers(table.get("reference_tool", {}), "length_mm", 1, file)[0])),
         law_lengths=m_from_mm(_numbers(table.get("strut_law", {}), "length_mm", 2, file)),
-        law_stiffnesses=_numbers(table.get("strut_law", {}), "stiffness_N_per_um", 2, file) * 1e6,
+        law_stiffnesses=n_per_m_from_n_per_um(_numbers(table.get("strut_law", {}), "stiffness_N_per_um", 2, file)),
         strut_range=(
             m_from_mm(float(_numbers(lengths, "min_mm", 1, file)[0])),
             m_from_mm(float(_numbers(lengths, "max_mm", 1, file)[0])),

@@ -37,7 +37,7 @@ from toolpath_stiff.hints import command_line
 from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 WHOLE_STEPS, MOST_STEPS, LINE_STEPS = 25, 200, 40
 SETTLED = 1e-8  # of the load: the tip's compliance is then certain to some 1e-8 of itself
@@ -244,7 +244,7 @@ def refuse_law_beyond_zero(lengths: FloatArray, stiffness: FloatArray) -> None:
     worst = np.unravel_index(np.argmin(stiffness), stiffness.shape)
     raise InputError(
         f"strut {worst[1] + 1} would be {mm_from_m(float(lengths[worst])):.1f} mm long, where the machine's strut law "
-        f"gives {stiffness[worst] / 1e6:.4g} N/um",
+        f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um",
         expected="a stiffness above 0",
         hint="bound the strut length in the machine file so that the law stays positive",
     )

@@ -20,12 +20,14 @@ from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path
+from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
 
 POSES, DRAWN, TIMED = 24, 600, 512
+LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
 SETUPS = ("riser", "table")
 SAME = 1e-9  # relative: of results that must agree
 # SI value of the units that parameters have, with the prefixes below.
-BASE = {"m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": np.pi / 180.0, "%": 1e-2, "1": 1.0}
+BASE = {"m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": RAD_PER_DEG, "%": 1e-2, "1": 1.0}
 BASE |= {"percent": 1e-2, "min": 60.0, "h": 3600.0}
 PREFIXED, PREFIXES = ("m", "N", "rad", "s"), {"n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 
@@ -94,7 +96,7 @@ def _poses(machine: Machine, seed: int) -> FloatArray:
     generator = np.random.default_rng(seed)
     drawn = np.empty((DRAWN, 6))
     drawn[:, :3] = generator.uniform(low, high, (DRAWN, 3))
-    drawn[:, 3:] = generator.uniform(-np.pi / 18.0, np.pi / 18.0, (DRAWN, 3))
+    drawn[:, 3:] = generator.uniform(-LEANING, LEANING, (DRAWN, 3))
     drawn[0] = origin
     turn = rotation_matrices(drawn[:, 3:])
     stand = reach(machine, drawn[:, :3], solve_struts(machine, drawn[:, :3], turn), turn)
