@@ -49,7 +49,8 @@ class PlatformFlexibility(Effect):
 
     def finding(self, p: Mapping[str, Any]) -> str:
         """Which part gives way, by how much."""
-        return f"the platform is flexible: its bars have about {about(n_per_um_from_n_per_m(p['bar_stiffness']))} N/um each"
+        stiffness = n_per_um_from_n_per_m(p["bar_stiffness"])
+        return f"the platform is flexible: its bars have about {about(stiffness)} N/um each"
 
 
 def platform_loads(path: LoadPath) -> FloatArray:
