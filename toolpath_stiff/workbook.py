@@ -74,23 +74,7 @@ def sheet_grid(content: bytes, file: str, sheet: str = "") -> Grid:
     if content.startswith(OLD_EXCEL):
         raise InputError("an old or a protected Excel file", expected="an .xlsx workbook", hint=SAVE_AS, file=file)
     _refuse_large(content, file)
-    values = _open(content, file, values=True)
-    filled = [one for one in values.worksheets if any(v is not None for row in one.values for v in row)]
-    names = [one.title for one in filled]
-    if not filled or (sheet and sheet not in names):
-        found = f"the workbook has no sheet {sheet!r} with cells" if filled else "the workbook is empty"
-        raise InputError(found, expected=f"one of {', '.join(names)}" if filled else "", file=file)
-    chosen = filled[names.index(sheet) if sheet else 0]
-    if chosen.max_row * chosen.max_column > LARGEST_CELLS:
-        raise InputError(
-            f"sheet {chosen.title!r} has {chosen.max_row} rows and {chosen.max_column} columns",
-            hint="delete the empty ones, or save the sheet as CSV",
-            file=file,
-        )
-    notes = []
-    if len(filled) > 1 and not sheet:
-        others = ", ".join(names[1:])
-        notes.append(f"{file}: sheet {chosen.title!r} is read, not {others}; {file}#SHEET names another")
+    chosen, notes = _chosen_sheet(_open(content, file, values=True), file, sheet)
     cells = [list(row) for row in chosen.values]
     if any(value is None for row in cells for value in row):
         _refuse_formulas(cells, _open(content, file, values=False)[chosen.title], file)
@@ -100,6 +84,28 @@ def sheet_grid(content: bytes, file: str, sheet: str = "") -> Grid:
     merged = _fill_merged(chosen, cells)
     rows = [(line, [_shown(value) for value in row]) for line, row in enumerate(cells, 1)]
     return Grid([(line, row) for line, row in rows if counts(row)], "", tuple(notes), merged)
+
+
+def _chosen_sheet(workbook: Any, file: str, sheet: str) -> tuple[Any, list[str]]:
+    """The sheet of that name, or the first that is not empty, and a note where there are others."""
+    filled = [one for one in workbook.worksheets if any(v is not None for row in one.values for v in row)]
+    names = [one.title for one in filled]
+    if not filled:
+        raise InputError("the workbook is empty", file=file)
+    if sheet and sheet not in names:
+        found = f"the workbook has no sheet {sheet!r} with cells"
+        raise InputError(found, expected=f"one of {', '.join(names)}", file=file)
+    chosen = filled[names.index(sheet) if sheet else 0]
+    if chosen.max_row * chosen.max_column > LARGEST_CELLS:
+        raise InputError(
+            f"sheet {chosen.title!r} has {chosen.max_row} rows and {chosen.max_column} columns",
+            hint="delete the empty ones, or save the sheet as CSV",
+            file=file,
+        )
+    if len(filled) == 1 or sheet:
+        return chosen, []
+    others = ", ".join(names[1:])
+    return chosen, [f"{file}: sheet {chosen.title!r} is read, not {others}; {file}#SHEET names another"]
 
 
 def _refuse_large(content: bytes, file: str) -> None:

@@ -134,33 +134,14 @@ def analyse(
     place_at, source = _effective_origin(model.machine, program, origin)
     moves = place(program.moves, place_at)
     samples = sample_moves(moves, step=step, rapid_feed=model.machine.rapid_feed, origin=place_at)
-    at = evaluate(
-        model,
-        samples.position,
-        samples.abc,
-        samples.tangent,
-        samples.tool_length,
-        direction,
-        force,
-        progress,
-    )
+    path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+    at = evaluate(model, *path, direction, force, progress)
     tool_given = not np.isnan(samples.tool_length[samples.cutting]).any()
+    warnings = (*program.warnings, *condition_warnings(model, tool_given), *_warnings(samples, at))
     analysis = Analysis(
-        program=program,
-        model=model,
-        origin=place_at,
-        origin_source=source,
-        load=direction,
-        force=force,
-        step=step,
-        samples=samples,
-        at=at,
-        warnings=(
-            *program.warnings,
-            *condition_warnings(model, tool_given),
-            *_warnings(samples, at),
-        ),
-    )
+        program=program, model=model, origin=place_at, origin_source=source, load=direction, force=force, step=step,
+        samples=samples, at=at, warnings=warnings,
+    )  # fmt: skip
     _check_reach(analysis, partial)
     return analysis
 

@@ -212,11 +212,21 @@ def _check_lengths(lengths: FloatArray) -> None:
 
 
 def _newton_step(jacobian: FloatArray, missing: FloatArray) -> FloatArray:
-    """Twists (n, 6), shortened where they are too large to be trusted."""
-    twist = np.einsum("nij,nj->ni", np.linalg.pinv(jacobian), missing)
-    shift = np.linalg.norm(twist[:, :3], axis=1) / LARGEST_SHIFT
-    turn = np.linalg.norm(twist[:, 3:], axis=1) / LARGEST_TURN
-    return np.asarray(twist / np.maximum(1.0, np.maximum(shift, turn))[:, None])
+    """Twists (n, 6), shortened where they are too large to be trusted; near singular poses the smallest ones."""
+    try:
+        twist = np.asarray(np.linalg.solve(jacobian, missing[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        twist = np.full(missing.shape, np.inf)
+    rows = np.flatnonzero(~(_excess(twist) <= 1.0))
+    if len(rows):
+        twist[rows] = np.einsum("nij,nj->ni", np.linalg.pinv(jacobian[rows]), missing[rows])
+    return np.asarray(twist / np.maximum(1.0, _excess(twist))[:, None])
+
+
+def _excess(twist: FloatArray) -> FloatArray:
+    """(n,) size of twists (n, 6) over the largest one that is trusted."""
+    shift, turn = np.linalg.norm(twist[:, :3], axis=1), np.linalg.norm(twist[:, 3:], axis=1)
+    return np.asarray(np.maximum(shift / LARGEST_SHIFT, turn / LARGEST_TURN))
 
 
 def _turn(vector: FloatArray) -> FloatArray:

@@ -187,6 +187,15 @@ def search_placements(
     ends = _climbed(search, candidates, now)
     report(3, 4)
     candidates = np.vstack([candidates, ends] + ([present[None]] if present is not None and held else []))
+    found = _result(search, candidates, now, unmended)
+    report(4, 4)
+    return found
+
+
+def _result(
+    search: _Search, candidates: FloatArray, now: PlacementFigures | None, unmended: tuple[tuple[int, str], ...]
+) -> PlacementResult:
+    """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
     figures = search.evaluators["whole"].figures(candidates)
     if not search.kept(figures).any():
         raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
@@ -195,8 +204,7 @@ def search_placements(
     if best not in rows:  # equal to another in all three
         rows = np.append(rows, best)
     rows = rows[np.argsort(figures.mean[rows], kind="stable")]
-    rows = thin(figures.take(rows).objectives, rows, asked.points, best)
-    report(4, 4)
+    rows = thin(figures.take(rows).objectives, rows, search.asked.points, best)
     return PlacementResult(
         front=candidates[rows],
         figures=figures.take(rows),
