@@ -37,7 +37,7 @@ class Limit:
 
     def margin(self, value: FloatArray) -> FloatArray:
         """Distance of values from the bound as a share of the span: 0 at the bound, negative beyond."""
-        return np.asarray((1.0 if self.lower else -1.0) * (value - self.bound) / self.span)
+        return np.asarray((value - self.bound if self.lower else self.bound - value) / self.span)
 
 
 def machine_limits(machine: Machine) -> tuple[Limit, ...]:
