@@ -28,11 +28,14 @@ class TomlReader:
         Its name, for messages.
     """
 
-    def __init__(self, text: str, file: str, what: str = "") -> None:
-        """`what` names the file in messages. Raises `InputError` with line and column if it is not TOML."""
+    def __init__(self, text: str, file: str, what: str = "", kind: type[InputError] = InputError) -> None:
+        """`what` names the file in messages, `kind` is the class of its errors.
+
+        Raises `kind` with line and column if the text is not TOML.
+        """
         import tomllib
 
-        self.file, self.lines = file, text.splitlines()
+        self.file, self.lines, self.kind = file, text.splitlines(), kind
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
@@ -40,18 +43,18 @@ class TomlReader:
             line, column = (int(place[1]), int(place[2])) if place else (None, None)
             reason = str(error).split(" (at ")[0]
             found = f"{what} is not TOML: {reason}" if what else f"not valid TOML: {reason}"
-            raise InputError(found, file=file, line=line, column=column) from None
+            raise kind(found, file=file, line=line, column=column) from None
 
     @classmethod
-    def read(cls, path: str | Path, what: str) -> TomlReader:
-        """Read a file; `what` names it in messages. Raises `InputError` if it cannot be read or is not TOML."""
+    def read(cls, path: str | Path, what: str, kind: type[InputError] = InputError) -> TomlReader:
+        """Read a file, as the constructor. Raises `kind` if it cannot be read or is not TOML."""
         try:
             text = Path(path).read_text(encoding="utf-8-sig")
         except OSError as error:
-            raise InputError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+            raise kind(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
         except UnicodeDecodeError:
-            raise InputError(f"{what} is not a text file", file=str(path)) from None
-        return cls(text, str(path), what)
+            raise kind(f"{what} is not a text file", file=str(path)) from None
+        return cls(text, str(path), what, kind)
 
     def line_of(self, section: str, key: str = "", nth: int = 0) -> int | None:
         """Line of a key of a section (the nth of its name), or of its heading; None if it is not found."""
@@ -90,7 +93,7 @@ class TomlReader:
 
     def error(self, found: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
         """An error at the line of the dotted name `where`."""
-        return InputError(found, expected=expected, hint=hint, file=self.file, line=self.line_at(where))
+        return self.kind(found, expected=expected, hint=hint, file=self.file, line=self.line_at(where))
 
     def only(self, where: str, table: Mapping[str, Any], known: Iterable[str], of: str = "") -> None:
         """Refuse a key of a table that is not known; `of` ends the sentence."""

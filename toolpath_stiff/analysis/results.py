@@ -26,7 +26,7 @@ from toolpath_stiff.analysis.statistics import (
     weakest_places,
 )
 from toolpath_stiff.arrays import IntArray
-from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
 from toolpath_stiff.path import Samples, place, sample_moves
@@ -155,7 +155,7 @@ def _effective_origin(machine: Machine, program: Program, origin: Pose | None) -
     else:
         chosen, source = program.origin, program.origin_source
     if program.moves.from_machine.any() and not np.allclose(chosen, program.origin, rtol=0.0, atol=1e-12):
-        raise InputError(
+        raise ProgramError(
             "moves in machine coordinates (G53, G28, G30) depend on where program zero sits",
             hint=f"read the program with origin={tuple(round(v, 9) for v in chosen)}",
             file=program.name,
@@ -202,7 +202,9 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     """Refuse a program that cuts nothing, or, unless `partial`, whose cuts leave the machine's reach."""
     samples, at = analysis.samples, analysis.at
     if not samples.cutting.any():
-        raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=analysis.program.name)
+        raise ProgramError(
+            "no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=analysis.program.name
+        )
     bad = analysis.out_of_reach
     if not bad.any() or (partial and not bad[samples.cutting].all()):
         return

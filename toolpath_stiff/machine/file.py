@@ -17,7 +17,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, MachineFileError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, StrutLaw, read_uncertainty
@@ -157,7 +157,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
     path = Path(name_or_file)
     if not path.is_file():
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
-        raise InputError(
+        raise MachineFileError(
             f"machine {str(name_or_file)!r} is neither a packaged machine nor a file",
             expected=f"one of {', '.join(known)}, or a machine file",
             hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
@@ -165,7 +165,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(
+        raise MachineFileError(
             f"not a text file (byte {error.start})", expected="a machine file (TOML, UTF-8)", file=str(path)
         ) from None
     return parse_machine(text, file=str(path))
@@ -173,14 +173,14 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
 
 def parse_machine(text: str, file: str = "machine.toml") -> Machine:
     """Parse the text of a machine file; `file` is only used in messages. Raises `InputError`."""
-    toml = TomlReader(text, file)
+    toml = TomlReader(text, file, kind=MachineFileError)
     return _machine(toml, toml.data)
 
 
 def _fail(toml: TomlReader, section: str, key: str, found: str, expected: str = "", hint: str = "") -> InputError:
     label = f"[{section}] {key}".strip() if section else key
     line = toml.line_of(section, key)
-    return InputError(f"{label}{found}", expected=expected, hint=hint, file=toml.file, line=line)
+    return MachineFileError(f"{label}{found}", expected=expected, hint=hint, file=toml.file, line=line)
 
 
 def _machine(toml: TomlReader, table: dict[str, Any]) -> Machine:
@@ -267,7 +267,7 @@ def _sections(toml: TomlReader, table: dict[str, Any]) -> dict[str, dict[str, An
             found[""][name] = content
     for name in SECTIONS:
         if name not in found and name not in OPTIONAL_SECTIONS:
-            raise InputError(
+            raise MachineFileError(
                 f"section [{name}] is missing",
                 hint="`tps machine new template.toml` writes a template with every section",
                 file=toml.file,
@@ -283,7 +283,7 @@ def _table(toml: TomlReader, name: str, content: Any) -> dict[str, Any]:
 
 def _unknown(toml: TomlReader, name: str, known: list[str]) -> InputError:
     sections = ", ".join(f"[{n}]" for n in known if n)
-    return InputError(
+    return MachineFileError(
         f"unknown section [{name}]",
         expected=f"one of {sections}, [[effect]], [[instrument]], [uncertainty]",
         file=toml.file,
@@ -413,7 +413,7 @@ def _entry(toml: TomlReader, row: dict[str, Any], kind: str, nth: int) -> Effect
 
     def refuse(key: str, told: str, expected: str) -> InputError:
         line = lines.get(key, lines.get(""))
-        return InputError(f"[[{kind}]] {key}{told}", expected=expected, file=toml.file, line=line)
+        return MachineFileError(f"[[{kind}]] {key}{told}", expected=expected, file=toml.file, line=line)
 
     name, provenance = row.get("name"), row.get("provenance", {})
     if not isinstance(name, str) or not name:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import PoseError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import mm_from_m
@@ -193,7 +193,7 @@ def forward_kinematics(
     if len(failed):
         row = int(failed[0])
         shown = ", ".join(f"{mm_from_m(v):.3f}" for v in wanted[row])
-        raise InputError(
+        raise PoseError(
             f"row {row + 1}: no pose near the start has struts of {shown} mm",
             hint="check the lengths, or give a start nearer to the pose",
         )
@@ -203,12 +203,12 @@ def forward_kinematics(
 def _check_lengths(lengths: FloatArray) -> None:
     """One bad row must not be blamed on another: rows are solved together."""
     if lengths.ndim != 2 or lengths.shape[1] != 6:
-        raise InputError(f"strut lengths of shape {lengths.shape}", expected="(n, 6) or (6,)")
+        raise PoseError(f"strut lengths of shape {lengths.shape}", expected="(n, 6) or (6,)")
     bad = np.flatnonzero(~(np.isfinite(lengths) & (lengths > 0.0)).all(axis=1))
     if len(bad):
         row = int(bad[0])
         shown = ", ".join(f"{mm_from_m(v):.3f}" for v in lengths[row])
-        raise InputError(f"row {row + 1}: strut lengths {shown} mm", expected="six finite lengths above 0")
+        raise PoseError(f"row {row + 1}: strut lengths {shown} mm", expected="six finite lengths above 0")
 
 
 def _newton_step(jacobian: FloatArray, missing: FloatArray) -> FloatArray:

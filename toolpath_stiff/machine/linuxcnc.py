@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import MachineFileError
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
@@ -72,7 +72,7 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
         if f"{part}.{n}.{axis}" not in values
     ]
     if missing:
-        raise InputError(
+        raise MachineFileError(
             f"{len(missing)} joint pins are not set, first {missing[0]}",
             expected="setp genhexkins.base.N.x|y|z and genhexkins.platform.N.x|y|z for N = 0 to 5",
             file=file,
@@ -101,19 +101,19 @@ def _read_pins(text: str, file: str) -> dict[str, float]:
             continue
         pin, raw = match.groups()
         if not KNOWN.match(pin):
-            raise InputError(f"genhexkins has no pin {pin!r}", file=file, line=number)
+            raise MachineFileError(f"genhexkins has no pin {pin!r}", file=file, line=number)
         if pin in values:
-            raise InputError(f"genhexkins.{pin} is set twice", file=file, line=number)
+            raise MachineFileError(f"genhexkins.{pin} is set twice", file=file, line=number)
         try:
             values[pin] = float(raw)
         except ValueError:
-            raise InputError(
+            raise MachineFileError(
                 f"genhexkins.{pin} = {raw!r}", expected="a number (variables are not read)", file=file, line=number
             ) from None
         if not np.isfinite(values[pin]):
-            raise InputError(f"genhexkins.{pin} = {raw!r}", expected="a finite number", file=file, line=number)
+            raise MachineFileError(f"genhexkins.{pin} = {raw!r}", expected="a finite number", file=file, line=number)
     if not any(JOINT.match(pin) for pin in values):
-        raise InputError("sets no genhexkins joints", expected="a HAL file with setp genhexkins...", file=file)
+        raise MachineFileError("sets no genhexkins joints", expected="a HAL file with setp genhexkins...", file=file)
     return values
 
 

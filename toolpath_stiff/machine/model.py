@@ -16,7 +16,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import EffectError, InputError, MachineFileError
 from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
 
@@ -110,7 +110,7 @@ class EffectEntry:
         """An error at one of its keys, or at its heading; `where` names an entry that no file holds."""
         line = self.lines.get(key, self.lines.get(""))
         text = found if self.file or not where else f"{where}: {found}"
-        return InputError(text, expected=expected, hint=hint, file=self.file or None, line=line)
+        return EffectError(text, expected=expected, hint=hint, file=self.file or None, line=line)
 
 
 @dataclass(frozen=True)
@@ -250,7 +250,7 @@ def with_parameter(machine: Machine, name: str, change: float) -> Machine:
                 moved = {**entry.parameters, key: entry.parameters[key] + change}
                 entries[i] = replace(entry, parameters=moved)
                 return machine.with_changes(**{kind: tuple(entries)})
-    raise InputError(f"machine {machine.name} has no parameter {name!r}")
+    raise MachineFileError(f"machine {machine.name} has no parameter {name!r}")
 
 
 def read_uncertainty(toml: TomlReader, entries: Sequence[EffectEntry]) -> Uncertainty | None:
@@ -272,7 +272,7 @@ def read_uncertainty(toml: TomlReader, entries: Sequence[EffectEntry]) -> Uncert
 
 def _fail(toml: TomlReader, key: str, found: str, expected: str) -> InputError:
     line = toml.line_of("uncertainty", key)
-    return InputError(f"{f'[uncertainty] {key}'.strip()}{found}", expected=expected, file=toml.file, line=line)
+    return MachineFileError(f"{f'[uncertainty] {key}'.strip()}{found}", expected=expected, file=toml.file, line=line)
 
 
 def _parameters(toml: TomlReader, names: Any, entries: Sequence[EffectEntry]) -> tuple[str, ...]:

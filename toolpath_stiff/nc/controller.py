@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.kinematics import PostedKinematics, read_kinematics
 from toolpath_stiff.nc.tables import (
     HOMES,
@@ -142,7 +142,7 @@ DIALECTS = {
 def dialect_named(name: str) -> Dialect:
     """The dialect of a name. Raises `InputError`."""
     if name not in DIALECTS:
-        raise InputError(f"dialect {name!r}", expected=", ".join(DIALECTS))
+        raise ProgramError(f"dialect {name!r}", expected=", ".join(DIALECTS))
     return DIALECTS[name]
 
 
@@ -199,7 +199,7 @@ def switches_on(block_delete: Switches, controller: Controller) -> frozenset[int
     if isinstance(block_delete, bool):
         return ALL_SWITCHES if block_delete else controller.switches
     if not block_delete <= ALL_SWITCHES:
-        raise InputError(f"block-delete switches {sorted(block_delete)}", expected="1 to 9")
+        raise ProgramError(f"block-delete switches {sorted(block_delete)}", expected="1 to 9")
     return block_delete
 
 
@@ -211,7 +211,7 @@ def plain(block_delete: Switches, controller: Controller) -> bool:
 def check_plain(block_delete: Switches, controller: Controller) -> None:
     """Raise `InputError` if LinuxCNC's interpreter would read the program otherwise than the control."""
     if not plain(block_delete, controller):
-        raise InputError(
+        raise ProgramError(
             f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {controller.dialect.name!r}, "
             "or it has single block-delete switches",
             hint="use the built-in interpreter (--interpreter builtin)",
@@ -225,7 +225,7 @@ def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".var", ".tbl"):
-        return _controller(TomlReader.read(path, "the controller file"), dialect)
+        return _controller(TomlReader.read(path, "the controller file", ProgramError), dialect)
     base = Controller(dialect_named(dialect or "linuxcnc"))
     if suffix == ".var":
         return replace(base, offsets=read_offsets(path))

@@ -18,7 +18,7 @@ import numpy as np
 from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
@@ -153,7 +153,7 @@ def work_path(
     moves = program.moves
     fixed = (moves.motion != RAPID) & moves.from_machine.any(axis=1)
     if fixed.any():
-        raise InputError(
+        raise ProgramError(
             "a cutting move from or to machine coordinates (G53, G28) does not move with the work",
             hint="end it in work coordinates before placing the program",
             file=program.name,

@@ -32,7 +32,7 @@ from functools import partial
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import EffectError, InputError, PoseError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
@@ -242,7 +242,7 @@ def refuse_law_beyond_zero(lengths: FloatArray, stiffness: FloatArray) -> None:
     if not (stiffness <= 0.0).any():
         return
     worst = np.unravel_index(np.argmin(stiffness), stiffness.shape)
-    raise InputError(
+    raise PoseError(
         f"strut {worst[1] + 1} would be {mm_from_m(float(lengths[worst])):.1f} mm long, where the machine's strut law "
         f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um",
         expected="a stiffness above 0",
@@ -389,7 +389,7 @@ def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wren
 def _unsettled(model: StiffnessModel, path: LoadPath, row: int) -> InputError:
     x, y, z = (mm_from_m(float(v)) for v in path.position[row])
     names = ", ".join(active.effect.name for active in model.effects if active.effect.load_dependent)
-    return InputError(
+    return EffectError(
         f"the strut forces do not settle at X{x:.1f} Y{y:.1f} Z{z:.1f} (mm) under {path.force[row]:g} N with {names}",
         expected="a stretch of each strut that grows with its force",
         hint="check the parameters of these effects",
@@ -418,7 +418,7 @@ def _possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> 
     x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[int(np.argmax(bad))])
     those = f"effect{'s' if len(foreign) > 1 else ''} {', '.join(effect.name for effect in foreign)}"
     check = command_line("effects", "check", guard.file_of(foreign[0]))
-    raise InputError(
+    raise EffectError(
         f"with {those} the tip has no positive stiffness at X{x:g} Y{y:g} Z{z:g} mm",
         expected="a compliance that is positive definite",
         hint=f"`{check}` tries an effect by itself",

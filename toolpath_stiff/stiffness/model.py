@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, TextArray
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Machine, with_parameter
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
@@ -157,7 +157,7 @@ def build_model(
     names = [active.effect.name for active in (*acting, *reading)]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(
+            raise EffectError(
                 f"machine {machine.name}: effect {name} is given twice",
                 hint="keep one of them (finite platform bars count as platform_flexibility)",
             )
@@ -193,7 +193,7 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
         The model has no such parameter, or it leaves its bounds.
     """
     if model.given is None:
-        raise InputError(f"a model without its machine has no parameter {name!r}")
+        raise EffectError(f"a model without its machine has no parameter {name!r}")
     if name in STRUT_LAW:
         moved = with_parameter(model.given, name, change)
         return _assembled(moved, model.effects, model.instruments, model.conditions)
@@ -206,10 +206,10 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
                 value = active.values[parameter.name] + change * parameter.si
                 low, high = (bound * parameter.si for bound in parameter.bounds)
                 if not low <= value <= high:
-                    raise InputError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
+                    raise EffectError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
                 kind[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
                 return _assembled(model.given, effects["effects"], effects["instruments"], model.conditions)
-    raise InputError(f"machine {model.given.name} has no parameter {name!r}")
+    raise EffectError(f"machine {model.given.name} has no parameter {name!r}")
 
 
 def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
@@ -430,7 +430,7 @@ def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
     if setup in ("", NO_SETUP, *known) or takes_any or not known:
         return
     near = difflib.get_close_matches(setup, known, n=1)
-    raise InputError(
+    raise EffectError(
         f"{said_by}: set-up {setup!r} is not known",
         expected=f"one of {', '.join(known)}, or {NO_SETUP}",
         hint=f"did you mean {near[0]}?" if near else "a machine file lists its set-ups as `names` of [setup]",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
-from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
@@ -152,12 +152,12 @@ def read_measurements(
     """
     names = [paths] if isinstance(paths, str | Path) else list(paths)
     if not names:
-        raise InputError("no measurements", expected="a CSV file, or nist-table1")
+        raise MeasurementError("no measurements", expected="a CSV file, or nist-table1")
     seen: set[str] = set()
     files = []
     for name in map(str, names):
         if name in seen:
-            raise InputError(f"{name!r} is given twice", hint="name it once")
+            raise MeasurementError(f"{name!r} is given twice", hint="name it once")
         seen.add(name)
         files.append(_read_file(name, planned))
     errors: list[InputError] = []
@@ -286,7 +286,7 @@ def _checked(data: Measurements, machine: Machine) -> Measurements:
             found = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
         else:
             continue
-        errors.append(InputError(found, hint="check the pose's unit", file=data.file[i], line=int(data.line[i])))
+        errors.append(MeasurementError(found, hint="check the pose's unit", file=data.file[i], line=int(data.line[i])))
     if errors:
         raise InputErrors(errors)
     stand = reach(machine, data.position, struts, rotation)
