@@ -2,6 +2,6 @@
 
 from toolpath_stiff.analysis.loads import LOADS, Load, parse_load
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
-from toolpath_stiff.analysis.results import Analysis, analyse
+from toolpath_stiff.analysis.results import Analysis, analyze
 
-__all__ = ["LOADS", "Analysis", "Load", "PoseStiffness", "analyse", "evaluate", "parse_load"]
+__all__ = ["LOADS", "Analysis", "Load", "PoseStiffness", "analyze", "evaluate", "parse_load"]

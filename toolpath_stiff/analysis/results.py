@@ -90,7 +90,7 @@ class Analysis(EvaluatedPath):
         return summarise(self)
 
 
-def analyse(
+def analyze(
     machine: Machine | StiffnessModel,
     program: Program,
     *,

@@ -91,7 +91,7 @@ def _program_number(compact: str, column: int, line: int, name: str) -> Block:
     raise ProgramError(
         f"O word {compact[:20]!r}: subprograms and loops are not supported",
         expected="plain moves",
-        hint="expand it before analysing (the control or the post can do it), or give --interpreter linuxcnc",
+        hint="expand it before analyzing (the control or the post can do it), or give --interpreter linuxcnc",
         file=name,
         line=line,
         column=column,

@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis import Analysis, analyse
+from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.nc import Program, parse_program
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated, machine_words
@@ -68,7 +68,7 @@ def origin_of(x_mm: float, y_mm: float, z_mm: float, turn_deg: float) -> Pose:
 
 
 def run_case_study(model: StiffnessModel, step: float = defaults.STEP) -> CaseStudy:
-    """Analyse the path in every region, over the heights, and its non-planar variants.
+    """Analyze the path in every region, over the heights, and its non-planar variants.
 
     Raises
     ------
@@ -76,10 +76,10 @@ def run_case_study(model: StiffnessModel, step: float = defaults.STEP) -> CaseSt
         The machine cannot reach a region (the regions are those of the reference machine).
     """
     program = case_study_program()
-    regions = {name: analyse(model, program, origin=origin_of(*at), step=step) for name, at in REGIONS.items()}
+    regions = {name: analyze(model, program, origin=origin_of(*at), step=step) for name, at in REGIONS.items()}
     figures = {name: _figures(analysis) for name, analysis in regions.items()}
     heights = [
-        {"z_mm": z, **_figures(analyse(model, program, origin=origin_of(150.0, 100.0, z, 0.0), step=step))}
+        {"z_mm": z, **_figures(analyze(model, program, origin=origin_of(150.0, 100.0, z, 0.0), step=step))}
         for z in HEIGHTS_MM
     ]
     waves = [_wave(model, amplitude, step) for amplitude in WAVES_MM]
@@ -156,7 +156,7 @@ def _wave(model: StiffnessModel, amplitude: float, step: float) -> dict[str, Any
     """The wavy square in the four regions, and whether its mean still does not depend on where it lies."""
     program = wavy_program(amplitude)
     figures = {
-        name: _figures(analyse(model, program, origin=origin_of(*at), step=step)) for name, at in REGIONS.items()
+        name: _figures(analyze(model, program, origin=origin_of(*at), step=step)) for name, at in REGIONS.items()
     }
     return {
         "amplitude_mm": amplitude,

@@ -1,6 +1,6 @@
 """A program written for another placement, or its placement as offsets to key in at the control.
 
-`rewrite_program` returns the text that, analysed at the original origin, takes the tool along the placed path. Every
+`rewrite_program` returns the text that, analyzed at the original origin, takes the tool along the placed path. Every
 motion word has new numbers; everything else stays byte for byte: comments, line numbers, order, blank lines, tape
 marks, line ends, upper and lower case. The rapid with which the tool comes from where the control was switched on is
 the one move that cannot match.
