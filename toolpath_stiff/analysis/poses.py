@@ -98,6 +98,16 @@ def evaluate(
         N; only load-dependent effects ask for it.
     progress
         Called with (poses done, poses in all).
+
+    Examples
+    --------
+    >>> from toolpath_stiff.analysis.loads import parse_load
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> position, zeros = np.array([[0.0, 0.0, 0.8], [0.2, 0.0, 0.8]]), np.zeros((2, 3))
+    >>> found = evaluate(build_model(load_machine("nist")), position, zeros, zeros, load=parse_load("x"))
+    >>> (found.stiffness / 1e3).round()  # N/mm
+    array([54823., 49735.])
     """
     n = len(position)
     load = load or Load()
@@ -327,6 +337,16 @@ def map_stiffness(
         The load needs a path, an area has no extent, or there are too many points.
     UnreachableError
         Nothing of the grid can be reached.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.analysis.loads import parse_load
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> model = build_model(load_machine("nist"))
+    >>> found = map_stiffness(model, (-0.1, 0.1), (-0.1, 0.1), [0.8], parse_load("x"), points=3)
+    >>> found.stiffness.shape, round(float(found.stiffness[0, 1, 1]) / 1e3)  # N/mm in the middle
+    ((1, 3, 3), 54823)
     """
     if load.kind in ("tangential", "normal"):
         raise InputError(

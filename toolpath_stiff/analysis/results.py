@@ -101,7 +101,7 @@ def analyze(
     partial: bool = False,
     progress: Progress | None = None,
 ) -> Analysis:
-    """Stiffness along the path of a program.
+    r"""Stiffness along the path of a program.
 
     Parameters
     ----------
@@ -128,6 +128,16 @@ def analyze(
         A cutting sample is out of reach and `partial` is not set.
     InputError
         The program cuts nothing, or uses machine coordinates and was read for another origin.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.nc import parse_program
+    >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc")
+    >>> found = analyze(load_machine("nist"), slot, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
+    >>> summary = found.summary()
+    >>> round(summary["mean_N_per_mm"]), round(summary["min_N_per_mm"]), summary["headline"]
+    (54353, 53875, 'across the tool axis')
     """
     model = machine if isinstance(machine, StiffnessModel) else build_model(machine)
     direction = parse_load(load) if isinstance(load, str) else load

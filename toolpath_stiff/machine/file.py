@@ -149,6 +149,14 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
     ------
     InputError
         There is no such machine or file, or the file is wrong; the message has section, key, value, bound.
+
+    Examples
+    --------
+    >>> machine = load_machine("nist")
+    >>> machine.name, machine.frame_joints.shape
+    ('nist', (6, 3))
+    >>> round(machine.reference_tool_length, 5)
+    0.15
     """
     known = packaged_machines()
     if str(name_or_file) in known:

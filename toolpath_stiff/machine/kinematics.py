@@ -74,6 +74,17 @@ def solve_struts(
     Returns
     -------
     Struts of n poses (n = 1 for a single position).
+
+    Examples
+    --------
+    On the machine's axis the struts have two lengths, three struts each:
+
+    >>> from toolpath_stiff.machine import load_machine
+    >>> struts = solve_struts(load_machine("nist"), [0.0, 0.0, 0.8])
+    >>> struts.lengths.round(4)
+    array([[2.8847, 2.8699, 2.8847, 2.8699, 2.8847, 2.8699]])
+    >>> struts.jacobian.shape
+    (1, 6, 6)
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     joints = platform_joints(machine, tool_length)
@@ -172,6 +183,14 @@ def forward_kinematics(
     InputError
         Not six finite lengths above 0 in each row, or lengths that no pose near the start has; the message names the
         row.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> machine = load_machine("nist")
+    >>> lengths = solve_struts(machine, [0.1, -0.05, 0.8]).lengths
+    >>> forward_kinematics(machine, lengths).round(9)[0, :3]
+    array([ 0.1 , -0.05,  0.8 ])
     """
     wanted = np.atleast_2d(np.asarray(lengths, dtype=float))
     _check_lengths(wanted)

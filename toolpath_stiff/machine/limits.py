@@ -143,6 +143,17 @@ def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: Array
         The struts at these poses.
     rotation
         (n, 3, 3); None: vertical.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine, solve_struts
+    >>> machine = load_machine("nist")
+    >>> position = [[0.0, 0.0, 0.8], [0.0, 0.0, 3.0]]
+    >>> found = reach(machine, position, solve_struts(machine, position))
+    >>> found.reachable
+    array([ True, False])
+    >>> found.describe(1)
+    'workspace z max needs 3000.000 mm, limit 1700.000 mm, 1300.000 mm beyond'
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     frame, platform = joint_angles(machine, struts, rotation)

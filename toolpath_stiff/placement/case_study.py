@@ -74,6 +74,14 @@ def run_case_study(model: StiffnessModel, step: float = defaults.STEP) -> CaseSt
     ------
     UnreachableError
         The machine cannot reach a region (the regions are those of the reference machine).
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> study = run_case_study(build_model(load_machine("nist")), step=0.02)
+    >>> [found["holds"] for found in study.summary["conclusions"]]
+    [True, True, True]
     """
     program = case_study_program()
     regions = {name: analyze(model, program, origin=origin_of(*at), step=step) for name, at in REGIONS.items()}

@@ -111,7 +111,7 @@ class Placed:
 
 
 def place_program(task: Task, progress: Callable[[int, int], None] | None = None) -> Placed:
-    """Search, and place the program where the search recommends.
+    r"""Search, and place the program where the search recommends.
 
     Raises
     ------
@@ -119,6 +119,24 @@ def place_program(task: Task, progress: Callable[[int, int], None] | None = None
         The program cannot be placed, or not be written there (before the search where that can be seen).
     UnreachableError
         No placement keeps the limits.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> present = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
+    >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc", origin=present)
+    >>> here = np.array([0.0, 0.1, 0.8, 0.0, 0.0, 0.0])  # a search of some seconds has bounds apart
+    >>> task = Task(
+    ...     build_model(load_machine("nist")), slot, present, lambda zero: slot, Bounds(here, here),
+    ...     SearchRules(objective="mean", points=5), Load(), step=0.01, force=1000.0,
+    ... )
+    >>> placed = place_program(task)
+    >>> [round(placed.summary[which]["mean_N_per_mm"]) for which in ("before", "chosen")]
+    [54352, 54097]
+    >>> placed.summary["warnings"][0].partition(",")[0]
+    'WORSE: at the recommended placement the mean is lower than at the present one'
     """
     check_task(task)
     path = _path(task)

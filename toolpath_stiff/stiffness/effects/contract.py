@@ -189,6 +189,22 @@ class Effect:
     unknown_to_control
         Of a geometry effect: whether the control computes with the geometry before it. The struts then get the
         lengths of the programmed pose on that geometry, and the platform goes where they put it.
+
+    Examples
+    --------
+    A screw that adds the same compliance to every strut:
+
+    >>> class Screws(Effect):
+    ...     name, title, link = "screws", "the screws give way", "struts"
+    ...     equation, source = "c_i += c", "an example"
+    ...     parameters = (Parameter("compliance", "nm/N", 1e-9, (0.0, 50.0), (1.0, 5.0), "an example"),)
+    ...
+    ...     def strut_compliance(self, path, p):
+    ...         return np.full((len(path), 6), p["compliance"])
+    >>> Screws().parameters[0].key
+    'compliance_nm_per_N'
+    >>> Screws().finding({"compliance": 2.5})
+    'the screws give way, compliance 2.5 nm/N'
     """
 
     name: ClassVar[str]
