@@ -19,7 +19,7 @@ from typing import TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.tables import Columns, Table, read_table
 from toolpath_stiff.units import m_from_um, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.rows import (
