@@ -1,4 +1,4 @@
-"""`python -m benchmarks.size`: programs of up to a million lines: reading, analysing, writing; CPU time and memory.
+"""`python -m benchmarks.size`: programs of up to a million lines: reading, analyzing, writing; CPU time and memory.
 
 One core. Rounds interleave what is compared, each ratio is taken within its round, the medians are printed. Bars: at
 least 12 times pygcode's own parse-and-process throughput on 200,000 lines; `tps analyze` of a million lines within 30 s
@@ -129,7 +129,7 @@ def lengths(report: Report, longest: int, rounds: int) -> None:
         report.add(f"| {kind} | {' | '.join(f'{c:.2f}' for c in costs)} | {ratio:.2f} | {bar} |")
 
 
-def analysing(report: Report, lines: int, folder: Path) -> None:
+def analyzing(report: Report, lines: int, folder: Path) -> None:
     """Whole commands in processes of their own."""
     report.add(
         "",
@@ -167,11 +167,11 @@ def writing(report: Report, lines: int, rounds: int) -> None:
     import pyarrow.csv as pc
     import pyarrow.parquet as pq
 
-    from toolpath_stiff.analysis import analyse
+    from toolpath_stiff.analysis import analyze
     from toolpath_stiff.analysis.statistics import sample_columns, samples_csv, samples_frame, samples_parquet
     from toolpath_stiff.machine import load_machine
 
-    analysis = analyse(load_machine("nist"), parse_program(program("5-axis", lines)), origin=(0, 0, 0.8, 0, 0, 0))
+    analysis = analyze(load_machine("nist"), parse_program(program("5-axis", lines)), origin=(0, 0, 0.8, 0, 0, 0))
     rows = len(analysis.samples)
 
     def table() -> pa.Table:
@@ -222,7 +222,7 @@ def main() -> int:
     reading(report, args.lines, args.rounds)
     lengths(report, args.longest, args.rounds)
     with tempfile.TemporaryDirectory() as folder:
-        analysing(report, args.longest, Path(folder))
+        analyzing(report, args.longest, Path(folder))
     writing(report, args.lines, args.rounds)
     report.add("", "A bar that is not cleared is marked; the exit code is then 1.")
     if args.out:

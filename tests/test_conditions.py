@@ -61,14 +61,14 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def analysed(capsys, *options):
+def analyzed(capsys, *options):
     assert main(["analyze", "part.nc", "--json", "--no-plots", "--step", "5", *options]) == 0
     return json.loads(capsys.readouterr().out)
 
 
 def test_without_the_set_up_the_figures_are_the_nominal_ones_and_a_warning_says_why(here, capsys):
-    nominal = analysed(capsys)
-    waiting = analysed(capsys, "--machine", "riser.toml")
+    nominal = analyzed(capsys)
+    waiting = analyzed(capsys, "--machine", "riser.toml")
     assert waiting["mean_N_per_mm"] == pytest.approx(nominal["mean_N_per_mm"], rel=1e-9)
     assert waiting["effects"] == [] and waiting["setup"] is None
     assert [one["effect"] for one in waiting["effects_idle"]] == ["setup_compliance"]
@@ -113,7 +113,7 @@ def test_another_set_up_that_the_machine_file_lists_is_no_mistake(here, capsys):
     machine = with_effects(("setup_compliance", RISER), setups=("riser", "table"))
     (here / "both.toml").write_text(machine_toml(machine))
     assert load_machine("both.toml").setups == ("riser", "table")
-    found = analysed(capsys, "--machine", "both.toml", "--setup", "table")
+    found = analyzed(capsys, "--machine", "both.toml", "--setup", "table")
     assert found["effects"] == [] and not any(WAITS in text for text in found["warnings"])
     assert any("belongs to set-up 'riser', and this is 'table'" in text for text in found["assumptions"])
     assert main(["analyze", "part.nc", "--machine", "both.toml", "--setup", "tabel"]) == 2
@@ -125,12 +125,12 @@ def test_machine_file_and_controller_file_name_the_set_up_and_the_option_wins(he
     (here / "named.toml").write_text(machine_toml(machine))
     again = load_machine("named.toml")
     assert (again.setup, again.setups, again.temperature) == ("riser", ("riser", "table"), 21.5)
-    assert analysed(capsys, "--machine", "named.toml")["effects"] == ["setup_compliance"]
+    assert analyzed(capsys, "--machine", "named.toml")["effects"] == ["setup_compliance"]
     (here / "control.toml").write_text('setup = "table"\n')
-    on_table = analysed(capsys, "--machine", "named.toml", "--controller", "control.toml")
+    on_table = analyzed(capsys, "--machine", "named.toml", "--controller", "control.toml")
     assert on_table["effects"] == [] and on_table["setup"] == "table"
     both = ("--machine", "named.toml", "--controller", "control.toml", "--setup", "riser")
-    assert analysed(capsys, *both)["setup"] == "riser"
+    assert analyzed(capsys, *both)["setup"] == "riser"
     (here / "control.toml").write_text('setup = "riserr"\n')
     assert main(["analyze", "part.nc", "--machine", "named.toml", "--controller", "control.toml"]) == 2
     assert "control.toml: set-up 'riserr' is not known" in capsys.readouterr().err
@@ -162,7 +162,7 @@ def test_a_set_up_in_the_machine_file_that_no_effect_knows_is_refused(here, caps
 
 
 def test_a_set_up_that_changes_nothing_is_said(here, capsys):
-    found = analysed(capsys, "--setup", "riser")
+    found = analyzed(capsys, "--setup", "riser")
     assert any("'riser' changes nothing" in text for text in found["warnings"])
 
 
@@ -192,9 +192,9 @@ def test_every_command_on_the_machine_warns(here, capsys):
 
 
 def test_a_machine_compared_with_says_so_too(here, capsys):
-    found = analysed(capsys, "--compare", "riser.toml")
+    found = analyzed(capsys, "--compare", "riser.toml")
     assert any(text.startswith(f"--compare nist: {WAITS}") for text in found["warnings"])
-    found = analysed(capsys, "--compare", "riser.toml", "--setup", "riser")
+    found = analyzed(capsys, "--compare", "riser.toml", "--setup", "riser")
     assert found["compare"]["mean_N_per_mm"] < 0.9 * found["mean_N_per_mm"]
     assert found["compare"]["effects"] == ["setup_compliance"]
 
@@ -203,7 +203,7 @@ def test_a_temperature_that_nobody_gives(here, capsys):
     file = effect_file(here, "warm_table", "temperature_C", "(path.temperature - 20.0)")
     (here / "warm.toml").write_text(machine_toml(with_effects(("warm_table", {"compliance_nm_per_N": 2.0}))))
     options = ("--machine", "warm.toml", "--effects", file)
-    waiting = analysed(capsys, *options)
+    waiting = analyzed(capsys, *options)
     assert waiting["effects"] == []
     assert any("warm_table does not act" in text and "--temperature" in text for text in waiting["warnings"])
     kx = {}
@@ -218,7 +218,7 @@ def test_a_temperature_that_nobody_gives(here, capsys):
 def test_what_no_program_has_is_named_as_such(here, capsys):
     file = effect_file(here, "creeping", "time_min", "path.time")
     (here / "creep.toml").write_text(machine_toml(with_effects(("creeping", {"compliance_nm_per_N": 2.0}))))
-    found = analysed(capsys, "--machine", "creep.toml", "--effects", file)
+    found = analyzed(capsys, "--machine", "creep.toml", "--effects", file)
     assert found["effects"] == []
     assert any("creeping does not act" in text and "no program has" in text for text in found["warnings"])
 
@@ -227,10 +227,10 @@ def test_a_tool_that_nobody_gives(here, capsys):
     file = effect_file(here, "long_tool", "tool_extension_mm", "path.tool_extension")
     (here / "tool.toml").write_text(machine_toml(with_effects(("long_tool", {"compliance_nm_per_N": 2.0}))))
     options = ("--machine", "tool.toml", "--effects", file)
-    assert any("long_tool acts as with the reference tool" in text for text in analysed(capsys, *options)["warnings"])
+    assert any("long_tool acts as with the reference tool" in text for text in analyzed(capsys, *options)["warnings"])
     (here / "part.nc").write_text(PART.replace("G0 X0", "T1 M6\nG43 H1\nG0 X0", 1))
     (here / "tools.csv").write_text("tool,length_mm,diameter_mm\n1,320,10\n")
-    assert not any("long_tool" in text for text in analysed(capsys, *options, "--tools", "tools.csv")["warnings"])
+    assert not any("long_tool" in text for text in analyzed(capsys, *options, "--tools", "tools.csv")["warnings"])
 
 
 def test_the_model_alone_knows_what_acts():
@@ -244,8 +244,8 @@ def test_a_parameter_of_an_effect_that_does_not_act_has_no_band(here, capsys):
     text = machine_toml(with_effects(("setup_compliance", RISER)))
     text += '\n[uncertainty]\nparameters = ["setup_compliance.x_nm_per_N"]\nsd = [0.5]\ncorrelation = [[1.0]]\n'
     (here / "band.toml").write_text(text)
-    assert "parameter_uncertainty" not in analysed(capsys, "--machine", "band.toml")
-    assert analysed(capsys, "--machine", "band.toml", "--setup", "riser")["parameter_uncertainty"]
+    assert "parameter_uncertainty" not in analyzed(capsys, "--machine", "band.toml")
+    assert analyzed(capsys, "--machine", "band.toml", "--setup", "riser")["parameter_uncertainty"]
 
 
 @pytest.fixture(scope="module")
@@ -258,17 +258,17 @@ def exercise(tmp_path_factory):
 
 
 def test_a_riser_that_was_found_acts(exercise, here, capsys):
-    """Measured, updated, analysed: softer on the riser, unchanged beside it, never silently."""
+    """Measured, updated, analyzed: softer on the riser, unchanged beside it, never silently."""
     data = str(exercise / "data.csv")
     wanted = ["update", data, "--add", "setup_compliance", "--strut-law", "--noise", "1", "-o", "better.toml"]
     assert main([*wanted, "--no-plots"]) == 0
     assert "--setup riser" in capsys.readouterr().out
     better = load_machine("better.toml")
     assert set(better.setups) == {"riser", "table"}  # as the rig calls them
-    on, off = (analysed(capsys, "--machine", "better.toml", "--setup", name) for name in ("riser", "table"))
+    on, off = (analyzed(capsys, "--machine", "better.toml", "--setup", name) for name in ("riser", "table"))
     assert on["mean_N_per_mm"] < 0.97 * off["mean_N_per_mm"]
     assert on["effects"] == ["setup_compliance"] and off["effects"] == []
-    nobody = analysed(capsys, "--machine", "better.toml")
+    nobody = analyzed(capsys, "--machine", "better.toml")
     assert nobody["mean_N_per_mm"] == pytest.approx(off["mean_N_per_mm"], rel=1e-12)
     assert any(WAITS in text for text in nobody["warnings"])
 

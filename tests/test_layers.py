@@ -18,24 +18,27 @@ PACKAGE = Path(toolpath_stiff.__file__).parent
 RANK = {
     "units": 0,
     "errors": 0,
-    "hints": 0,
-    "rotations": 0,
-    "files": 1,
-    "results_folder": 2,
-    "column_files": 1,
-    "workbook": 1,
-    "tables": 2,
-    "nc": 2,
-    "path": 3,
-    "rewriting": 4,
-    "machine": 4,
-    "stiffness": 5,
-    "analysis": 6,
-    "placement": 7,
-    "updating": 7,
-    "report": 8,
-    "api": 9,
-    "cli": 10,
+    "arrays": 0,
+    "rotations": 1,
+    "defaults": 1,
+    "toml_reader": 1,
+    "hints": 2,
+    "files": 2,
+    "results_folder": 3,
+    "column_files": 2,
+    "workbook": 2,
+    "tables": 3,
+    "nc": 3,
+    "path": 4,
+    "rewriting": 5,
+    "machine": 5,
+    "stiffness": 6,
+    "analysis": 7,
+    "placement": 8,
+    "updating": 8,
+    "report": 9,
+    "api": 10,
+    "cli": 11,
 }
 # The same within `updating`, of its modules and rooms.
 UPDATING_RANK = {
@@ -48,7 +51,7 @@ UPDATING_RANK = {
     "diagnosis": 4,
     "correction": 5,
 }
-RIG_MAY_IMPORT = {"units", "errors", "files", "results_folder", "rig"}
+RIG_MAY_IMPORT = {"units", "errors", "arrays", "defaults", "files", "results_folder", "rig"}
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
 
 

@@ -60,9 +60,16 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.programs import analyze as analyze
     from toolpath_stiff.api.programs import check as check
     from toolpath_stiff.api.programs import sample_path as sample_path
+    from toolpath_stiff.errors import EffectError as EffectError
     from toolpath_stiff.errors import EffectFault as EffectFault
+    from toolpath_stiff.errors import FileError as FileError
     from toolpath_stiff.errors import InputError as InputError
     from toolpath_stiff.errors import InputErrors as InputErrors
+    from toolpath_stiff.errors import MachineFileError as MachineFileError
+    from toolpath_stiff.errors import MeasurementError as MeasurementError
+    from toolpath_stiff.errors import PoseError as PoseError
+    from toolpath_stiff.errors import ProgramError as ProgramError
+    from toolpath_stiff.errors import TableError as TableError
     from toolpath_stiff.errors import TpsError as TpsError
     from toolpath_stiff.errors import UnreachableError as UnreachableError
     from toolpath_stiff.stiffness.effects.contract import Effect as Effect
@@ -86,7 +93,10 @@ _PUBLIC = {
     ),
     "api.placements": ("CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
-    "errors": ("EffectFault", "InputError", "InputErrors", "TpsError", "UnreachableError"),
+    "errors": (
+        "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
+        "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
+    ),
     "stiffness.effects.contract": ("Effect", "Parameter"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}

@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Columns = Mapping[str, NDArray[Any]]
+from toolpath_stiff.arrays import AnyArray, FloatArray
+
+Columns = Mapping[str, AnyArray]
 Decimals = Mapping[str, int | None]  # None: a whole number or a word
 
 BLOCK = 65_536  # rows
@@ -148,7 +149,7 @@ def _by_arrow(columns: Columns, decimals: Decimals) -> bytes | None:
     return bytes(stream.getvalue().to_pybytes())
 
 
-def _fixed(column: NDArray[np.float64], digits: int) -> Any:
+def _fixed(column: FloatArray, digits: int) -> Any:
     """Numbers rounded to some decimals, exactly, as Arrow's 128-bit decimals: a whole number of units and a scale."""
     import pyarrow as pa
 

@@ -1,4 +1,27 @@
-"""Errors that a user can act on: where it is, what was found, what was expected, what to do."""
+"""Errors that a user can act on: where it is, what was found, what was expected, what to do.
+
+A tree, so that a caller can catch as much as it can handle::
+
+    TpsError
+      InputError            something in the input is wrong
+        FileError           a file cannot be read or written
+        ProgramError        an NC program, or what belongs to its control
+        MachineFileError    a machine file
+        TableError          a table: CSV or Excel
+          MeasurementError  readings, raw records, plans
+        EffectError         a physical effect, or its parameters
+        PoseError           a pose that cannot be computed
+          UnreachableError  a pose beyond the machine's limits
+      InputErrors           several input errors together
+      EffectFault           a user's own effect breaks the contract
+
+>>> from toolpath_stiff.machine import load_machine
+>>> try:
+...     load_machine("nits")
+... except MachineFileError as error:
+...     print(error.found)
+machine 'nits' is neither a packaged machine nor a file
+"""
 
 from __future__ import annotations
 
@@ -61,8 +84,45 @@ class InputErrors(TpsError):
         super().__init__("\n".join(str(error) for error in self.errors))
 
 
-class UnreachableError(InputError):
-    """A pose that the machine cannot take: a limit exceeded, or a singular configuration."""
+class FileError(InputError):
+    """A file cannot be read or written, or a folder holds what would be lost: choose another, or make room."""
+
+
+class ProgramError(InputError):
+    """An NC program, a controller file, a tool table or offsets cannot be read, or cannot be used as asked.
+
+    Raised by `analyze`, `check`, `place`, `rewrite` and the like; `line` and `column` say where to mend it.
+    """
+
+
+class MachineFileError(InputError):
+    """A machine file is missing or wrong: `tps machine new` writes a template, `tps machine check` tries a file."""
+
+
+class TableError(InputError):
+    """A table (CSV or a sheet of a workbook) is empty, damaged, or has cells that can be read in two ways."""
+
+
+class MeasurementError(TableError):
+    """Readings, raw records or a plan lack what is needed, or contradict themselves; `line` says which row."""
+
+
+class EffectError(InputError):
+    """A physical effect does not exist, is declared wrongly, or has parameters that are not possible.
+
+    A fit takes it for values to walk away from; otherwise mend the entry in the machine file or the effect's file.
+    """
+
+
+class PoseError(InputError):
+    """A pose cannot be computed: strut lengths that belong to no pose, or a strut law carried beyond zero."""
+
+
+class UnreachableError(PoseError):
+    """A pose that the machine cannot take: a limit exceeded, or a singular configuration.
+
+    Move the work (`origin`), widen the search, or keep the reachable part.
+    """
 
 
 class EffectFault(TpsError):

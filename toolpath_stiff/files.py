@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import FileError
 
 NOT_WINDOWS = frozenset(b"\x81\x8d\x8f\x90\x9d")  # bytes that Windows' Latin-1 (cp1252) leaves undefined
 
@@ -33,7 +33,7 @@ def write_atomically(path: str | Path, content: Content) -> Path:
         else:
             _write_then_rename(target.resolve(), content)
     except OSError as error:
-        raise InputError(f"cannot write {str(path)!r}: {error.strerror}") from None
+        raise FileError(f"cannot write {str(path)!r}: {error.strerror}") from None
     return target
 
 
@@ -70,7 +70,7 @@ def read_bytes(path: str | Path, what: str) -> bytes:
     try:
         return Path(path).read_bytes()
     except OSError as error:
-        raise InputError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+        raise FileError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
 
 
 def decoded(content: bytes) -> str:
@@ -100,7 +100,7 @@ def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], r
     given = [Path(file) for file in inputs if Path(file).is_file()]
     found = [Path(out) for out in outputs if any(_is_same(Path(out), file) for file in given)]
     if found and not replace:
-        raise InputError(
+        raise FileError(
             f"{str(found[0])!r} is read here and would be written over",
             hint="write somewhere else, or say --replace: the old file is then kept beside the new one",
         )
@@ -128,4 +128,4 @@ def keep_old(file: str | Path) -> Path | None:
     try:
         return write_atomically(kept, path.read_bytes())
     except OSError as error:
-        raise InputError(f"cannot read {str(path)!r}: {error.strerror}") from None
+        raise FileError(f"cannot read {str(path)!r}: {error.strerror}") from None

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
+from toolpath_stiff import defaults
+
 PROGRAM = "tps"
-MACHINE, STRUT_SPREAD = "nist", 0.01  # what commands take unless told
 NO_MATTER = ("--out", "--jobs")  # each takes a value
 PRINTED = "--json"  # what is printed, not what is written
 NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
@@ -71,10 +72,10 @@ class Asked:
     """
 
     data: tuple[str, ...]
-    machine: str = MACHINE
+    machine: str = defaults.MACHINE
     effects: tuple[str, ...] = ()
     noise: float | tuple[float, float] | None = None
-    strut_spread: float = STRUT_SPREAD
+    strut_spread: float = defaults.STRUT_SPREAD
 
     def command(self, name: str, *own: str, machine: str | None = None, effects: Sequence[str] = ()) -> str:
         """`tps name` on the same data with the same options; `own` words of that command come after the machine.
@@ -85,10 +86,10 @@ class Asked:
         return command_line(
             name,
             *self.data,
-            *options(machine=chosen if chosen != MACHINE else None),
+            *options(machine=chosen if chosen != defaults.MACHINE else None),
             *own,
             *options(effects=[*self.effects, *effects], noise=self._noise()),
-            *options(strut_spread=percent(self.strut_spread) if self.strut_spread != STRUT_SPREAD else None),
+            *options(strut_spread=percent(self.strut_spread) if self.strut_spread != defaults.STRUT_SPREAD else None),
         )
 
     def _noise(self) -> str | None:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
@@ -255,7 +254,7 @@ def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> 
     pieces = np.maximum(pieces, 1.0)
     total = float(pieces.sum()) + len(moves)
     if total > MOST_SAMPLES:
-        raise InputError(
+        raise ProgramError(
             f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
             expected=f"at most {MOST_SAMPLES}",
             hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",

@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import FileError
 from toolpath_stiff.files import Content, check_outputs, encoded, keep_old, write_atomically
 
 MANIFEST = ".tps-files.json"
@@ -144,20 +144,20 @@ def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules(
     target, names = Path(folder), list(names)
     nearest = next(path for path in (target, *target.absolute().parents) if os.path.lexists(path))
     if not nearest.is_dir():
-        raise InputError(f"cannot write to {str(target)!r}: {str(nearest)!r} is not a folder")
+        raise FileError(f"cannot write to {str(target)!r}: {str(nearest)!r} is not a folder")
     old = read_manifest(target)
     touched = [target / name for name in dict.fromkeys([*names, *old.files])]
     in_the_way = check_outputs(touched, rules.inputs, rules.replace)
     if rules.replace:
         return list(dict.fromkeys([*in_the_way, *(target / name for name in names if _told(target, name, old, rules))]))
     if rules.of and old.of and old.of != _relative(target, rules.of):
-        raise InputError(
+        raise FileError(
             f"{str(target)!r} holds the results of {', '.join(map(repr, old.of))} (seen from there)",
             hint="choose another folder with --out",
         )
     for name in names:
         if told := _told(target, name, old, rules):
-            raise InputError(f"{str(target / name)!r} {told}", hint=ELSEWHERE)
+            raise FileError(f"{str(target / name)!r} {told}", hint=ELSEWHERE)
     return []
 
 
@@ -185,11 +185,11 @@ def read_manifest(folder: Path) -> Manifest:
     except (FileNotFoundError, NotADirectoryError):
         return Manifest()
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise InputError(
+        raise FileError(
             f"{str(folder / MANIFEST)!r} does not record what tps wrote", hint="delete it, or choose another folder"
         ) from None
     except OSError as error:
-        raise InputError(f"cannot read {str(folder / MANIFEST)!r}: {error.strerror}") from None
+        raise FileError(f"cannot read {str(folder / MANIFEST)!r}: {error.strerror}") from None
 
 
 def _is_ours(folder: Path, name: str, manifest: Manifest) -> bool:
@@ -201,7 +201,7 @@ def _is_ours(folder: Path, name: str, manifest: Manifest) -> bool:
         with path.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest() in manifest.files[name]
     except OSError as error:
-        raise InputError(f"cannot read {str(path)!r}: {error.strerror}") from None
+        raise FileError(f"cannot read {str(path)!r}: {error.strerror}") from None
 
 
 def _relative(folder: Path, of: Sequence[str]) -> tuple[str, ...]:
@@ -249,5 +249,5 @@ def _folders_above(folder: Path) -> Iterator[None]:
             with suppress(OSError):  # not empty: someone else uses it by now
                 parent.rmdir()
         if isinstance(error, OSError):
-            raise InputError(f"cannot write to {str(folder)!r}: {error.strerror}") from None
+            raise FileError(f"cannot write to {str(folder)!r}: {error.strerror}") from None
         raise

@@ -7,9 +7,9 @@ text, so the order is assumed; it is of no consequence while the spindle is vert
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.arrays import FloatArray
 
 
 def rotation_matrices(abc: ArrayLike) -> FloatArray:

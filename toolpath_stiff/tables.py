@@ -14,7 +14,7 @@ import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.errors import InputError, InputErrors, TableError
 from toolpath_stiff.files import decoded, read_bytes
 from toolpath_stiff.workbook import SPREADSHEET_ERROR, Grid, counts, is_workbook, sheet_grid, split_name, typed
 
@@ -77,7 +77,7 @@ class Table:
         if len(cells) == len(self.heading):
             return dict(zip(self.heading, cells, strict=True))
         comma = self.separator == "," and len(cells) > len(self.heading)
-        raise InputError(
+        raise TableError(
             f"row with {len(cells)} cells",
             expected=f"{len(self.heading)} as in the heading",
             hint="a decimal comma between commas? Write semicolons between the cells" if comma else "",
@@ -106,7 +106,7 @@ def read_table(path: str, what: str, columns: Columns) -> Table:
     if is_workbook(content):
         return _table(sheet_grid(content, workbook, sheet), path, columns)
     if sheet:
-        raise InputError(f"{workbook!r} is not an Excel workbook and has no sheets", file=path)
+        raise TableError(f"{workbook!r} is not an Excel workbook and has no sheets", file=path)
     return parse_table(decoded(content), path, columns)
 
 
@@ -143,19 +143,16 @@ def _lines(text: str, file: str, separator: str, strict: bool = True) -> Iterato
                 yield reader.line_num, stripped
     except csv.Error as error:  # a quote that never ends, say
         if strict:
-            raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
+            raise TableError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
 
 
 def _table(grid: Grid, file: str, columns: Columns) -> Table:
     if not grid.rows:
-        raise InputError("the file is empty", expected="a heading and rows below it", file=file)
+        raise TableError("the file is empty", expected="a heading and rows below it", file=file)
     known = _known(columns)
-    top = min(len(grid.rows), LOOKED_AT)
-    scores = [_score(cells, known) for _, cells in grid.rows[:top]]
-    at = next((i for i, score in enumerate(scores) if score >= HEADING_FROM), 0)
+    at = _heading_row(grid, known)
     line, written = grid.rows[at]
-    body = grid.rows[at + 1 :]
-    notes = list(grid.notes)
+    body, notes = grid.rows[at + 1 :], list(grid.notes)
     if at:
         notes.append(f"{file}: what stands above the heading in line {line} is passed over")
     units: list[str] = []
@@ -163,8 +160,7 @@ def _table(grid: Grid, file: str, columns: Columns) -> Table:
         units = body[0][1]
         notes.append(f"{file}: line {body[0][0]} is a row of units")
         body = body[1:]
-    width = max((i + 1 for _, cells in [grid.rows[at], *body] for i, cell in enumerate(cells) if cell), default=0)
-    written = (written + [""] * width)[:width] if grid.separator == "" or len(written) > width else written
+    written = _as_wide(grid, written, [written, *(cells for _, cells in body)])
     _refuse_merged(grid, written, file, line)
     heading = [_name(cell, unit, known, file, line) for cell, unit in _paired(written, units)]
     renamed = [f"{old!r} as {new}" for old, new in zip(written, heading, strict=True) if old != new]
@@ -177,6 +173,19 @@ def _table(grid: Grid, file: str, columns: Columns) -> Table:
     if commas:
         notes.append(f"{file}: numbers are read with decimal commas")
     return Table(file, tuple(heading), line, tuple((n, tuple(c)) for n, c in rows), grid.separator, tuple(notes))
+
+
+def _heading_row(grid: Grid, known: Mapping[str, str]) -> int:
+    """Row of the heading: the first with enough known columns, else the first."""
+    top = min(len(grid.rows), LOOKED_AT)
+    scores = [_score(cells, known) for _, cells in grid.rows[:top]]
+    return next((i for i, score in enumerate(scores) if score >= HEADING_FROM), 0)
+
+
+def _as_wide(grid: Grid, heading: list[str], rows: list[list[str]]) -> list[str]:
+    """The heading as wide as the last cell with something in it; of a text file not wider than it is."""
+    width = max((i + 1 for cells in rows for i, cell in enumerate(cells) if cell), default=0)
+    return (heading + [""] * width)[:width] if grid.separator == "" or len(heading) > width else heading
 
 
 def _fitted(cells: list[str], width: int, pad: bool) -> list[str]:
@@ -248,14 +257,14 @@ def _name(written: str, unit: str, known: Mapping[str, str], file: str, line: in
         found = f"unknown column {written!r} (in another unit?)"
     else:
         found = f"column {written!r} has no unit"
-    raise InputError(
+    raise TableError(
         found, expected=name, hint=f"did you mean {name}? Otherwise give it another name", file=file, line=line
     )
 
 
 def _refuse_merged(grid: Grid, heading: Sequence[str], file: str, line: int) -> None:
     if "" in heading and grid.merged and line in grid.merged:
-        raise InputError(
+        raise TableError(
             f"merged cells in the heading: {grid.merged[line]}",
             expected="one heading a column",
             hint="split the merged cells, or leave them in a row above the heading",
@@ -266,7 +275,7 @@ def _refuse_merged(grid: Grid, heading: Sequence[str], file: str, line: int) -> 
 
 def _refuse_spreadsheet_errors(heading: Sequence[str], rows: list[tuple[int, list[str]]], file: str) -> None:
     errors = [
-        InputError(f"{name} = {cell}, an error of the spreadsheet", expected="a value", file=file, line=line)
+        TableError(f"{name} = {cell}, an error of the spreadsheet", expected="a value", file=file, line=line)
         for line, cells in rows
         for name, cell in zip(heading, cells, strict=False)
         if SPREADSHEET_ERROR.fullmatch(cell)
@@ -300,15 +309,10 @@ def with_points(
         Thousands separators, two kinds of decimal marks, or numbers that can be read in two ways.
     """
     cells = [(line, heading[i], row[i]) for line, row in rows for i in numbers if i < len(row)]
+    _refuse_grouped(cells, file)
     marked = [cell for cell in cells if ONE_MARK.fullmatch(cell[2])]
     commas = [cell for cell in marked if "," in cell[2]]
     points = [cell for cell in marked if "." in cell[2]]
-    grouped = [cell for cell in cells if THOUSANDS.fullmatch(cell[2]) and not ONE_MARK.fullmatch(cell[2])]
-    if grouped:
-        raise InputErrors(
-            InputError(f"{name} = {text!r} has thousands separators", hint=REMOVE_THEM, file=file, line=line)
-            for line, name, text in grouped
-        )
     if commas and points:
         raise _two_marks(commas, points, file)
     if commas and all(LIKE_THOUSANDS.fullmatch(text) for _, _, text in commas):
@@ -318,10 +322,20 @@ def with_points(
     if not commas:
         return rows, False
     chosen = frozenset(numbers)
-    return [
-        (line, [c.replace(",", ".") if i in chosen and ONE_MARK.fullmatch(c) else c for i, c in enumerate(row)])
-        for line, row in rows
-    ], True
+    return [(line, [_with_point(c) if i in chosen else c for i, c in enumerate(row)]) for line, row in rows], True
+
+
+def _with_point(cell: str) -> str:
+    return cell.replace(",", ".") if ONE_MARK.fullmatch(cell) else cell
+
+
+def _refuse_grouped(cells: list[Cell], file: str) -> None:
+    grouped = [cell for cell in cells if THOUSANDS.fullmatch(cell[2]) and not ONE_MARK.fullmatch(cell[2])]
+    if grouped:
+        raise InputErrors(
+            TableError(f"{name} = {text!r} has thousands separators", hint=REMOVE_THEM, file=file, line=line)
+            for line, name, text in grouped
+        )
 
 
 def _refuse_doubtful_points(cells: list[Cell], points: list[Cell], file: str) -> None:
@@ -336,7 +350,7 @@ def _refuse_doubtful_points(cells: list[Cell], points: list[Cell], file: str) ->
 def _two_marks(commas: list[Cell], points: list[Cell], file: str) -> InputError:
     rare, usual = (commas, points) if len(commas) < len(points) else (points, commas)
     (line, name, text), (other_line, other_name, other) = rare[0], usual[0]
-    return InputError(
+    return TableError(
         f"{name} = {text!r} and {other_name} = {other!r} (line {other_line}) have different decimal marks",
         expected="decimal points, or decimal commas, in the whole file",
         hint=REMOVE_THEM,
@@ -347,7 +361,7 @@ def _two_marks(commas: list[Cell], points: list[Cell], file: str) -> InputError:
 
 def _ambiguous(cell: Cell, file: str) -> InputError:
     line, name, text = cell
-    return InputError(
+    return TableError(
         f"{name} = {text!r} could be {text.replace(',', '.')} or {re.sub('[.,]', '', text)}",
         expected="a number that can be read in one way",
         hint=f"{REMOVE_THEM}, decimals with a point",

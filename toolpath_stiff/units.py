@@ -66,6 +66,31 @@ def n_per_mm_from_n_per_m(k: T) -> T:
     return k / 1e3
 
 
+def n_per_m_from_n_per_um(k: T) -> T:
+    """N/m from N/um."""
+    return k * 1e6
+
+
+def n_per_um_from_n_per_m(k: T) -> T:
+    """N/um from N/m."""
+    return k / 1e6
+
+
+def s_from_min(minutes: T) -> T:
+    """Seconds from minutes."""
+    return minutes * 60.0
+
+
+def min_from_s(seconds: T) -> T:
+    """Minutes from seconds."""
+    return seconds / 60.0
+
+
+def per_s_from_per_min(rate: T) -> T:
+    """A rate a second from one a minute."""
+    return rate / 60.0
+
+
 def m_per_s_from_mm_per_min(feed: T) -> T:
     """m/s from mm/min."""
     return feed / 60e3

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.errors import InputErrors, TableError
 
 SPREADSHEET_ERROR = re.compile(r"#[A-ZÄÖÜ][A-ZÄÖÜ0-9/_]*[!?]|#N/A|#N/?V")
 
@@ -76,25 +76,9 @@ def sheet_grid(content: bytes, file: str, sheet: str = "") -> Grid:
         Not a workbook that can be read, no such sheet, too large, or formulas without a stored value.
     """
     if content.startswith(OLD_EXCEL):
-        raise InputError("an old or a protected Excel file", expected="an .xlsx workbook", hint=SAVE_AS, file=file)
+        raise TableError("an old or a protected Excel file", expected="an .xlsx workbook", hint=SAVE_AS, file=file)
     _refuse_large(content, file)
-    values = _open(content, file, values=True)
-    filled = [one for one in values.worksheets if any(v is not None for row in one.values for v in row)]
-    names = [one.title for one in filled]
-    if not filled or (sheet and sheet not in names):
-        found = f"the workbook has no sheet {sheet!r} with cells" if filled else "the workbook is empty"
-        raise InputError(found, expected=f"one of {', '.join(names)}" if filled else "", file=file)
-    chosen = filled[names.index(sheet) if sheet else 0]
-    if chosen.max_row * chosen.max_column > LARGEST_CELLS:
-        raise InputError(
-            f"sheet {chosen.title!r} has {chosen.max_row} rows and {chosen.max_column} columns",
-            hint="delete the empty ones, or save the sheet as CSV",
-            file=file,
-        )
-    notes = []
-    if len(filled) > 1 and not sheet:
-        others = ", ".join(names[1:])
-        notes.append(f"{file}: sheet {chosen.title!r} is read, not {others}; {file}#SHEET names another")
+    chosen, notes = _chosen_sheet(_open(content, file, values=True), file, sheet)
     cells = [list(row) for row in chosen.values]
     if any(value is None for row in cells for value in row):
         _refuse_formulas(cells, _open(content, file, values=False)[chosen.title], file)
@@ -106,24 +90,46 @@ def sheet_grid(content: bytes, file: str, sheet: str = "") -> Grid:
     return Grid([(line, row) for line, row in rows if counts(row)], "", tuple(notes), merged)
 
 
+def _chosen_sheet(workbook: Any, file: str, sheet: str) -> tuple[Any, list[str]]:
+    """The sheet of that name, or the first that is not empty, and a note where there are others."""
+    filled = [one for one in workbook.worksheets if any(v is not None for row in one.values for v in row)]
+    names = [one.title for one in filled]
+    if not filled:
+        raise TableError("the workbook is empty", file=file)
+    if sheet and sheet not in names:
+        found = f"the workbook has no sheet {sheet!r} with cells"
+        raise TableError(found, expected=f"one of {', '.join(names)}", file=file)
+    chosen = filled[names.index(sheet) if sheet else 0]
+    if chosen.max_row * chosen.max_column > LARGEST_CELLS:
+        raise TableError(
+            f"sheet {chosen.title!r} has {chosen.max_row} rows and {chosen.max_column} columns",
+            hint="delete the empty ones, or save the sheet as CSV",
+            file=file,
+        )
+    if len(filled) == 1 or sheet:
+        return chosen, []
+    others = ", ".join(names[1:])
+    return chosen, [f"{file}: sheet {chosen.title!r} is read, not {others}; {file}#SHEET names another"]
+
+
 def _refuse_large(content: bytes, file: str) -> None:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = archive.namelist()
             size = sum(part.file_size for part in archive.infolist())
     except zipfile.BadZipFile:
-        raise InputError("a damaged Excel workbook", hint=SAVE_AS, file=file) from None
+        raise TableError("a damaged Excel workbook", hint=SAVE_AS, file=file) from None
     if "xl/workbook.xml" not in names:
-        raise InputError("neither text nor an Excel workbook", hint=SAVE_AS, file=file)
+        raise TableError("neither text nor an Excel workbook", hint=SAVE_AS, file=file)
     if size > LARGEST_BYTES:
-        raise InputError(f"a workbook of {size / 1e6:.0f} MB unpacked", hint="save the sheet as CSV", file=file)
+        raise TableError(f"a workbook of {size / 1e6:.0f} MB unpacked", hint="save the sheet as CSV", file=file)
 
 
 def _open(content: bytes, file: str, values: bool) -> Any:
     try:
         import openpyxl
     except ImportError:
-        raise InputError(
+        raise TableError(
             "reading .xlsx needs openpyxl, which is not installed",
             hint="install it (`pip install openpyxl`), or save the sheet as CSV",
             file=file,
@@ -133,7 +139,7 @@ def _open(content: bytes, file: str, values: bool) -> Any:
             warnings.simplefilter("ignore")  # what it leaves out (validations, pictures) is nothing of ours
             return openpyxl.load_workbook(io.BytesIO(content), data_only=values)
     except Exception as error:  # whatever a damaged file makes of the library
-        raise InputError(f"an Excel workbook that cannot be read: {error}", hint=SAVE_AS, file=file) from None
+        raise TableError(f"an Excel workbook that cannot be read: {error}", hint=SAVE_AS, file=file) from None
 
 
 def _refuse_formulas(cells: list[list[Any]], written: Any, file: str) -> None:
@@ -143,7 +149,7 @@ def _refuse_formulas(cells: list[list[Any]], written: Any, file: str) -> None:
             if cell.data_type == "f" and cells[line - 1][column] is None:
                 found = f"cell {cell.coordinate} holds the formula {cell.value!s} without a stored value"
                 hint = "open and save the workbook in Excel once, or save it as CSV"
-                errors.append(InputError(found, hint=hint, file=file, line=line))
+                errors.append(TableError(found, hint=hint, file=file, line=line))
     if errors:
         raise InputErrors(errors)
 

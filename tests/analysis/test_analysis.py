@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolpath_stiff.analysis import analyse, evaluate, parse_load
+from toolpath_stiff.analysis import analyze, evaluate, parse_load
 from toolpath_stiff.analysis.loads import load_directions, softest_directions, stiffest_directions
 from toolpath_stiff.analysis.poses import evaluate_poses
 from toolpath_stiff.analysis.results import required_stiffness_missed
@@ -22,7 +22,7 @@ SQUARE = "G21 G90 F1000\nG0 X-100 Y-100 Z0\nG1 X100\nY100\nX-100\nY-100\nM2\n"
 
 
 def analyse_text(text: str, **options):
-    return analyse(MACHINE, parse_program(text, "part.nc", origin=options.get("origin")), **options)
+    return analyze(MACHINE, parse_program(text, "part.nc", origin=options.get("origin")), **options)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_extrapolated_share():
 def test_machine_coordinates_need_the_origin_they_were_read_for():
     program = parse_program("G1 F100 X1\nG53 G0 Z900\n", "part.nc")
     with pytest.raises(InputError, match="machine coordinates"):
-        analyse(MACHINE, program)
+        analyze(MACHINE, program)
 
 
 def test_assumptions_are_said():

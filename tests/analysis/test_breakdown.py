@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.factory import make_analysis, spiral
-from toolpath_stiff.analysis import Analysis, analyse
+from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.loads import PLUNGES_ONLY
 from toolpath_stiff.analysis.statistics import FIGURES, weighted_figures
 from toolpath_stiff.machine import load_machine
@@ -36,12 +36,12 @@ M30
 """
 
 
-def analysed(text: str, **options: object) -> Analysis:
-    return analyse(load_machine("nist"), parse_program(text, "part.nc"), **options)
+def analyzed(text: str, **options: object) -> Analysis:
+    return analyze(load_machine("nist"), parse_program(text, "part.nc"), **options)
 
 
 def test_operations_by_hand() -> None:
-    rows = analysed(TWO).summary()["per_operation"]
+    rows = analyzed(TWO).summary()["per_operation"]
     assert [row["name"] for row in rows] == ["T1", "WALL", "T2"]
     assert [row["tool"] for row in rows] == [1, 1, 2]
     first, second, third = rows
@@ -97,7 +97,7 @@ def check_plunges(parts: list[dict[str, Any]], whole: dict[str, Any] | None) -> 
 
 
 def test_the_parts_make_the_whole() -> None:
-    for analysis in (analysed(TWO), spiral()):
+    for analysis in (analyzed(TWO), spiral()):
         check_parts(analysis, "per_operation")
         check_parts(analysis, "per_tool")
 
@@ -125,14 +125,14 @@ LINES = st.lists(
 @settings(deadline=None, max_examples=40)
 @given(LINES)
 def test_the_parts_of_any_program_make_the_whole(lines: list[str]) -> None:
-    analysis = analysed("\n".join([*lines, "G1 X99 Y-5 F100", "X98 Z1"]), step=5e-3)
+    analysis = analyzed("\n".join([*lines, "G1 X99 Y-5 F100", "X98 Z1"]), step=5e-3)
     check_parts(analysis, "per_operation")
     check_parts(analysis, "per_tool")
 
 
 def test_an_operation_out_of_reach_has_no_figures() -> None:
     text = "G1 X10 F500\nX0\n(TOO FAR)\nG0 X5000\nG1 X5100\n(BACK)\nG0 X0\nG1 X10\n"
-    analysis = analysed(text, partial=True)
+    analysis = analyzed(text, partial=True)
     near, far, back = analysis.summary()["per_operation"]
     assert far["name"] == "TOO FAR"
     assert all(far[name] is None for name in (*FIGURES, "weakest", "min_margin", "min_margin_limit"))
@@ -156,14 +156,14 @@ def test_a_tool_of_two_lengths_has_two_rows() -> None:
 def test_the_approach_before_a_tools_length_is_in_force_is_the_tools_time() -> None:
     text = "T3 M6\nG0 X100\nG43 H3 Z20\nG1 Z0 F600\nX90\n"
     program = parse_program(text, "part.nc", tools={3: ToolEntry(3, length=100.0)})
-    analysis = analyse(load_machine("nist"), program)
+    analysis = analyze(load_machine("nist"), program)
     (row,) = analysis.summary()["per_tool"]
     assert row["length_mm"] == pytest.approx(100.0)
     assert row["time_s"] == pytest.approx(analysis.summary()["time_s"])
 
 
 def test_the_samples_tell_their_operation() -> None:
-    analysis = analysed(TWO)
+    analysis = analyzed(TWO)
     frame = analysis.to_frame()
     assert frame.groupby("operation")["line"].agg(["min", "max"]).to_numpy().tolist() == [[3, 7], [9, 11], [13, 15]]
 

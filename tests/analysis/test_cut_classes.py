@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.factory import make_analysis
-from toolpath_stiff.analysis import LOADS, analyse, parse_load
+from toolpath_stiff.analysis import LOADS, analyze, parse_load
 from toolpath_stiff.analysis.loads import along_tool_axis, headline_rows, plunging_rows
 from toolpath_stiff.analysis.results import required_stiffness_missed
 from toolpath_stiff.analysis.statistics import FIGURES, stiffness_figures, weakest_places
@@ -87,17 +87,17 @@ PROGRAMS = Path(__file__).parents[2] / "programs"
 NIST = load_machine("nist")
 
 
-def analysed(text, **options):
-    return analyse(NIST, parse_program(text, "part.nc"), **options)
+def analyzed(text, **options):
+    return analyze(NIST, parse_program(text, "part.nc"), **options)
 
 
 def alone(text, **options):
     """Figures of a program of one class alone."""
-    return analysed(text, **options).summary()
+    return analyzed(text, **options).summary()
 
 
 def test_plunges_no_longer_rule_the_range_of_the_readmes_example():
-    summary = analyse(NIST, read_program(str(PROGRAMS / "pocket.nc"))).summary()
+    summary = analyze(NIST, read_program(str(PROGRAMS / "pocket.nc"))).summary()
     # Three feeds down in the program's text: lines 13, 39 and 65, 5 + 3 + 12 mm.
     assert (summary["plunges"]["moves"], summary["plunges"]["length_mm"]) == (3, pytest.approx(20.0))
     assert summary["headline"] == "across the tool axis"
@@ -107,7 +107,7 @@ def test_plunges_no_longer_rule_the_range_of_the_readmes_example():
 
 
 def test_a_program_that_only_plunges_says_so():
-    summary = analyse(NIST, read_program(str(PROGRAMS / "drilling.nc"))).summary()
+    summary = analyze(NIST, read_program(str(PROGRAMS / "drilling.nc"))).summary()
     assert summary["headline"] == "plunges only"
     assert all(summary[name] == summary["plunges"][name] for name in FIGURES)
     assert {row["headline"] for row in (*summary["per_tool"], *summary["per_operation"])} == {"plunges only"}
@@ -142,7 +142,7 @@ def test_other_loads_count_every_cut(load):
 
 
 def test_require_catches_a_weak_plunge():
-    analysis = analysed("G1 Z-4 F100\nG1 X40\n")
+    analysis = analyzed("G1 Z-4 F100\nG1 X40\n")
     level = analysis.summary()["plunges"]["max_N_per_mm"] * 1e3 + 1.0
     assert {line for line, _ in required_stiffness_missed(analysis, level)} == {1, 2}
     assert weakest_places(analysis) and not analysis.plunging[weakest_places(analysis)].any()
@@ -155,7 +155,7 @@ STEPS = st.lists(st.sampled_from(["G1 X{}", "G1 Y{}", "G1 Z-{}", "G1 X{0} Z-{0}"
 @given(STEPS, st.integers(1, 9))
 def test_the_classes_together_are_the_old_figures(steps, size):
     lines = [step.format(size + i) for i, step in enumerate(steps)]
-    analysis = analysed("\n".join(["F500", *lines, "G1 X20 Y20", ""]))
+    analysis = analyzed("\n".join(["F500", *lines, "G1 X20 Y20", ""]))
     counted, plunging = analysis.counted, analysis.plunging
     assert not (analysis.headline & analysis.set_aside).any()
     np.testing.assert_array_equal(analysis.headline | analysis.set_aside, counted)
@@ -171,13 +171,13 @@ def test_the_classes_together_are_the_old_figures(steps, size):
 
 def test_the_papers_path_has_no_plunges():
     for program in (case_study_program(), wavy_program(40.0)):
-        analysis = analyse(NIST, program, origin=(0.15, 0.1, 0.4, 0.0, 0.0, 0.0))
+        analysis = analyze(NIST, program, origin=(0.15, 0.1, 0.4, 0.0, 0.0, 0.0))
         assert not analysis.plunging.any() and analysis.headline.tolist() == analysis.counted.tolist()
 
 
 def test_the_table_of_samples_says_the_class_whatever_the_load():
     text = "G0 Z5\nG1 Z-4 F100\nX40\nA3\n"
     for load in ("tangential", "x"):
-        frame = analysed(text, load=load).to_frame()
+        frame = analyzed(text, load=load).to_frame()
         found = frame.groupby("line")["cut"].agg(lambda cut: "".join(sorted(set(cut))))
         assert found.to_dict() == {1: "", 2: "plunge", 3: "across", 4: ""}, load

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toolpath_stiff.analysis.results import analyse
+from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty
@@ -37,7 +37,7 @@ def soft_joints(machine=NIST, size=5.0):
 
 
 def test_a_machine_without_uncertainty_has_no_band(program):
-    found = analyse(NIST, program, step=0.05)
+    found = analyze(NIST, program, step=0.05)
     assert found.parameter_band is None
     assert "parameter_uncertainty" not in found.summary()
 
@@ -46,7 +46,7 @@ def test_a_law_wrong_by_one_factor_makes_the_stiffness_wrong_by_it(program):
     """Rigid but for its struts, a machine is as stiff as they are: 2 % in both constants together is 2 % everywhere."""
     law = NIST.strut_law
     sd = [0.02 * law.stiffness_1 / 1e6, 0.02 * law.stiffness_2 / 1e6]
-    found = analyse(with_uncertainty(STRUT_LAW, sd, [[1.0, 1.0], [1.0, 1.0]]), program, step=0.05)
+    found = analyze(with_uncertainty(STRUT_LAW, sd, [[1.0, 1.0], [1.0, 1.0]]), program, step=0.05)
     counted = found.counted
     relative = found.parameter_band.deviation[counted] / found.at.stiffness[counted]
     # 2e-4 of it: each constant is moved alone by 0.02 % of itself, over which the stiffness bends by as much.
@@ -58,8 +58,8 @@ def test_a_law_wrong_by_one_factor_makes_the_stiffness_wrong_by_it(program):
 
 def test_the_deviation_is_the_move_that_the_parameter_makes(program):
     machine = with_uncertainty([JOINTS], [0.1], machine=soft_joints())
-    found = analyse(machine, program, step=0.05)
-    up, down = (analyse(soft_joints(size=5.0 + change), program, step=0.05).at.stiffness for change in (0.1, -0.1))
+    found = analyze(machine, program, step=0.05)
+    up, down = (analyze(soft_joints(size=5.0 + change), program, step=0.05).at.stiffness for change in (0.1, -0.1))
     counted = found.counted
     # Half the move between plus and minus one deviation; 0.1 of 20 nm/N bends by (0.5 %)^2.
     assert found.parameter_band.deviation[counted] == pytest.approx((down - up)[counted] / 2.0, rel=1e-2)
@@ -69,11 +69,11 @@ def test_it_agrees_with_drawn_parameters(program):
     """1000 machines drawn from the covariance scatter as the band says."""
     law, correlation = NIST.strut_law, np.array([[1.0, -0.6], [-0.6, 1.0]])
     sd = np.array([0.5, 0.4])
-    found = analyse(with_uncertainty(STRUT_LAW, sd, correlation), program, step=0.5)
+    found = analyze(with_uncertainty(STRUT_LAW, sd, correlation), program, step=0.5)
     rng = np.random.default_rng(3)
     drawn = rng.multivariate_normal([0.0, 0.0], np.outer(sd, sd) * correlation, 1000)
     runs = [
-        analyse(
+        analyze(
             NIST.with_changes(
                 strut_law=replace(law, stiffness_1=law.stiffness_1 + a * 1e6, stiffness_2=law.stiffness_2 + b * 1e6)
             ),
@@ -90,7 +90,7 @@ def test_it_agrees_with_drawn_parameters(program):
 def test_errors_of_parameters_do_not_average_out(program):
     law = NIST.strut_law
     sd = [0.03 * law.stiffness_1 / 1e6, 0.03 * law.stiffness_2 / 1e6]
-    found = analyse(with_uncertainty(STRUT_LAW, sd, [[1.0, 0.5], [0.5, 1.0]]), program, step=0.01)
+    found = analyze(with_uncertainty(STRUT_LAW, sd, [[1.0, 0.5], [0.5, 1.0]]), program, step=0.01)
     weight = np.where(found.counted, found.samples.weight, 0.0)
     deviation = found.parameter_band.deviation[found.counted]
     assert deviation.min() <= found.parameter_band.deviation_of_mean(weight) <= deviation.max()
@@ -100,7 +100,7 @@ def test_instruments_act_on_readings_only(program):
     machine = NIST.with_changes(
         instruments=(EffectEntry("gauge_scale", {"direction": 1, "setup": "", "scale_percent": 3.0}),)
     )
-    found = analyse(with_uncertainty(["gauge_scale.scale_percent"], [1.0], machine=machine), program, step=0.05)
+    found = analyze(with_uncertainty(["gauge_scale.scale_percent"], [1.0], machine=machine), program, step=0.05)
     assert found.parameter_band is None
 
 
@@ -108,7 +108,7 @@ def test_a_parameter_at_its_bound_is_moved_inwards(program):
     machine = with_uncertainty([JOINTS], [0.5], machine=soft_joints(size=0.0))
     with pytest.raises(InputError, match=JOINTS):
         with_parameter_moved(build_model(machine), JOINTS, -0.1)
-    found = analyse(machine, program, step=0.05)
+    found = analyze(machine, program, step=0.05)
     assert (found.parameter_band.deviation[found.counted] > 0.0).all()
 
 
@@ -118,8 +118,8 @@ def test_geometry_effects_are_applied_once(program):
     model = build_model(machine)
     same = with_parameter_moved(model, "tool_length_error.error_mm", 0.0)
     assert np.array_equal(same.machine.platform_joints, model.machine.platform_joints)
-    found = analyse(with_uncertainty(["tool_length_error.error_mm"], [2.0], machine=machine), program, step=0.05)
-    near = analyse(
+    found = analyze(with_uncertainty(["tool_length_error.error_mm"], [2.0], machine=machine), program, step=0.05)
+    near = analyze(
         NIST.with_changes(effects=(EffectEntry("tool_length_error", {"error_mm": 22.0}),)), program, step=0.05
     )
     moved = np.abs(near.at.stiffness - found.at.stiffness)[found.counted]
@@ -135,7 +135,7 @@ def test_no_such_parameter():
 def test_the_profile_holds_the_band(program):
     from toolpath_stiff.report.profile import profile_band, profile_curve, profile_picture
 
-    found = analyse(with_uncertainty(STRUT_LAW, [1.0, 1.0]), program, step=0.05)
+    found = analyze(with_uncertainty(STRUT_LAW, [1.0, 1.0]), program, step=0.05)
     low, high = profile_band(found)
     _, k = profile_curve(found)
     drawn = ~np.isnan(k)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.kinematics import PostedKinematics, read_kinematics, roll_pitch, tool_poses
 from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.toml_reader import TomlReader
 
 TOLERANCE_MM = 1e-3
 
@@ -21,12 +21,11 @@ points = st.tuples(lengths, lengths, lengths)
 
 
 def kinematics(text: str) -> PostedKinematics:
-    import tomllib
-
-    def fail(found: str, expected: str) -> InputError:
-        return InputError(found, expected=expected)
-
-    return read_kinematics(tomllib.loads(text), fail)
+    toml = TomlReader(text, "control.toml")
+    toml.data = {"kinematics": toml.data}
+    found = read_kinematics(toml)
+    assert found is not None
+    return found
 
 
 def two(kind: str, first: str, second: str, tcp: bool = False, more: str = "") -> PostedKinematics:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.nc import rs274
-from toolpath_stiff.analysis import analyse
+from toolpath_stiff.analysis import analyze
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.path import place
@@ -31,8 +31,8 @@ def keyed_in(name: str, block: str):
 def test_linuxcnc_block_places_as_the_origin_does(name):
     machine, program = load_machine("nist"), read_program(PROGRAMS / name)
     blocks = offset_blocks(program, PLACEMENT, decimals=6)
-    there = analyse(machine, keyed_in(name, blocks.linuxcnc), step=2e-3).summary()
-    wanted = analyse(machine, program, origin=PLACEMENT, step=2e-3).summary()
+    there = analyze(machine, keyed_in(name, blocks.linuxcnc), step=2e-3).summary()
+    wanted = analyze(machine, program, origin=PLACEMENT, step=2e-3).summary()
     for figure in FIGURES:  # six decimals of a millimetre; the summary itself is rounded
         assert there[figure] == pytest.approx(wanted[figure], rel=1e-6, abs=0.11)
 

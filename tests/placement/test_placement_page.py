@@ -11,7 +11,7 @@ import pytest
 
 from tests.browser import needs_browser, opened, painted
 from tests.placement.test_placement_search import headline_figures
-from toolpath_stiff.analysis import analyse
+from toolpath_stiff.analysis import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program, read_program
@@ -69,7 +69,7 @@ def test_page_tells_what_analysis_finds(tmp_path, capsys, name, request):
     assert len(data["stiffness"]) == len(data["front"]) + 1  # and the original
     for i in (0, len(data["front"]) // 2, data["recommended"]):
         row = data["front"][i]
-        found = analyse(NIST, program, origin=pose_of(row), step=STEP)
+        found = analyze(NIST, program, origin=pose_of(row), step=STEP)
         figures = headline_figures(found)
         for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "mean_deflection_um"):
             # placement.json holds mm to the last digit; the range is a difference of large numbers
@@ -81,7 +81,7 @@ def test_page_tells_what_analysis_finds(tmp_path, capsys, name, request):
             near = np.linalg.norm(1e3 * samples.position - position[k], axis=1) < 2e-3
             near &= samples.cutting & (np.abs(1e3 * samples.s - data["s"][k]) < 2e-2)
             assert np.abs(found.at.stiffness[near] / 1e3 - data["stiffness"][i][k]).min() <= 0.5 + 1e-6
-    original = headline_figures(analyse(NIST, program, step=STEP))
+    original = headline_figures(analyze(NIST, program, step=STEP))
     assert data["before"]["mean_N_per_mm"] == pytest.approx(original["mean_N_per_mm"], rel=1e-12)
 
 

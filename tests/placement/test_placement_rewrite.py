@@ -12,7 +12,7 @@ import pytest
 
 from tests.nc import rs274
 from tests.placement.rewriting import assert_same_path
-from toolpath_stiff.analysis import analyse
+from toolpath_stiff.analysis import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
@@ -50,7 +50,7 @@ def reading(name: str, **more):
 def placed_there(name: str, there):
     """The program as it is read at a placement, its present zero, its analysis there."""
     program = reading(name, origin=there)
-    return program, reading(name).origin, analyse(MACHINE, program, origin=there, step=2e-3)
+    return program, reading(name).origin, analyze(MACHINE, program, origin=there, step=2e-3)
 
 
 def differences(name: str, there, **options) -> dict[str, float]:
@@ -222,10 +222,10 @@ def test_decimals_that_make_no_program(decimals):
 def test_the_printed_differences_are_those_of_the_figures():
     name, there = "pocket.nc", placement(37.0)
     program, origin = reading(name, origin=there), reading(name).origin
-    placed = analyse(MACHINE, program, origin=there, step=2e-3)
+    placed = analyze(MACHINE, program, origin=there, step=2e-3)
     wrong = rewrite_program(program, placement(36.0), origin)  # a degree off: must show
     found = rewriting_differences(placed, wrong, origin)
-    again = analyse(MACHINE, parse_program(wrong.text), origin=origin, step=2e-3)
+    again = analyze(MACHINE, parse_program(wrong.text), origin=origin, step=2e-3)
     for short, key in zip(("mean", "range", "min"), FIGURES, strict=True):
         old, new = (stiffness_figures(a, a.counted)[key] for a in (placed, again))
         assert found[short] == pytest.approx(abs(new / old - 1.0), rel=1e-9)

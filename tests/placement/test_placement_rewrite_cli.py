@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.placement.test_placement_search import headline_figures
-from toolpath_stiff.analysis import analyse
+from toolpath_stiff.analysis import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import read_program
@@ -34,7 +34,7 @@ def test_the_written_program_has_the_figures_of_the_placement(capsys, decimals, 
     summary = json.loads(Path("out/placement.json").read_text())
     machine = load_machine("nist")
     written = read_program("sub/placed.nc", default_origin=machine.default_origin)
-    again = analyse(machine, written, step=2e-3)
+    again = analyze(machine, written, step=2e-3)
     figures = headline_figures(again)
     for short, key in (("mean", "mean_N_per_mm"), ("range", "range_N_per_mm"), ("min", "min_N_per_mm")):
         assert figures[key] == pytest.approx(summary["chosen"][key], rel=bar)

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from tests.placement.test_placement_search import MODEL, TANGENTIAL, headline_figures, program_of
-from toolpath_stiff.analysis import analyse
+from toolpath_stiff.analysis import analyze
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
@@ -20,7 +21,7 @@ from toolpath_stiff.path import place
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import telling_path, work_path
-from toolpath_stiff.placement.search import NO_FLOORS, OBJECTIVES, SearchRules, search_placements
+from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parents[2]
@@ -40,8 +41,8 @@ def test_never_worse_than_the_present_placement(name, objective):
     """Told by plain analysis of both placements; the README's own bounds, where a corner was recommended once."""
     program = program_of(name)
     found = searched(program, objective=objective)
-    best = analyse(NIST, program, origin=tuple(found.front[found.best]), step=4e-3)
-    before = analyse(NIST, program, origin=PRESENT, step=4e-3)
+    best = analyze(NIST, program, origin=tuple(found.front[found.best]), step=4e-3)
+    before = analyze(NIST, program, origin=PRESENT, step=4e-3)
     now, then = headline_figures(best), headline_figures(before)
     assert now["mean_N_per_mm"] >= then["mean_N_per_mm"]
     assert now["range_N_per_mm"] <= then["range_N_per_mm"]
@@ -107,7 +108,7 @@ def test_a_rapid_is_a_constraint_like_a_cut():
     found = searched(program, objective="mean")
     assert (found.figures.rapid_margin >= 0.01).all()
     for placement in (found.front[found.best], found.front[0], found.front[-1]):
-        assert analyse(NIST, program, origin=tuple(placement), step=4e-3).at.reachable.all()
+        assert analyze(NIST, program, origin=tuple(placement), step=4e-3).at.reachable.all()
     # It does bind: without the rapids the search goes higher.
     low = parse_program(text.replace("Z700", "Z6"), "low.nc")
     assert searched(low, objective="mean").front[:, 2].max() > found.front[:, 2].max() + 0.05
@@ -253,7 +254,7 @@ def test_pick_takes_a_point_of_the_front_without_a_search(earlier, monkeypatch, 
     assert summary["picked"] and summary["chosen"]["number"] == number
     assert summary["front"] == earlier["front"] and summary["recommended"] == earlier["recommended"]
     assert f"Z{row['z_mm']:.4f}".rstrip("0").rstrip(".") in summary["offset_blocks"]["linuxcnc"]
-    again = analyse(NIST, parse_program(Path("placed.nc").read_text(), "placed.nc"), origin=PRESENT, step=5e-3)
+    again = analyze(NIST, parse_program(Path("placed.nc").read_text(), "placed.nc"), origin=PRESENT, step=5e-3)
     assert headline_figures(again)["mean_N_per_mm"] == pytest.approx(row["mean_N_per_mm"], rel=1e-6)
     printed = capsys.readouterr().out
     assert f"placement {number} of {len(earlier['front'])}, picked" in printed
@@ -301,7 +302,7 @@ def test_a_program_that_only_plunges_says_so(tmp_path, capsys):
 
 
 def test_effects_are_placed_by_the_plain_analysis(tmp_path):
-    """A model with an effect takes the other route; its figures are those of `analyse`."""
+    """A model with an effect takes the other route; its figures are those of `analyze`."""
     from toolpath_stiff.machine.model import EffectEntry
 
     machine = NIST.with_changes(effects=(EffectEntry("platform_flexibility", {"bar_stiffness_N_per_m": 2e8}),))
@@ -309,7 +310,7 @@ def test_effects_are_placed_by_the_plain_analysis(tmp_path):
     program = program_of("inch_bracket")
     placement = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7]])
     found = Evaluator(model, work_path(program, 4e-3), TANGENTIAL, 1000.0).figures(placement)
-    wanted = headline_figures(analyse(model, program, origin=tuple(placement[0]), step=4e-3))
+    wanted = headline_figures(analyze(model, program, origin=tuple(placement[0]), step=4e-3))
     assert found.mean[0] / 1e3 == pytest.approx(wanted["mean_N_per_mm"], rel=1e-9)
     assert found.spread[0] / 1e3 == pytest.approx(wanted["range_N_per_mm"], rel=1e-9)
 
@@ -322,7 +323,7 @@ def test_other_loads_are_those_of_the_plain_analysis(load):
     placements = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7], [0.0, 0.05, 0.8, 0.05, -0.03, 0.2]])
     found = Evaluator(MODEL, work_path(program, 4e-3, direction), direction, 1000.0).figures(placements)
     for i, placement in enumerate(placements):
-        analysis = analyse(MODEL, program, origin=tuple(placement), step=4e-3, load=direction)
+        analysis = analyze(MODEL, program, origin=tuple(placement), step=4e-3, load=direction)
         k = analysis.at.stiffness[analysis.counted]
         assert found.lowest[i] == pytest.approx(k.min(), rel=1e-9)
         assert found.mean[i] == pytest.approx(

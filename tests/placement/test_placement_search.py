@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from toolpath_stiff.analysis import analyse, parse_load
+from toolpath_stiff.analysis import analyze, parse_load
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
@@ -65,7 +65,7 @@ def test_batch_is_the_plain_analysis(name):
     placements = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7], [-0.1, 0.05, 1.0, 0, 0, 4.0]])
     found = Evaluator(MODEL, work_path(program, 2e-3), TANGENTIAL, 1000.0).figures(placements)
     for i, placement in enumerate(placements):
-        figures = headline_figures(analyse(MODEL, program, origin=tuple(placement), step=2e-3))
+        figures = headline_figures(analyze(MODEL, program, origin=tuple(placement), step=2e-3))
         assert found.mean[i] / 1e3 == pytest.approx(figures["mean_N_per_mm"], rel=1e-9)
         assert found.spread[i] / 1e3 == pytest.approx(figures["range_N_per_mm"], rel=1e-9)
         assert found.lowest[i] / 1e3 == pytest.approx(figures["min_N_per_mm"], rel=1e-9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.moves_factory import make_moves
-from toolpath_stiff.analysis import Analysis, analyse
+from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc.moves import RAPID, Program, ToolUse, Unsupported
 
@@ -31,7 +31,7 @@ def make_analysis(
         tools=tools,
         unsupported=unsupported,
     )
-    return analyse(load_machine("nist"), program, **options)  # type: ignore[arg-type]
+    return analyze(load_machine("nist"), program, **options)  # type: ignore[arg-type]
 
 
 def spiral_moves(turns: int = 5, radius: float = 0.25, per_turn: int = 36) -> list[dict[str, object]]:

@@ -6,14 +6,14 @@ from toolpath_stiff.analysis.loads import LOADS, Load, parse_load
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
 
 if TYPE_CHECKING:
-    from toolpath_stiff.analysis.results import Analysis, analyse
+    from toolpath_stiff.analysis.results import Analysis, analyze
 
-__all__ = ["LOADS", "Analysis", "Load", "PoseStiffness", "analyse", "evaluate", "parse_load"]
+__all__ = ["LOADS", "Analysis", "Load", "PoseStiffness", "analyze", "evaluate", "parse_load"]
 
 
 def __getattr__(name: str) -> object:
-    """`Analysis` and `analyse` on first use: they need NC programs, which single poses do without."""
-    if name in ("Analysis", "analyse"):
+    """`Analysis` and `analyze` on first use: they need NC programs, which single poses do without."""
+    if name in ("Analysis", "analyze"):
         from toolpath_stiff.analysis import results
 
         return getattr(results, name)

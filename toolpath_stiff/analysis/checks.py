@@ -11,9 +11,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.analysis.poses import PoseReport, evaluate_poses
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Machine
@@ -25,7 +26,7 @@ from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.operations import find_operations
 from toolpath_stiff.nc.reader import ZERO
-from toolpath_stiff.path import BLOCK, RAPID_FEED, Samples, move_durations, place, sample_moves
+from toolpath_stiff.path import BLOCK, Samples, move_durations, place, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import (
@@ -35,10 +36,9 @@ from toolpath_stiff.units import (
     mm_from_m,
     mm_per_min_from_m_per_s,
     n_per_mm_from_n_per_m,
+    n_per_um_from_n_per_m,
+    um_from_m,
 )
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 RADII_APART = m_from_mm(2e-3)  # what rounding I, J, K, X, Y to 0.001 mm explains, and a little more
 MOST_NAMED = 20  # lines named for one kind of finding
@@ -49,7 +49,6 @@ STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
 # N/um at the tool: "usually less than 1" for articulated robots, "very often greater than 50" for machining centres
 # (Pan, Zhang, Zhu, Wang 2006, J. Mater. Process. Technol. 173, 301).
 ROBOT, MACHINING_CENTRE, BEYOND = 1.0, 50.0, 1000.0
-LOAD = 1000.0  # N, for the deflection in words
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ class Figures:
     times: dict[str, float]
 
 
-def figures(moves: Moves, rapid_feed: float = RAPID_FEED) -> Figures:
+def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
     """Extents, lengths and times of moves; rapids at `rapid_feed`, m/s."""
     cutting = moves.motion != RAPID
     length, duration = move_lengths(moves), move_durations(moves, rapid_feed)
@@ -84,7 +83,7 @@ def figures(moves: Moves, rapid_feed: float = RAPID_FEED) -> Figures:
 
 
 def figures_of_parts(
-    moves: Moves, of_move: NDArray[np.int64], count: int, rapid_feed: float = RAPID_FEED
+    moves: Moves, of_move: IntArray, count: int, rapid_feed: float = defaults.RAPID_FEED
 ) -> list[Figures]:
     """The same of moves in `count` parts, each of them in the part that `of_move` (n,) says."""
     order = np.argsort(of_move, kind="stable")
@@ -240,7 +239,7 @@ def check_program(
     *,
     machine: Machine | None,
     origin: Pose | None = None,
-    step: float = 1e-3,
+    step: float = defaults.STEP,
     strut_speed: float | None = None,
     controller: Controller = UNKNOWN_CONTROL,
     block_delete: Switches = False,
@@ -294,7 +293,7 @@ def check_program(
 
 
 def check_parts(
-    checked: Checked, lines: Sequence[str], name: str, rapid_feed: float = RAPID_FEED
+    checked: Checked, lines: Sequence[str], name: str, rapid_feed: float = defaults.RAPID_FEED
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Tools in order of use, and operations in the order of the run: rows of `--json`, mm, degrees, s.
 
@@ -417,7 +416,7 @@ def _struts(machine: Machine) -> Iterator[str]:
 
 def _implausible(where: str, struts: list[tuple[float, float]]) -> Iterator[str]:
     for length, stiffness in struts:
-        value = stiffness / 1e6
+        value = n_per_um_from_n_per_m(stiffness)
         if STRUT_SOFTEST <= value <= STRUT_STIFFEST:
             continue
         per, other = ("N/mm", value / 1e3) if value > STRUT_STIFFEST else ("kN/um", value * 1e3)
@@ -429,7 +428,7 @@ def _implausible(where: str, struts: list[tuple[float, float]]) -> Iterator[str]
 
 
 def _stiffness(report: PoseReport) -> list[str]:
-    softest = float(report.softest_stiffness[0]) / 1e6
+    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
     if ROBOT <= softest <= BEYOND:
         return []
     beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
@@ -442,8 +441,9 @@ def neutral_words(machine: Machine, report: PoseReport) -> str:
     pose = " ".join(f"{axis}{mm_from_m(v) + 0.0:g}" for axis, v in zip("XYZ", (x, y, z), strict=True))
     turned = [f"{axis}{deg_from_rad(v) + 0.0:g}" for axis, v in zip("ABC", angles, strict=True) if v]
     kx, ky, kz = (n_per_mm_from_n_per_m(float(v)) for v in report.along_axes[0])
-    moved = ", ".join(f"{1e3 * LOAD / k:.3g} um along {axis}" for axis, k in zip("XYZ", (kx, ky, kz), strict=True))
-    softest = float(report.softest_stiffness[0]) / 1e6
+    along = (um_from_m(defaults.FORCE / float(k)) for k in report.along_axes[0])
+    moved = ", ".join(f"{moved:.3g} um along {axis}" for axis, moved in zip("XYZ", along, strict=True))
+    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
     if softest < ROBOT:
         words = "as soft as a robot arm"
     elif softest <= MACHINING_CENTRE:
@@ -454,7 +454,7 @@ def neutral_words(machine: Machine, report: PoseReport) -> str:
         words = "stiffer than any machine tool"
     return (
         f"at the neutral pose {' '.join([pose, *turned])}: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; "
-        f"{LOAD:g} N move the tool by {moved}; softest direction {softest:.3g} N/um, {words}"
+        f"{defaults.FORCE:g} N move the tool by {moved}; softest direction {softest:.3g} N/um, {words}"
     )
 
 

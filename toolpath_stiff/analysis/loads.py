@@ -16,14 +16,11 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import rad_from_deg
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 # Poses (n,) of all and, unless all directions are meant, unit vectors (k, 3) to stay across: to directions (k, 3).
 Softest = Callable[[BoolArray, FloatArray | None], FloatArray]
@@ -45,7 +42,6 @@ RULES = {
 # Below this sine of the angle between motion and tool axis (0.06 degrees) "sideways" has no meaning.
 ALONG_AXIS = 1e-3
 
-PLUNGE_ANGLE = rad_from_deg(5.0)  # rad between motion and tool axis; helical and ramping entries are well beyond it
 ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"
 BLOCK = 16_384  # samples at a time: nine numbers for each
 
@@ -54,7 +50,7 @@ BLOCK = 16_384  # samples at a time: nine numbers for each
 class Load:
     """A load direction: one of `LOADS`, or "fixed" with a unit vector in machine axes."""
 
-    kind: str = "tangential"
+    kind: str = defaults.LOAD
     vector: tuple[float, float, float] | None = None
 
     def __str__(self) -> str:
@@ -185,7 +181,7 @@ def _principal(compliance: FloatArray, which: int) -> FloatArray:
 
 
 def along_tool_axis(tangent: FloatArray, abc: FloatArray) -> BoolArray:
-    """Whether the tip moves along the tool axis, in either sense, within `PLUNGE_ANGLE`.
+    """Whether the tip moves along the tool axis, in either sense, within `defaults.PLUNGE_ANGLE`.
 
     Parameters
     ----------
@@ -205,7 +201,7 @@ def along_tool_axis(tangent: FloatArray, abc: FloatArray) -> BoolArray:
             along[rows] = np.einsum("ni,ni->n", tangent[rows], rotation_matrices(abc[rows])[:, :, 2])
         else:  # upright
             along[rows] = tangent[rows, 2]
-    return np.asarray(np.abs(along) >= np.cos(PLUNGE_ANGLE))
+    return np.asarray(np.abs(along) >= np.cos(defaults.PLUNGE_ANGLE))
 
 
 def plunging_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: BoolArray) -> BoolArray:

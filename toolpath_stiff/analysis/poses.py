@@ -10,20 +10,16 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load, load_directions, softest_directions, stiffest_directions
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Limit, Reach, machine_limits, reach
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import StiffnessModel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
 Progress = Callable[[int, int], None]
@@ -81,7 +77,7 @@ def evaluate(
     tangent: FloatArray,
     tool_length: FloatArray | float = np.nan,
     load: Load | None = None,
-    force: float = DEFAULT_FORCE,
+    force: float = defaults.FORCE,
     progress: Progress | None = None,
 ) -> PoseStiffness:
     """Evaluate n poses.
@@ -102,6 +98,16 @@ def evaluate(
         N; only load-dependent effects ask for it.
     progress
         Called with (poses done, poses in all).
+
+    Examples
+    --------
+    >>> from toolpath_stiff.analysis.loads import parse_load
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> position, zeros = np.array([[0.0, 0.0, 0.8], [0.2, 0.0, 0.8]]), np.zeros((2, 3))
+    >>> found = evaluate(build_model(load_machine("nist")), position, zeros, zeros, load=parse_load("x"))
+    >>> (found.stiffness / 1e3).round()  # N/mm
+    array([54823., 49735.])
     """
     n = len(position)
     load = load or Load()
@@ -217,7 +223,7 @@ class PoseReport:
     stiffest: FloatArray
     stiffest_stiffness: FloatArray
     strut_lengths: FloatArray
-    extrapolated: NDArray[np.bool_]
+    extrapolated: BoolArray
     reach: Reach
 
 
@@ -226,7 +232,7 @@ def evaluate_poses(
     position: FloatArray,
     abc: FloatArray,
     tool_length: float = np.nan,
-    force: float = DEFAULT_FORCE,
+    force: float = defaults.FORCE,
 ) -> PoseReport:
     """Evaluate n poses: position (n, 3) m, abc (n, 3) rad; `tool_length` in m (nan: the reference tool)."""
     rotation = rotation_matrices(abc)
@@ -305,7 +311,7 @@ def map_stiffness(
     load: Load,
     points: int = 61,
     abc: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    force: float = DEFAULT_FORCE,
+    force: float = defaults.FORCE,
     progress: Progress | None = None,
 ) -> StiffnessMap:
     """Evaluate a grid of poses.
@@ -331,6 +337,16 @@ def map_stiffness(
         The load needs a path, an area has no extent, or there are too many points.
     UnreachableError
         Nothing of the grid can be reached.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.analysis.loads import parse_load
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> model = build_model(load_machine("nist"))
+    >>> found = map_stiffness(model, (-0.1, 0.1), (-0.1, 0.1), [0.8], parse_load("x"), points=3)
+    >>> found.stiffness.shape, round(float(found.stiffness[0, 1, 1]) / 1e3)  # N/mm in the middle
+    ((1, 3, 3), 54823)
     """
     if load.kind in ("tangential", "normal"):
         raise InputError(

@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import RULES, Load, parse_load
 from toolpath_stiff.analysis.poses import PoseStiffness, Progress, evaluate
 from toolpath_stiff.analysis.statistics import (
@@ -25,11 +25,11 @@ from toolpath_stiff.analysis.statistics import (
     share,
     weakest_places,
 )
-from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.arrays import IntArray
+from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
 from toolpath_stiff.path import Samples, place, sample_moves
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.stiffness.model import (
     StiffnessModel,
     acting_effects,
@@ -42,11 +42,6 @@ from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
-DEFAULT_STEP = 1e-3  # m; 1 mm resolves any feature that a mill can cut, and costs microseconds
 
 
 @dataclass(frozen=True)
@@ -95,18 +90,18 @@ class Analysis(EvaluatedPath):
         return summarise(self)
 
 
-def analyse(
+def analyze(
     machine: Machine | StiffnessModel,
     program: Program,
     *,
     origin: Pose | None = None,
-    load: Load | str = "tangential",
-    step: float = DEFAULT_STEP,
-    force: float = DEFAULT_FORCE,
+    load: Load | str = defaults.LOAD,
+    step: float = defaults.STEP,
+    force: float = defaults.FORCE,
     partial: bool = False,
     progress: Progress | None = None,
 ) -> Analysis:
-    """Stiffness along the path of a program.
+    r"""Stiffness along the path of a program.
 
     Parameters
     ----------
@@ -133,39 +128,30 @@ def analyse(
         A cutting sample is out of reach and `partial` is not set.
     InputError
         The program cuts nothing, or uses machine coordinates and was read for another origin.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.nc import parse_program
+    >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc")
+    >>> found = analyze(load_machine("nist"), slot, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
+    >>> summary = found.summary()
+    >>> round(summary["mean_N_per_mm"]), round(summary["min_N_per_mm"]), summary["headline"]
+    (54353, 53875, 'across the tool axis')
     """
     model = machine if isinstance(machine, StiffnessModel) else build_model(machine)
     direction = parse_load(load) if isinstance(load, str) else load
     place_at, source = _effective_origin(model.machine, program, origin)
     moves = place(program.moves, place_at)
     samples = sample_moves(moves, step=step, rapid_feed=model.machine.rapid_feed, origin=place_at)
-    at = evaluate(
-        model,
-        samples.position,
-        samples.abc,
-        samples.tangent,
-        samples.tool_length,
-        direction,
-        force,
-        progress,
-    )
+    path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+    at = evaluate(model, *path, direction, force, progress)
     tool_given = not np.isnan(samples.tool_length[samples.cutting]).any()
+    warnings = (*program.warnings, *condition_warnings(model, tool_given), *_warnings(samples, at))
     analysis = Analysis(
-        program=program,
-        model=model,
-        origin=place_at,
-        origin_source=source,
-        load=direction,
-        force=force,
-        step=step,
-        samples=samples,
-        at=at,
-        warnings=(
-            *program.warnings,
-            *condition_warnings(model, tool_given),
-            *_warnings(samples, at),
-        ),
-    )
+        program=program, model=model, origin=place_at, origin_source=source, load=direction, force=force, step=step,
+        samples=samples, at=at, warnings=warnings,
+    )  # fmt: skip
     _check_reach(analysis, partial)
     return analysis
 
@@ -179,7 +165,7 @@ def _effective_origin(machine: Machine, program: Program, origin: Pose | None) -
     else:
         chosen, source = program.origin, program.origin_source
     if program.moves.from_machine.any() and not np.allclose(chosen, program.origin, rtol=0.0, atol=1e-12):
-        raise InputError(
+        raise ProgramError(
             "moves in machine coordinates (G53, G28, G30) depend on where program zero sits",
             hint=f"read the program with origin={tuple(round(v, 9) for v in chosen)}",
             file=program.name,
@@ -207,7 +193,7 @@ def _warnings(samples: Samples, at: PoseStiffness) -> list[str]:
     return found
 
 
-def _lines(lines: NDArray[np.int64], most: int = 5) -> str:
+def _lines(lines: IntArray, most: int = 5) -> str:
     """Line numbers in words: "lines 3, 4, 9 and 12 more"."""
     shown = ", ".join(str(line) for line in lines[:most])
     more = f" and {len(lines) - most} more" if len(lines) > most else ""
@@ -226,7 +212,9 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     """Refuse a program that cuts nothing, or, unless `partial`, whose cuts leave the machine's reach."""
     samples, at = analysis.samples, analysis.at
     if not samples.cutting.any():
-        raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=analysis.program.name)
+        raise ProgramError(
+            "no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=analysis.program.name
+        )
     bad = analysis.out_of_reach
     if not bad.any() or (partial and not bad[samples.cutting].all()):
         return

@@ -14,10 +14,11 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_of, headline_words, plunging_rows
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.moves import RAPID, Program
@@ -29,9 +30,6 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m,
 if TYPE_CHECKING:
     import pandas as pd
 
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
 # Of `samples.csv`, Parquet and the DataFrame, with their decimals.
@@ -47,7 +45,6 @@ COLUMNS: dict[str, int | None] = {
 }
 
 STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
-NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,7 @@ class EvaluatedPath:
         return operations(self.program)
 
     @property
-    def operation(self) -> NDArray[np.int64]:
+    def operation(self) -> IntArray:
         """(n,) number of each sample's operation, from 1."""
         return np.asarray(self.operations.of_move[self.samples.move] + 1)
 
@@ -399,10 +396,10 @@ def band_figures(path: EvaluatedPath, band: ParameterBand) -> dict[str, Any] | N
 
 
 def _interval(value: float, sd: float) -> list[float]:
-    return [n_per_mm_from_n_per_m(value + sign * NORMAL_95 * sd) for sign in (-1.0, 1.0)]
+    return [n_per_mm_from_n_per_m(value + sign * defaults.NORMAL_95 * sd) for sign in (-1.0, 1.0)]
 
 
-def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, AnyArray]:
     """Column name -> values in the shop's units, for some rows."""
     at = path.at
     names = np.array([limit.name for limit in at.limits] or ["none"])
@@ -418,7 +415,7 @@ def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, 
     }
 
 
-def _cut(samples: Samples) -> NDArray[np.str_]:
+def _cut(samples: Samples) -> TextArray:
     """(n,) "across" or "plunge", whatever the load; "" on rapids and where the tip does not move."""
     moving = samples.cutting & samples.tangent.any(axis=1)
     return np.where(moving, np.where(along_tool_axis(samples.tangent, samples.abc), "plunge", "across"), "")

@@ -17,9 +17,10 @@ from toolpath_stiff.api.inputs import (
     whole,
 )
 from toolpath_stiff.api.results import FolderResult, Progress, Result, one_of, teller
+from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
-from toolpath_stiff.hints import MACHINE, Asked, options
+from toolpath_stiff.hints import Asked, options
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:

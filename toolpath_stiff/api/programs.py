@@ -192,7 +192,7 @@ def analyze(
     require_N_per_mm
         Stiffness that every cut must have; `below_required` lists those that have not.
     compare_with
-        Another machine to analyse the program on.
+        Another machine to analyze the program on.
     progress
         Called with what is being done, samples done, samples in all.
 
@@ -213,7 +213,7 @@ def analyze(
     >>> found.to_frame()[["line", "x_mm", "stiffness_N_per_mm"]].tail(1).round(0).values.tolist()
     [[4.0, 40.0, 53875.0]]
     """
-    from toolpath_stiff.analysis import analyse
+    from toolpath_stiff.analysis import analyze
 
     first, part = machine_from(machine), program_from(program)
     second = None
@@ -233,7 +233,7 @@ def analyze(
     def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> PathAnalysis:
         model = one.running(part, [other] if other else [])
         read = part.moves(options["origin"], model.machine.default_origin)
-        return analyse(model, read, progress=told, **options)
+        return analyze(model, read, progress=told, **options)
 
     path = on(first, second, counter(progress, f"{part.name}: samples"))
     return Analysis(

@@ -100,11 +100,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N_PER_MM",
         help="stiffness that every cutting move must have; those below are listed (exit code 3)",
     )
-    parser.add_argument("--compare", metavar="MACHINE", help="also analyse on this machine (name or file) and compare")
+    parser.add_argument("--compare", metavar="MACHINE", help="also analyze on this machine (name or file) and compare")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Analyse one program, or hand several, or a folder, to `batch`."""
+    """Analyze one program, or hand several, or a folder, to `batch`."""
     from toolpath_stiff.cli.programs import find_programs
     from toolpath_stiff.cli.workers import job_count
 
@@ -138,7 +138,7 @@ def analysis_of(
 
 
 def _run_single(args: argparse.Namespace, file: str) -> int:
-    """Analyse, write, print; the exit code."""
+    """Analyze, write, print; the exit code."""
     from toolpath_stiff.report.analysis import names
 
     target = destination(args, "analyze", [file]).check(names(not args.no_plots, args.format))

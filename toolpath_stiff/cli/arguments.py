@@ -9,8 +9,8 @@ import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import MACHINE
 from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:

@@ -46,7 +46,7 @@ class Setting:
 
 
 def run_batch(args: argparse.Namespace, found: Sequence[Found], counts: Sequence[FolderCount], jobs: int) -> int:
-    """Analyse the programs, `jobs` at a time, write the overview, print; the exit code.
+    """Analyze the programs, `jobs` at a time, write the overview, print; the exit code.
 
     Raises
     ------
@@ -150,12 +150,12 @@ def start_worker(setting: Setting) -> Callable[[Listed], Outcome]:
     machine = machine_for(setting.args)
 
     def work(program: Listed) -> Outcome:
-        return _analyse(setting, program, machine)
+        return _analyze(setting, program, machine)
 
     return work
 
 
-def _analyse(setting: Setting, program: Listed, machine: Machine) -> Outcome:
+def _analyze(setting: Setting, program: Listed, machine: Machine) -> Outcome:
     args, target = setting.args, setting.target(program.folder)
     try:
         found = analysis_of(args, program.file, machine)
@@ -172,7 +172,7 @@ def _analyse(setting: Setting, program: Listed, machine: Machine) -> Outcome:
         return Outcome(program.name, program.file, f"{program.file}: out of memory; try fewer --jobs")
     except Exception as error:  # a defect of ours: it must not stop the other programs
         told = " ".join(f"{type(error).__name__}: {error}".split())
-        return Outcome(program.name, program.file, f"{program.file}: {told} (a defect; analyse it alone to see where)")
+        return Outcome(program.name, program.file, f"{program.file}: {told} (a defect; analyze it alone to see where)")
     opens = "summary.json" if setting.args.no_plots else "report.html"
     return Outcome(program.name, program.file, "", (program.folder / opens).as_posix(), figures_of(found.to_dict()))
 

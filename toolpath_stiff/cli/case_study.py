@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Analyse the regions and write the files."""
+    """Analyze the regions and write the files."""
     from toolpath_stiff.api.placements import case_study
     from toolpath_stiff.report.case_study import names
 

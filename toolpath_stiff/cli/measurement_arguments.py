@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import add_json_option, finite_number
 from toolpath_stiff.cli.outputs import add_replace_option
-from toolpath_stiff.hints import MACHINE, STRUT_SPREAD
+from toolpath_stiff.defaults import MACHINE, STRUT_SPREAD
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.inputs import Machine

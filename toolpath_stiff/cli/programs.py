@@ -43,7 +43,7 @@ class FolderCount:
 
 @dataclass(frozen=True)
 class Listed:
-    """A program to analyse: its file, a short name that no other program has, its report folder below `--out`."""
+    """A program to analyze: its file, a short name that no other program has, its report folder below `--out`."""
 
     file: str
     name: str

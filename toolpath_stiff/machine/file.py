@@ -8,28 +8,32 @@ fall back to a default; the message has section, key, value and bound.
 from __future__ import annotations
 
 import math
-import re
-import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError, MachineFileError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, StrutLaw, read_uncertainty
 from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
-from toolpath_stiff.units import Pose, m_from_mm, m_per_s_from_mm_per_min, mm_from_m, rad_from_deg
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.toml_reader import TomlReader, is_number, is_text, shortened
+from toolpath_stiff.units import (
+    Pose,
+    m_from_mm,
+    m_per_s_from_mm_per_min,
+    mm_from_m,
+    n_per_m_from_n_per_um,
+    rad_from_deg,
+)
 
 INFINITY = math.inf
 
-DEFAULT_MACHINE = "nist"
 # Smallest singular value of the six strut screws (arms in units of the platform's size) that is no singularity.
 SINGULAR = 1e-6
 
@@ -98,7 +102,7 @@ def as_array(raw: Any) -> FloatArray | None:
     def numeric(item: Any) -> bool:
         if isinstance(item, list):
             return all(numeric(part) for part in item)
-        return isinstance(item, int | float) and not isinstance(item, bool)
+        return is_number(item)
 
     if not numeric(raw):
         return None
@@ -127,19 +131,13 @@ def describe(rule: Key) -> str:
     return f"{shape}{unit}, {low}{high}"
 
 
-def shorten(raw: Any) -> str:
-    """A value as it stands, cut for a message."""
-    text = repr(raw)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
 def packaged_machines() -> dict[str, Path]:
     """Name -> file of the machines that ship with the package."""
     folder = Path(str(resources.files("toolpath_stiff"))) / "data" / "machines"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def load_machine(name_or_file: str | Path = DEFAULT_MACHINE) -> Machine:
+def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
     """Load a machine by the name of a packaged one or from a machine file.
 
     Parameters
@@ -151,6 +149,14 @@ def load_machine(name_or_file: str | Path = DEFAULT_MACHINE) -> Machine:
     ------
     InputError
         There is no such machine or file, or the file is wrong; the message has section, key, value, bound.
+
+    Examples
+    --------
+    >>> machine = load_machine("nist")
+    >>> machine.name, machine.frame_joints.shape
+    ('nist', (6, 3))
+    >>> round(machine.reference_tool_length, 5)
+    0.15
     """
     known = packaged_machines()
     if str(name_or_file) in known:
@@ -159,7 +165,7 @@ def load_machine(name_or_file: str | Path = DEFAULT_MACHINE) -> Machine:
     path = Path(name_or_file)
     if not path.is_file():
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
-        raise InputError(
+        raise MachineFileError(
             f"machine {str(name_or_file)!r} is neither a packaged machine nor a file",
             expected=f"one of {', '.join(known)}, or a machine file",
             hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
@@ -167,7 +173,7 @@ def load_machine(name_or_file: str | Path = DEFAULT_MACHINE) -> Machine:
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(
+        raise MachineFileError(
             f"not a text file (byte {error.start})", expected="a machine file (TOML, UTF-8)", file=str(path)
         ) from None
     return parse_machine(text, file=str(path))
@@ -175,274 +181,255 @@ def load_machine(name_or_file: str | Path = DEFAULT_MACHINE) -> Machine:
 
 def parse_machine(text: str, file: str = "machine.toml") -> Machine:
     """Parse the text of a machine file; `file` is only used in messages. Raises `InputError`."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
-        line, column = (int(place[1]), int(place[2])) if place else (None, None)
-        reason = str(error).split(" (at ")[0]
-        raise InputError(f"not valid TOML: {reason}", file=file, line=line, column=column) from None
-    reader = _Reader(text, file)
-    return reader.machine(table)
+    toml = TomlReader(text, file, kind=MachineFileError)
+    return _machine(toml, toml.data)
 
 
-class _Reader:
-    """Reads one machine file; holds its text so that messages can name lines."""
+def _fail(toml: TomlReader, section: str, key: str, found: str, expected: str = "", hint: str = "") -> InputError:
+    label = f"[{section}] {key}".strip() if section else key
+    line = toml.line_of(section, key)
+    return MachineFileError(f"{label}{found}", expected=expected, hint=hint, file=toml.file, line=line)
 
-    def __init__(self, text: str, file: str) -> None:
-        self.lines = text.splitlines()
-        self.file = file
 
-    def fail(self, section: str, key: str, found: str, expected: str = "", hint: str = "") -> InputError:
-        label = f"[{section}] {key}".strip() if section else key
-        return InputError(
-            f"{label}{found}", expected=expected, hint=hint, file=self.file, line=self.line_of(section, key)
-        )
+def _machine(toml: TomlReader, table: dict[str, Any]) -> Machine:
+    sections = _sections(toml, table)
+    values = {name: _section(toml, name, content) for name, content in sections.items()}
+    top, setup = values[""], values.get("setup", {})
+    effects, instruments = _entries(toml, table, "effect"), _entries(toml, table, "instrument")
+    machine = Machine(
+        name=top["name"],
+        title=top.get("title", top["name"]),
+        source=top.get("source", ""),
+        frame_joints=_joints(toml, "frame_joints", values),
+        platform_joints=_joints(toml, "platform_joints", values),
+        reference_tool_length=m_from_mm(values["reference_tool"]["length_mm"]),
+        strut_law=_strut_law(toml, values["strut_law"]),
+        platform_bar_stiffness=values.get("platform", {}).get("bar_stiffness_N_per_m", INFINITY),
+        limits=_limits(toml, values),
+        default_origin=_pose(setup.get("default_origin_mm", np.zeros(3))),
+        rapid_feed=m_per_s_from_mm_per_min(setup["rapid_mm_per_min"]) if setup else defaults.RAPID_FEED,
+        setup=setup.get("name"),
+        temperature=setup.get("temperature_C"),
+        setups=setup.get("names", ()),
+        origins={name: v["origin"] for name, v in values.items() if name and "origin" in v},
+        remarks={name: v["remark"] for name, v in values.items() if name and "remark" in v},
+        effects=effects,
+        instruments=instruments,
+        uncertainty=read_uncertainty(toml, (*effects, *instruments)),
+    )
+    _check_law(toml, machine)
+    _check_neutral_pose(toml, machine)
+    return machine
 
-    def line_of(self, section: str, key: str, nth: int = 0) -> int | None:
-        """Line on which a key of a section (the nth of its name) stands, None if it is not found."""
-        inside = section == ""
-        seen = -1
-        for number, line in enumerate(self.lines, 1):
-            header = re.match(r"\s*\[\[?\s*([\w.]+)\s*\]", line)
-            if header:
-                seen += header[1] == section
-                inside = header[1] == section and seen == nth
-                if inside and not key:
-                    return number
-            elif inside and key and re.match(rf"\s*{re.escape(key)}\s*=", line):
-                return number
-        return None
 
-    def machine(self, table: dict[str, Any]) -> Machine:
-        sections = self.sections(table)
-        values = {name: self.section(name, content) for name, content in sections.items()}
-        top, setup = values[""], values.get("setup", {})
-        effects, instruments = self.entries(table, "effect"), self.entries(table, "instrument")
-        machine = Machine(
-            name=top["name"],
-            title=top.get("title", top["name"]),
-            source=top.get("source", ""),
-            frame_joints=self.joints("frame_joints", values),
-            platform_joints=self.joints("platform_joints", values),
-            reference_tool_length=m_from_mm(values["reference_tool"]["length_mm"]),
-            strut_law=self.strut_law(values["strut_law"]),
-            platform_bar_stiffness=values.get("platform", {}).get("bar_stiffness_N_per_m", INFINITY),
-            limits=self.limits(values),
-            default_origin=_pose(setup.get("default_origin_mm", np.zeros(3))),
-            rapid_feed=m_per_s_from_mm_per_min(setup.get("rapid_mm_per_min", 10000.0)),
-            setup=setup.get("name"),
-            temperature=setup.get("temperature_C"),
-            setups=setup.get("names", ()),
-            origins={name: v["origin"] for name, v in values.items() if name and "origin" in v},
-            remarks={name: v["remark"] for name, v in values.items() if name and "remark" in v},
-            effects=effects,
-            instruments=instruments,
-            uncertainty=read_uncertainty(
-                table.get("uncertainty"),
-                (*effects, *instruments),
-                lambda key, found, expected: self.fail("uncertainty", key, found, expected),
-            ),
-        )
-        self.check_law(machine)
-        self.check_neutral_pose(machine)
-        return machine
-
-    def check_law(self, machine: Machine) -> None:
-        """The struts must keep some stiffness over their whole travel."""
-        law = machine.strut_law
-        for key, length in zip(("min_mm", "max_mm"), machine.limits.strut_length, strict=True):
-            if np.isfinite(length) and law.intercept + law.slope * length <= 0.0:
-                vanishes = mm_from_m(-law.intercept / law.slope)
-                raise self.fail(
-                    "limits.strut_length",
-                    key,
-                    f" = {mm_from_m(length):g}: the strut law leaves no stiffness there",
-                    expected=f"a travel on this side of {vanishes:.1f} mm, where the law vanishes",
-                )
-
-    def check_neutral_pose(self, machine: Machine) -> None:
-        """Margins are counted from the neutral pose, so the machine must not be singular there."""
-        struts = solve_struts_at(machine, machine.limits.neutral_pose)
-        directions, arms = struts.directions[0], struts.arms[0] - struts.arms[0].mean(axis=0)
-        size = max(float(np.linalg.norm(arms, axis=1).mean()), 1e-9)
-        screws = np.concatenate([directions, np.cross(arms, directions) / size], axis=1)
-        if not np.isfinite(screws).all() or np.linalg.svd(screws)[1][-1] < SINGULAR:
-            symmetry = find_symmetry(machine)
-            strays = "; ".join(describe_stray(stray, symmetry.kind) for stray in symmetry.strays)
-            raise self.fail(
-                "limits.joint_angle",
-                "neutral_pose_mm_deg",
-                ": the machine is singular there",
-                expected="a pose in the middle of the workspace",
-                hint=strays or "check the joints as well: similar hexagons without a twist are singular everywhere",
-            )
-
-    def sections(self, table: dict[str, Any]) -> dict[str, dict[str, Any]]:
-        """Split the file into the sections of the schema; unknown and missing ones are errors."""
-        found: dict[str, dict[str, Any]] = {"": {}}
-        for name, content in table.items():
-            if name in ("effect", "instrument", "uncertainty"):
-                continue
-            if name == "limits" and isinstance(content, dict):
-                for sub, inner in content.items():
-                    if f"limits.{sub}" not in SECTIONS:
-                        raise self.unknown(f"limits.{sub}", list(SECTIONS))
-                    found[f"limits.{sub}"] = self.table("limits." + sub, inner)
-            elif name in SECTIONS:
-                found[name] = self.table(name, content)
-            elif isinstance(content, dict):
-                raise self.unknown(name, list(SECTIONS))
-            else:
-                found[""][name] = content
-        for name in SECTIONS:
-            if name not in found and name not in OPTIONAL_SECTIONS:
-                raise InputError(
-                    f"section [{name}] is missing",
-                    hint="`tps machine new template.toml` writes a template with every section",
-                    file=self.file,
-                )
-        return found
-
-    def table(self, name: str, content: Any) -> dict[str, Any]:
-        if not isinstance(content, dict):
-            raise self.fail("", name, f" = {content!r}", expected=f"a section [{name}]")
-        return content
-
-    def unknown(self, name: str, known: list[str]) -> InputError:
-        sections = ", ".join(f"[{n}]" for n in known if n)
-        return InputError(
-            f"unknown section [{name}]",
-            expected=f"one of {sections}, [[effect]], [[instrument]], [uncertainty]",
-            file=self.file,
-            line=self.line_of(name, ""),
-        )
-
-    def section(self, name: str, content: dict[str, Any]) -> dict[str, Any]:
-        keys = SECTIONS[name]
-        allowed = [*keys, *(("origin", "remark") if name else ())]
-        for key in content:
-            if key not in allowed:
-                raise self.fail(name, key, ": unknown key", expected=f"one of {', '.join(allowed)}")
-        for key, rule in keys.items():
-            if rule.required and key not in content:
-                raise self.fail(name, key, " is missing", expected=describe(rule))
-        if name and name != "setup" and content.get("origin") not in ORIGINS:
-            raise self.fail(
-                name,
-                "origin",
-                f" = {content['origin']!r}" if "origin" in content else " is missing",
-                expected=f"one of {', '.join(ORIGINS)}",
-            )
-        return {k: self.value(name, k, v, keys[k]) if k in keys else str(v) for k, v in content.items()}
-
-    def value(self, section: str, key: str, raw: Any, rule: Key) -> Any:
-        shown = shorten(raw)
-        if rule.text and rule.shape:
-            if not isinstance(raw, list) or not all(map(_is_text, raw)) or len(set(raw)) < len(raw):
-                raise self.fail(section, key, f" = {shown}", expected="a list of names, each once")
-            return tuple(raw)
-        if rule.text:
-            if not _is_text(raw):
-                raise self.fail(section, key, f" = {shown}", expected="a text that is not empty")
-            return raw
-        array = as_array(raw)
-        shapes = [rule.shape, *([(rule.also_length,)] if rule.also_length else [])]
-        if array is None or array.shape not in shapes:
-            raise self.fail(section, key, f" = {shown}", expected=describe(rule))
-        bad = np.isnan(array) | (array < rule.low) | (array > rule.high)
-        if rule.open_low:
-            bad |= array <= rule.low
-        if not rule.infinite:
-            bad |= np.isinf(array)
-        if bad.any():
-            worst = float(array[bad][0])
-            raise self.fail(section, key, f" = {worst:g}", expected=describe(rule))
-        return float(array) if array.ndim == 0 else array
-
-    def joints(self, section: str, values: dict[str, dict[str, Any]]) -> FloatArray:
-        """(6, 3) m from whichever of the two forms is given."""
-        given = [key for key in ("mm", "cylindrical_mm_deg") if key in values[section]]
-        if len(given) != 1:
-            raise self.fail(
-                section,
-                "mm",
-                " and cylindrical_mm_deg are both given" if given else " is missing",
-                expected="one of mm (6 rows x, y, z) and cylindrical_mm_deg (6 rows radius, angle, height)",
-            )
-        rows = values[section][given[0]]
-        if given[0] == "cylindrical_mm_deg":
-            angle = rad_from_deg(rows[:, 1])
-            rows = np.column_stack([rows[:, 0] * np.cos(angle), rows[:, 0] * np.sin(angle), rows[:, 2]])
-        return m_from_mm(rows)
-
-    def strut_law(self, values: dict[str, Any]) -> StrutLaw:
-        lengths, stiffnesses = m_from_mm(values["length_mm"]), values["stiffness_N_per_um"] * 1e6
-        if lengths[0] == lengths[1]:
-            raise self.fail("strut_law", "length_mm", ": both lengths are equal", "two lengths apart")
-        return StrutLaw(float(lengths[0]), float(stiffnesses[0]), float(lengths[1]), float(stiffnesses[1]))
-
-    def limits(self, values: dict[str, dict[str, Any]]) -> Limits:
-        strut = values["limits.strut_length"]
-        if not strut["min_mm"] < strut["max_mm"]:
-            raise self.fail(
+def _check_law(toml: TomlReader, machine: Machine) -> None:
+    """The struts must keep some stiffness over their whole travel."""
+    law = machine.strut_law
+    for key, length in zip(("min_mm", "max_mm"), machine.limits.strut_length, strict=True):
+        if np.isfinite(length) and law.intercept + law.slope * length <= 0.0:
+            vanishes = mm_from_m(-law.intercept / law.slope)
+            raise _fail(
+                toml,
                 "limits.strut_length",
-                "max_mm",
-                f" = {strut['max_mm']:g}",
-                expected=f"more than min_mm = {strut['min_mm']:g}",
+                key,
+                f" = {mm_from_m(length):g}: the strut law leaves no stiffness there",
+                expected=f"a travel on this side of {vanishes:.1f} mm, where the law vanishes",
             )
-        given: dict[str, Any] = {"strut_length": (m_from_mm(strut["min_mm"]), m_from_mm(strut["max_mm"]))}
-        box = values.get("limits.workspace")
-        if box:
-            if not (box["min_mm"] < box["max_mm"]).all():
-                raise self.fail(
-                    "limits.workspace",
-                    "max_mm",
-                    ": not above min_mm",
-                    expected="max_mm > min_mm in x, y and z",
-                )
-            given["workspace"] = m_from_mm(np.array([box["min_mm"], box["max_mm"]]))
-        angles = values.get("limits.joint_angle")
-        if angles:
-            given["frame_joint_angle"] = rad_from_deg(angles["frame_max_deg"])
-            given["platform_joint_angle"] = rad_from_deg(angles["platform_max_deg"])
-            given["neutral_pose"] = _pose(angles["neutral_pose_mm_deg"])
-        else:  # joints without limits: the neutral pose only serves the singularity index
-            given["neutral_pose"] = _pose(values.get("setup", {}).get("default_origin_mm", np.zeros(3)))
-        if "limits.singularity" in values:
-            given["singularity"] = values["limits.singularity"]["min_index"]
-        return Limits(**given)
-
-    def entries(self, table: dict[str, Any], kind: str) -> tuple[EffectEntry, ...]:
-        """`[[effect]]` and `[[instrument]]`: a name, the parameters in SI, the provenance if there is one.
-
-        What the parameters mean, and their bounds, is known to the effects themselves (the room above).
-        """
-        rows = table.get(kind, [])
-        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-            raise self.fail("", kind, f" is not a list of tables; write [[{kind}]]")
-        return tuple(self.entry(row, kind, nth) for nth, row in enumerate(rows))
-
-    def entry(self, row: dict[str, Any], kind: str, nth: int) -> EffectEntry:
-        """The nth entry of its kind."""
-        found = {key: self.line_of(kind, key, nth) for key in ("", *row)}
-        lines = {key: line for key, line in found.items() if line is not None}
-
-        def refuse(key: str, told: str, expected: str) -> InputError:
-            line = lines.get(key, lines.get(""))
-            return InputError(f"[[{kind}]] {key}{told}", expected=expected, file=self.file, line=line)
-
-        name, provenance = row.get("name"), row.get("provenance", {})
-        if not isinstance(name, str) or not name:
-            raise refuse("name", " is missing" if name is None else f" = {name!r}", "an effect's name")
-        if not isinstance(provenance, dict):
-            raise refuse("provenance", f" = {shorten(provenance)}", f"a table [{kind}.provenance]")
-        parameters = {key: value for key, value in row.items() if key not in ("name", "provenance")}
-        return EffectEntry(name, parameters, provenance, self.file, lines)
 
 
-def _is_text(raw: Any) -> bool:
-    return isinstance(raw, str) and bool(raw.strip())
+def _check_neutral_pose(toml: TomlReader, machine: Machine) -> None:
+    """Margins are counted from the neutral pose, so the machine must not be singular there."""
+    struts = solve_struts_at(machine, machine.limits.neutral_pose)
+    directions, arms = struts.directions[0], struts.arms[0] - struts.arms[0].mean(axis=0)
+    size = max(float(np.linalg.norm(arms, axis=1).mean()), 1e-9)
+    screws = np.concatenate([directions, np.cross(arms, directions) / size], axis=1)
+    if not np.isfinite(screws).all() or np.linalg.svd(screws)[1][-1] < SINGULAR:
+        symmetry = find_symmetry(machine)
+        strays = "; ".join(describe_stray(stray, symmetry.kind) for stray in symmetry.strays)
+        raise _fail(
+            toml,
+            "limits.joint_angle",
+            "neutral_pose_mm_deg",
+            ": the machine is singular there",
+            expected="a pose in the middle of the workspace",
+            hint=strays or "check the joints as well: similar hexagons without a twist are singular everywhere",
+        )
+
+
+def _sections(toml: TomlReader, table: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Split the file into the sections of the schema; unknown and missing ones are errors."""
+    found: dict[str, dict[str, Any]] = {"": {}}
+    for name, content in table.items():
+        if name in ("effect", "instrument", "uncertainty"):
+            continue
+        if name == "limits" and isinstance(content, dict):
+            for sub, inner in content.items():
+                if f"limits.{sub}" not in SECTIONS:
+                    raise _unknown(toml, f"limits.{sub}", list(SECTIONS))
+                found[f"limits.{sub}"] = _table(toml, "limits." + sub, inner)
+        elif name in SECTIONS:
+            found[name] = _table(toml, name, content)
+        elif isinstance(content, dict):
+            raise _unknown(toml, name, list(SECTIONS))
+        else:
+            found[""][name] = content
+    for name in SECTIONS:
+        if name not in found and name not in OPTIONAL_SECTIONS:
+            raise MachineFileError(
+                f"section [{name}] is missing",
+                hint="`tps machine new template.toml` writes a template with every section",
+                file=toml.file,
+            )
+    return found
+
+
+def _table(toml: TomlReader, name: str, content: Any) -> dict[str, Any]:
+    if not isinstance(content, dict):
+        raise _fail(toml, "", name, f" = {content!r}", expected=f"a section [{name}]")
+    return content
+
+
+def _unknown(toml: TomlReader, name: str, known: list[str]) -> InputError:
+    sections = ", ".join(f"[{n}]" for n in known if n)
+    return MachineFileError(
+        f"unknown section [{name}]",
+        expected=f"one of {sections}, [[effect]], [[instrument]], [uncertainty]",
+        file=toml.file,
+        line=toml.line_of(name, ""),
+    )
+
+
+def _section(toml: TomlReader, name: str, content: dict[str, Any]) -> dict[str, Any]:
+    keys = SECTIONS[name]
+    allowed = [*keys, *(("origin", "remark") if name else ())]
+    for key in content:
+        if key not in allowed:
+            raise _fail(toml, name, key, ": unknown key", expected=f"one of {', '.join(allowed)}")
+    for key, rule in keys.items():
+        if rule.required and key not in content:
+            raise _fail(toml, name, key, " is missing", expected=describe(rule))
+    if name and name != "setup" and content.get("origin") not in ORIGINS:
+        raise _fail(
+            toml,
+            name,
+            "origin",
+            f" = {content['origin']!r}" if "origin" in content else " is missing",
+            expected=f"one of {', '.join(ORIGINS)}",
+        )
+    return {k: _value(toml, name, k, v, keys[k]) if k in keys else str(v) for k, v in content.items()}
+
+
+def _value(toml: TomlReader, section: str, key: str, raw: Any, rule: Key) -> Any:
+    shown = shortened(raw)
+    if rule.text and rule.shape:
+        if not isinstance(raw, list) or not all(map(is_text, raw)) or len(set(raw)) < len(raw):
+            raise _fail(toml, section, key, f" = {shown}", expected="a list of names, each once")
+        return tuple(raw)
+    if rule.text:
+        if not is_text(raw):
+            raise _fail(toml, section, key, f" = {shown}", expected="a text that is not empty")
+        return raw
+    array = as_array(raw)
+    shapes = [rule.shape, *([(rule.also_length,)] if rule.also_length else [])]
+    if array is None or array.shape not in shapes:
+        raise _fail(toml, section, key, f" = {shown}", expected=describe(rule))
+    bad = np.isnan(array) | (array < rule.low) | (array > rule.high)
+    if rule.open_low:
+        bad |= array <= rule.low
+    if not rule.infinite:
+        bad |= np.isinf(array)
+    if bad.any():
+        worst = float(array[bad][0])
+        raise _fail(toml, section, key, f" = {worst:g}", expected=describe(rule))
+    return float(array) if array.ndim == 0 else array
+
+
+def _joints(toml: TomlReader, section: str, values: dict[str, dict[str, Any]]) -> FloatArray:
+    """(6, 3) m from whichever of the two forms is given."""
+    given = [key for key in ("mm", "cylindrical_mm_deg") if key in values[section]]
+    if len(given) != 1:
+        raise _fail(
+            toml,
+            section,
+            "mm",
+            " and cylindrical_mm_deg are both given" if given else " is missing",
+            expected="one of mm (6 rows x, y, z) and cylindrical_mm_deg (6 rows radius, angle, height)",
+        )
+    rows = values[section][given[0]]
+    if given[0] == "cylindrical_mm_deg":
+        angle = rad_from_deg(rows[:, 1])
+        rows = np.column_stack([rows[:, 0] * np.cos(angle), rows[:, 0] * np.sin(angle), rows[:, 2]])
+    return m_from_mm(rows)
+
+
+def _strut_law(toml: TomlReader, values: dict[str, Any]) -> StrutLaw:
+    lengths, stiffnesses = m_from_mm(values["length_mm"]), n_per_m_from_n_per_um(values["stiffness_N_per_um"])
+    if lengths[0] == lengths[1]:
+        raise _fail(toml, "strut_law", "length_mm", ": both lengths are equal", "two lengths apart")
+    return StrutLaw(float(lengths[0]), float(stiffnesses[0]), float(lengths[1]), float(stiffnesses[1]))
+
+
+def _limits(toml: TomlReader, values: dict[str, dict[str, Any]]) -> Limits:
+    strut = values["limits.strut_length"]
+    if not strut["min_mm"] < strut["max_mm"]:
+        raise _fail(
+            toml,
+            "limits.strut_length",
+            "max_mm",
+            f" = {strut['max_mm']:g}",
+            expected=f"more than min_mm = {strut['min_mm']:g}",
+        )
+    given: dict[str, Any] = {"strut_length": (m_from_mm(strut["min_mm"]), m_from_mm(strut["max_mm"]))}
+    box = values.get("limits.workspace")
+    if box:
+        if not (box["min_mm"] < box["max_mm"]).all():
+            raise _fail(
+                toml,
+                "limits.workspace",
+                "max_mm",
+                ": not above min_mm",
+                expected="max_mm > min_mm in x, y and z",
+            )
+        given["workspace"] = m_from_mm(np.array([box["min_mm"], box["max_mm"]]))
+    angles = values.get("limits.joint_angle")
+    if angles:
+        given["frame_joint_angle"] = rad_from_deg(angles["frame_max_deg"])
+        given["platform_joint_angle"] = rad_from_deg(angles["platform_max_deg"])
+        given["neutral_pose"] = _pose(angles["neutral_pose_mm_deg"])
+    else:  # joints without limits: the neutral pose only serves the singularity index
+        given["neutral_pose"] = _pose(values.get("setup", {}).get("default_origin_mm", np.zeros(3)))
+    if "limits.singularity" in values:
+        given["singularity"] = values["limits.singularity"]["min_index"]
+    return Limits(**given)
+
+
+def _entries(toml: TomlReader, table: dict[str, Any], kind: str) -> tuple[EffectEntry, ...]:
+    """`[[effect]]` and `[[instrument]]`: a name, the parameters in SI, the provenance if there is one.
+
+    What the parameters mean, and their bounds, is known to the effects themselves (the room above).
+    """
+    rows = table.get(kind, [])
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise _fail(toml, "", kind, f" is not a list of tables; write [[{kind}]]")
+    return tuple(_entry(toml, row, kind, nth) for nth, row in enumerate(rows))
+
+
+def _entry(toml: TomlReader, row: dict[str, Any], kind: str, nth: int) -> EffectEntry:
+    """The nth entry of its kind."""
+    found = {key: toml.line_of(kind, key, nth) for key in ("", *row)}
+    lines = {key: line for key, line in found.items() if line is not None}
+
+    def refuse(key: str, told: str, expected: str) -> InputError:
+        line = lines.get(key, lines.get(""))
+        return MachineFileError(f"[[{kind}]] {key}{told}", expected=expected, file=toml.file, line=line)
+
+    name, provenance = row.get("name"), row.get("provenance", {})
+    if not isinstance(name, str) or not name:
+        raise refuse("name", " is missing" if name is None else f" = {name!r}", "an effect's name")
+    if not isinstance(provenance, dict):
+        raise refuse("provenance", f" = {shortened(provenance)}", f"a table [{kind}.provenance]")
+    parameters = {key: value for key, value in row.items() if key not in ("name", "provenance")}
+    return EffectEntry(name, parameters, provenance, toml.file, lines)
 
 
 def _pose(values: Any) -> Pose:

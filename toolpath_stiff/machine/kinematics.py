@@ -13,14 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import PoseError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import mm_from_m
-
-FloatArray = NDArray[np.float64]
 
 LENGTH_TOLERANCE = 1e-12  # m, a few units in the last place of a strut's length
 MOST_STEPS = 50
@@ -75,6 +74,17 @@ def solve_struts(
     Returns
     -------
     Struts of n poses (n = 1 for a single position).
+
+    Examples
+    --------
+    On the machine's axis the struts have two lengths, three struts each:
+
+    >>> from toolpath_stiff.machine import load_machine
+    >>> struts = solve_struts(load_machine("nist"), [0.0, 0.0, 0.8])
+    >>> struts.lengths.round(4)
+    array([[2.8847, 2.8699, 2.8847, 2.8699, 2.8847, 2.8699]])
+    >>> struts.jacobian.shape
+    (1, 6, 6)
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     joints = platform_joints(machine, tool_length)
@@ -173,6 +183,14 @@ def forward_kinematics(
     InputError
         Not six finite lengths above 0 in each row, or lengths that no pose near the start has; the message names the
         row.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> machine = load_machine("nist")
+    >>> lengths = solve_struts(machine, [0.1, -0.05, 0.8]).lengths
+    >>> forward_kinematics(machine, lengths).round(9)[0, :3]
+    array([ 0.1 , -0.05,  0.8 ])
     """
     wanted = np.atleast_2d(np.asarray(lengths, dtype=float))
     _check_lengths(wanted)
@@ -194,7 +212,7 @@ def forward_kinematics(
     if len(failed):
         row = int(failed[0])
         shown = ", ".join(f"{mm_from_m(v):.3f}" for v in wanted[row])
-        raise InputError(
+        raise PoseError(
             f"row {row + 1}: no pose near the start has struts of {shown} mm",
             hint="check the lengths, or give a start nearer to the pose",
         )
@@ -204,20 +222,30 @@ def forward_kinematics(
 def _check_lengths(lengths: FloatArray) -> None:
     """One bad row must not be blamed on another: rows are solved together."""
     if lengths.ndim != 2 or lengths.shape[1] != 6:
-        raise InputError(f"strut lengths of shape {lengths.shape}", expected="(n, 6) or (6,)")
+        raise PoseError(f"strut lengths of shape {lengths.shape}", expected="(n, 6) or (6,)")
     bad = np.flatnonzero(~(np.isfinite(lengths) & (lengths > 0.0)).all(axis=1))
     if len(bad):
         row = int(bad[0])
         shown = ", ".join(f"{mm_from_m(v):.3f}" for v in lengths[row])
-        raise InputError(f"row {row + 1}: strut lengths {shown} mm", expected="six finite lengths above 0")
+        raise PoseError(f"row {row + 1}: strut lengths {shown} mm", expected="six finite lengths above 0")
 
 
 def _newton_step(jacobian: FloatArray, missing: FloatArray) -> FloatArray:
-    """Twists (n, 6), shortened where they are too large to be trusted."""
-    twist = np.einsum("nij,nj->ni", np.linalg.pinv(jacobian), missing)
-    shift = np.linalg.norm(twist[:, :3], axis=1) / LARGEST_SHIFT
-    turn = np.linalg.norm(twist[:, 3:], axis=1) / LARGEST_TURN
-    return np.asarray(twist / np.maximum(1.0, np.maximum(shift, turn))[:, None])
+    """Twists (n, 6), shortened where they are too large to be trusted; near singular poses the smallest ones."""
+    try:
+        twist = np.asarray(np.linalg.solve(jacobian, missing[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        twist = np.full(missing.shape, np.inf)
+    rows = np.flatnonzero(~(_excess(twist) <= 1.0))
+    if len(rows):
+        twist[rows] = np.einsum("nij,nj->ni", np.linalg.pinv(jacobian[rows]), missing[rows])
+    return np.asarray(twist / np.maximum(1.0, _excess(twist))[:, None])
+
+
+def _excess(twist: FloatArray) -> FloatArray:
+    """(n,) size of twists (n, 6) over the largest one that is trusted."""
+    shift, turn = np.linalg.norm(twist[:, :3], axis=1), np.linalg.norm(twist[:, 3:], axis=1)
+    return np.asarray(np.maximum(shift / LARGEST_SHIFT, turn / LARGEST_TURN))
 
 
 def _turn(vector: FloatArray) -> FloatArray:

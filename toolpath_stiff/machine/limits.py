@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.kinematics import Struts, joint_angles, singularity_index
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+# What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
+STRUT, FRAME, PLATFORM, SINGULARITY = "strut", "frame", "platform", "singularity"
+AXES = ("x", "y", "z")
+QUANTITIES = (STRUT, FRAME, PLATFORM, *AXES, SINGULARITY)
 
 
 @dataclass(frozen=True)
@@ -20,19 +24,41 @@ class Limit:
     """One bound: its name, the bound, whether it is a lower one, the span that margins are counted in.
 
     `span` is max - min where there are two bounds, else the distance of the bound from the value's natural
-    end (0 for angles, 1 for the singularity index).
+    end (0 for angles, 1 for the singularity index). `quantity` is what it bounds, one of `QUANTITIES`; the limits of
+    one quantity on one side differ by the joint or strut alone.
     """
 
     name: str
+    quantity: str
     bound: float
     lower: bool
     span: float
     unit: str
 
+    def margin(self, value: FloatArray) -> FloatArray:
+        """Distance of values from the bound as a share of the span: 0 at the bound, negative beyond."""
+        return np.asarray((value - self.bound if self.lower else self.bound - value) / self.span)
+
 
 def machine_limits(machine: Machine) -> tuple[Limit, ...]:
-    """The finite limits of a machine, in the order of `limit_values`' columns."""
+    """The finite limits of a machine, in the order of `reach`'s columns."""
     return tuple(limit for limit in _all_limits(machine) if np.isfinite(limit.bound))
+
+
+def distinct_limits(machine: Machine) -> tuple[Limit, ...]:
+    """One of the finite limits for each quantity and side: the extreme strut or joint decides."""
+    return tuple({(limit.quantity, limit.lower): limit for limit in machine_limits(machine)}.values())
+
+
+def smallest_margin(limits: Iterable[Limit], extreme: Callable[[Limit], FloatArray]) -> FloatArray:
+    """(n,) the margins of `reach` without the name of the limit, from `distinct_limits`; inf without any.
+
+    `extreme` gives the values (n,) of a limit's quantity that come nearest to it.
+    """
+    margin: FloatArray = np.array(np.inf)
+    for limit in limits:
+        margin = np.minimum(margin, limit.margin(extreme(limit)))
+    return margin
 
 
 def _all_limits(machine: Machine) -> list[Limit]:
@@ -42,19 +68,19 @@ def _all_limits(machine: Machine) -> list[Limit]:
     found: list[Limit] = []
     for i in range(6):
         found += [
-            Limit(f"strut{i + 1} min length", low, True, span, "mm"),
-            Limit(f"strut{i + 1} max length", high, False, span, "mm"),
+            Limit(f"strut{i + 1} min length", STRUT, low, True, span, "mm"),
+            Limit(f"strut{i + 1} max length", STRUT, high, False, span, "mm"),
         ]
-    for place, angle in (("frame", limits.frame_joint_angle), ("platform", limits.platform_joint_angle)):
-        found += [Limit(f"{place} joint{i + 1} angle", angle, False, angle, "deg") for i in range(6)]
+    for quantity, angle in ((FRAME, limits.frame_joint_angle), (PLATFORM, limits.platform_joint_angle)):
+        found += [Limit(f"{quantity} joint{i + 1} angle", quantity, angle, False, angle, "deg") for i in range(6)]
     lower, upper = limits.workspace
-    for axis, lo, hi in zip("xyz", lower, upper, strict=True):
+    for axis, lo, hi in zip(AXES, lower, upper, strict=True):
         both = hi - lo if np.isfinite(hi - lo) else 1.0
         found += [
-            Limit(f"workspace {axis} min", float(lo), True, float(both), "mm"),
-            Limit(f"workspace {axis} max", float(hi), False, float(both), "mm"),
+            Limit(f"workspace {axis} min", axis, float(lo), True, float(both), "mm"),
+            Limit(f"workspace {axis} max", axis, float(hi), False, float(both), "mm"),
         ]
-    found.append(Limit("singularity", limits.singularity, True, 1.0 - limits.singularity, ""))
+    found.append(Limit("singularity", SINGULARITY, limits.singularity, True, 1.0 - limits.singularity, ""))
     return found
 
 
@@ -80,7 +106,7 @@ class Reach:
     limits: tuple[Limit, ...]
 
     @property
-    def reachable(self) -> NDArray[np.bool_]:
+    def reachable(self) -> BoolArray:
         """(n,) whether every limit is kept."""
         return np.asarray(self.margin >= 0.0)
 
@@ -117,6 +143,17 @@ def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: Array
         The struts at these poses.
     rotation
         (n, 3, 3); None: vertical.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine, solve_struts
+    >>> machine = load_machine("nist")
+    >>> position = [[0.0, 0.0, 0.8], [0.0, 0.0, 3.0]]
+    >>> found = reach(machine, position, solve_struts(machine, position))
+    >>> found.reachable
+    array([ True, False])
+    >>> found.describe(1)
+    'workspace z max needs 3000.000 mm, limit 1700.000 mm, 1300.000 mm beyond'
     """
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     frame, platform = joint_angles(machine, struts, rotation)

@@ -12,14 +12,12 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import MachineFileError
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Limits, Machine, StrutLaw
-from toolpath_stiff.units import MM_PER_INCH, m_from_mm, rad_from_deg
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.units import MM_PER_INCH, m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
 SETP = re.compile(r"^\s*setp\s+genhexkins\.(\S+?)\s*(?:=\s*|\s+)(\S+)\s*$")
 JOINT = re.compile(r"(base|platform)\.([0-5])\.([xyz])$")
@@ -29,7 +27,7 @@ KNOWN = re.compile(
 )
 UNITS_MM = {"mm": 1.0, "inch": MM_PER_INCH}
 # Struts of a screw about 40 mm thick; LinuxCNC knows no stiffness.
-ASSUMED_STIFFNESS = 50e6  # N/m
+ASSUMED_STIFFNESS = n_per_m_from_n_per_um(50.0)
 
 
 def units_of(hal: Path) -> str | None:
@@ -74,7 +72,7 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
         if f"{part}.{n}.{axis}" not in values
     ]
     if missing:
-        raise InputError(
+        raise MachineFileError(
             f"{len(missing)} joint pins are not set, first {missing[0]}",
             expected="setp genhexkins.base.N.x|y|z and genhexkins.platform.N.x|y|z for N = 0 to 5",
             file=file,
@@ -87,7 +85,7 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
     offset = m_from_mm((values.get("tool-offset", 0.0) + values.get("spindle-offset", 0.0)) * scale)
     notes = []
     if offset:
-        notes.append(f"{offset * 1e3:g} mm (tool-offset plus spindle-offset) are added to Z of all joints")
+        notes.append(f"{mm_from_m(offset):g} mm (tool-offset plus spindle-offset) are added to Z of all joints")
     if any(name.startswith(("base-n", "platform-n")) or name == "screw-lead" for name in values):
         notes.append("screw-lead and the joint normals correct strut lengths for the turning screw; left out")
     shift = np.array([0.0, 0.0, offset])
@@ -103,19 +101,19 @@ def _read_pins(text: str, file: str) -> dict[str, float]:
             continue
         pin, raw = match.groups()
         if not KNOWN.match(pin):
-            raise InputError(f"genhexkins has no pin {pin!r}", file=file, line=number)
+            raise MachineFileError(f"genhexkins has no pin {pin!r}", file=file, line=number)
         if pin in values:
-            raise InputError(f"genhexkins.{pin} is set twice", file=file, line=number)
+            raise MachineFileError(f"genhexkins.{pin} is set twice", file=file, line=number)
         try:
             values[pin] = float(raw)
         except ValueError:
-            raise InputError(
+            raise MachineFileError(
                 f"genhexkins.{pin} = {raw!r}", expected="a number (variables are not read)", file=file, line=number
             ) from None
         if not np.isfinite(values[pin]):
-            raise InputError(f"genhexkins.{pin} = {raw!r}", expected="a finite number", file=file, line=number)
+            raise MachineFileError(f"genhexkins.{pin} = {raw!r}", expected="a finite number", file=file, line=number)
     if not any(JOINT.match(pin) for pin in values):
-        raise InputError("sets no genhexkins joints", expected="a HAL file with setp genhexkins...", file=file)
+        raise MachineFileError("sets no genhexkins joints", expected="a HAL file with setp genhexkins...", file=file)
     return values
 
 

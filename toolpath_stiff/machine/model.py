@@ -8,20 +8,21 @@ shows, so that the one is known better once the other is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.units import Pose
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.errors import EffectError, InputError, MachineFileError
+from toolpath_stiff.toml_reader import TomlReader
+from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
 
 ORIGINS = ("published", "recovered", "assumed", "fitted")
 
+UNCERTAINTY_KEYS = ("parameters", "sd", "correlation")
 STRUT_LAW = ("strut_law.stiffness_1_N_per_um", "strut_law.stiffness_2_N_per_um")
 NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may leave
 
@@ -60,7 +61,7 @@ class StrutLaw:
         low, high = sorted((self.length_1, self.length_2))
         return np.asarray(np.minimum(length - (low - slack), (high + slack) - length))
 
-    def extrapolates(self, length: FloatArray) -> NDArray[np.bool_]:
+    def extrapolates(self, length: FloatArray) -> BoolArray:
         """Whether a length lies outside the range that the law was given for."""
         return np.asarray(self.room(length) < 0.0)
 
@@ -109,7 +110,7 @@ class EffectEntry:
         """An error at one of its keys, or at its heading; `where` names an entry that no file holds."""
         line = self.lines.get(key, self.lines.get(""))
         text = found if self.file or not where else f"{where}: {found}"
-        return InputError(text, expected=expected, hint=hint, file=self.file or None, line=line)
+        return EffectError(text, expected=expected, hint=hint, file=self.file or None, line=line)
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ class Machine:
     platform_bar_stiffness: float = np.inf
     limits: Limits = field(default_factory=Limits)
     default_origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    rapid_feed: float = 10.0 / 60.0
+    rapid_feed: float = defaults.RAPID_FEED
     setup: str | None = None
     temperature: float | None = None
     setups: tuple[str, ...] = ()
@@ -239,7 +240,7 @@ def with_parameter(machine: Machine, name: str, change: float) -> Machine:
     if name in STRUT_LAW:
         law = machine.strut_law
         values = [law.stiffness_1, law.stiffness_2]
-        values[STRUT_LAW.index(name)] += change * 1e6
+        values[STRUT_LAW.index(name)] += n_per_m_from_n_per_um(change)
         return machine.with_changes(strut_law=replace(law, stiffness_1=values[0], stiffness_2=values[1]))
     owner, _, key = name.partition(".")
     for kind in ("effects", "instruments"):
@@ -249,43 +250,56 @@ def with_parameter(machine: Machine, name: str, change: float) -> Machine:
                 moved = {**entry.parameters, key: entry.parameters[key] + change}
                 entries[i] = replace(entry, parameters=moved)
                 return machine.with_changes(**{kind: tuple(entries)})
-    raise InputError(f"machine {machine.name} has no parameter {name!r}")
+    raise MachineFileError(f"machine {machine.name} has no parameter {name!r}")
 
 
-def read_uncertainty(
-    table: Any, entries: Sequence[EffectEntry], fail: Callable[[str, str, str], InputError]
-) -> Uncertainty | None:
-    """`[uncertainty]` of a machine file, checked; None where there is none.
-
-    `fail(key, found, expected)` makes the error that names file and line.
-    """
+def read_uncertainty(toml: TomlReader, entries: Sequence[EffectEntry]) -> Uncertainty | None:
+    """`[uncertainty]` of a machine file, checked; None where there is none. Raises `InputError`."""
+    table = toml.data.get("uncertainty")
     if table is None:
         return None
     if not isinstance(table, Mapping):
-        raise fail("", f" = {table!r}", "a section [uncertainty]")
-    keys = ("parameters", "sd", "correlation")
+        raise _fail(toml, "", f" = {table!r}", "a section [uncertainty]")
     for key in table:
-        if key not in keys:
-            raise fail(key, ": unknown key", f"one of {', '.join(keys)}")
-    for key in keys:
+        if key not in UNCERTAINTY_KEYS:
+            raise _fail(toml, key, ": unknown key", f"one of {', '.join(UNCERTAINTY_KEYS)}")
+    for key in UNCERTAINTY_KEYS:
         if key not in table:
-            raise fail(key, " is missing", "parameters, sd and correlation")
-    known = list(STRUT_LAW) + [f"{entry.name}.{key}" for entry in entries for key in entry.parameters]
-    names = table["parameters"]
+            raise _fail(toml, key, " is missing", "parameters, sd and correlation")
+    names = _parameters(toml, table["parameters"], entries)
+    return Uncertainty(names, _deviations(toml, table["sd"], len(names)), _correlation(toml, table, len(names)))
+
+
+def _fail(toml: TomlReader, key: str, found: str, expected: str) -> InputError:
+    line = toml.line_of("uncertainty", key)
+    return MachineFileError(f"{f'[uncertainty] {key}'.strip()}{found}", expected=expected, file=toml.file, line=line)
+
+
+def _parameters(toml: TomlReader, names: Any, entries: Sequence[EffectEntry]) -> tuple[str, ...]:
+    """The names of the parameters, each once, each of the machine file."""
     if not isinstance(names, list) or not names or len(set(map(str, names))) != len(names):
-        raise fail("parameters", f" = {names!r}", "a list of parameters, each once")
+        raise _fail(toml, "parameters", f" = {names!r}", "a list of parameters, each once")
+    known = list(STRUT_LAW) + [f"{entry.name}.{key}" for entry in entries for key in entry.parameters]
     for name in names:
         if name not in known:
-            raise fail("parameters", f": {name!r} is not a parameter of this file", f"one of {', '.join(known)}")
-    sd, correlation = _numbers(table["sd"]), _numbers(table["correlation"])
-    count = len(names)
+            found = f": {name!r} is not a parameter of this file"
+            raise _fail(toml, "parameters", found, f"one of {', '.join(known)}")
+    return tuple(names)
+
+
+def _deviations(toml: TomlReader, raw: Any, count: int) -> FloatArray:
+    sd = _numbers(raw)
     if sd is None or sd.shape != (count,) or not (np.isfinite(sd).all() and (sd >= 0.0).all()):
-        raise fail("sd", "", f"{count} numbers, 0 or more, one a parameter")
-    if correlation is None or correlation.shape != (count, count) or not _is_correlation(correlation):
-        raise fail(
-            "correlation", "", f"{count} rows of {count} numbers: symmetric, ones on the diagonal, a correlation"
-        )
-    return Uncertainty(tuple(names), sd, correlation)
+        raise _fail(toml, "sd", "", f"{count} numbers, 0 or more, one a parameter")
+    return sd
+
+
+def _correlation(toml: TomlReader, table: Mapping[str, Any], count: int) -> FloatArray:
+    found = _numbers(table["correlation"])
+    if found is None or found.shape != (count, count) or not _is_correlation(found):
+        expected = f"{count} rows of {count} numbers: symmetric, ones on the diagonal, a correlation"
+        raise _fail(toml, "correlation", "", expected)
+    return found
 
 
 def _numbers(raw: Any) -> FloatArray | None:

@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import mm_from_m
 
-FloatArray = NDArray[np.float64]
 Pairing = tuple[int, ...]  # strut i goes over into strut pairing[i]
 
 FOLLOWS = 0.01  # of the body's size: joints this close to where the symmetry puts them follow it (tolerances, recovery)

@@ -8,12 +8,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import EffectEntry, Machine, Uncertainty
-from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.units import Pose, deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
 
 # `tps machine new` puts it in every section; what still has it was not replaced.
 TEMPLATE_REMARK = "value of the template, not of this machine"
@@ -48,7 +46,7 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
         "reference_tool": {"length_mm": _number(mm_from_m(machine.reference_tool_length))},
         "strut_law": {
             "length_mm": _list([mm_from_m(law.length_1), mm_from_m(law.length_2)]),
-            "stiffness_N_per_um": _list([law.stiffness_1 / 1e6, law.stiffness_2 / 1e6]),
+            "stiffness_N_per_um": _list([n_per_um_from_n_per_m(k) for k in (law.stiffness_1, law.stiffness_2)]),
         },
         "platform": {"bar_stiffness_N_per_m": _number(machine.platform_bar_stiffness)},
         "limits.strut_length": {

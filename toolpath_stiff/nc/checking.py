@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import cutter_location
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning, would_change
@@ -178,7 +178,7 @@ def check_lines(
     (3, 'error')
     """
     if not any(line.strip() for line in lines):
-        raise InputError("the program is empty", expected="an NC program", file=name)
+        raise ProgramError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
         return _check_cutter_location(lines, name, origin or default_origin, bool(block_delete), controller)
     place, default = None if origin is None else pose_in_mm(origin), pose_in_mm(default_origin)
@@ -225,7 +225,7 @@ def _run_to_the_end(run: _CheckingRun) -> tuple[list[InputError], list[str]]:
         foreign = next((f for e in run.errors if (f := foreign_program(lines, name, e.line)) is not None), None)
     errors = run.errors if foreign is None else [foreign]
     if not errors and not run.state.recorder.cuts:
-        errors = [InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)]
+        errors = [ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)]
     return errors, warnings
 
 
@@ -371,7 +371,7 @@ def check_by(
     (True, 'builtin', 'G1')
     """
     if interpreter not in INTERPRETERS:
-        raise InputError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))
+        raise ProgramError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))
     options: dict[str, Any] = {"origin": origin, "default_origin": default_origin, "block_delete": block_delete}
     ours = None
     if interpreter != "linuxcnc":

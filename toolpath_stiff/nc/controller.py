@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.kinematics import PostedKinematics, read_kinematics
 from toolpath_stiff.nc.tables import (
     HOMES,
@@ -34,6 +34,7 @@ from toolpath_stiff.nc.tables import (
     read_tool_table,
     set_offset,
 )
+from toolpath_stiff.toml_reader import TomlReader, is_text
 
 # -- dialects ----------------------------------------------------------------------------------------------------------
 
@@ -149,7 +150,7 @@ def dialect_named(name: str) -> Dialect:
     True
     """
     if name not in DIALECTS:
-        raise InputError(f"dialect {name!r}", expected=", ".join(DIALECTS))
+        raise ProgramError(f"dialect {name!r}", expected=", ".join(DIALECTS))
     return DIALECTS[name]
 
 
@@ -216,7 +217,7 @@ def switches_on(block_delete: Switches, controller: Controller) -> frozenset[int
     if isinstance(block_delete, bool):
         return ALL_SWITCHES if block_delete else controller.switches
     if not block_delete <= ALL_SWITCHES:
-        raise InputError(f"block-delete switches {sorted(block_delete)}", expected="1 to 9")
+        raise ProgramError(f"block-delete switches {sorted(block_delete)}", expected="1 to 9")
     return block_delete
 
 
@@ -228,7 +229,7 @@ def plain(block_delete: Switches, controller: Controller) -> bool:
 def check_plain(block_delete: Switches, controller: Controller) -> None:
     """Raise `InputError` if LinuxCNC's interpreter would read the program differently from the control."""
     if not plain(block_delete, controller):
-        raise InputError(
+        raise ProgramError(
             f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {controller.dialect.name!r}, "
             "or it has single block-delete switches",
             hint="use the built-in interpreter (--interpreter builtin)",
@@ -253,135 +254,111 @@ def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".var", ".tbl"):
-        return _Reader(path, dialect).controller()
+        return _controller(TomlReader.read(path, "the controller file", ProgramError), dialect)
     base = Controller(dialect_named(dialect or "linuxcnc"))
     if suffix == ".var":
         return replace(base, offsets=read_offsets(path))
     return replace(base, tools=read_tool_table(path))
 
 
-class _Reader:
-    """One controller file."""
+def _controller(toml: TomlReader, dialect: str | None) -> Controller:
+    toml.only("", toml.data, KEYS)
+    return Controller(
+        _dialect(toml, dialect),
+        _switches(toml),
+        _offsets(toml),
+        _tools(toml),
+        read_kinematics(toml),
+        _setup(toml),
+    )
 
-    def __init__(self, path: str | Path, dialect: str | None) -> None:
-        import tomllib
 
-        self.path, self.dialect = Path(path), dialect
-        try:
-            self.data: dict[str, Any] = tomllib.loads(self.path.read_text(encoding="utf-8-sig"))
-        except OSError as error:
-            raise InputError(f"cannot read the controller file {str(path)!r}: {error.strerror}") from None
-        except UnicodeDecodeError:
-            raise InputError("the controller file is not a text file", file=str(path)) from None
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"the controller file is not TOML: {error}", file=str(path)) from None
+def _dialect(toml: TomlReader, asked: str | None) -> Dialect:
+    name = _choice(toml, "dialect", tuple(DIALECTS), "generic")
+    dialect = dialect_named(asked or name)
+    changes: dict[str, Any] = {}
+    if _choice(toml, "arc_centers", ("incremental", "absolute"), "incremental") == "absolute":
+        changes["arc_absolute"] = True
+    if _choice(toml, "inch_metric", (G70_UNITS, G20_UNITS), G20_UNITS) == G70_UNITS:
+        changes["inch_metric"] = True
+    return replace(dialect, **changes) if changes else dialect
 
-    def fail(self, found: str, expected: str = "", hint: str = "") -> InputError:
-        return InputError(found, expected=expected, hint=hint, file=str(self.path))
 
-    def controller(self) -> Controller:
-        for key in self.data:
-            if key not in KEYS:
-                raise self.fail(f"{key!r} is not known", ", ".join(KEYS))
-        return Controller(
-            self._dialect(), self._switches(), self._offsets(), self._tools(), self._kinematics(), self._setup()
-        )
+def _choice(toml: TomlReader, key: str, choices: tuple[str, ...], otherwise: str) -> str:
+    return toml.choice(key, toml.data.get(key, otherwise), choices, " or ".join(choices))
 
-    def _dialect(self) -> Dialect:
-        name = self._choice("dialect", tuple(DIALECTS), "generic")
-        dialect = dialect_named(self.dialect or name)
-        changes: dict[str, Any] = {}
-        if self._choice("arc_centers", ("incremental", "absolute"), "incremental") == "absolute":
-            changes["arc_absolute"] = True
-        if self._choice("inch_metric", (G70_UNITS, G20_UNITS), G20_UNITS) == G70_UNITS:
-            changes["inch_metric"] = True
-        return replace(dialect, **changes) if changes else dialect
 
-    def _choice(self, key: str, choices: tuple[str, ...], otherwise: str) -> str:
-        value = self.data.get(key, otherwise)
-        if not isinstance(value, str) or value not in choices:
-            raise self.fail(f"{key} = {value!r}", " or ".join(choices))
-        return value
+def _setup(toml: TomlReader) -> str | None:
+    value = toml.data.get("setup")
+    if value is not None and not is_text(value):
+        raise toml.error(f"setup = {value!r}", "the name of a set-up", where="setup")
+    return value
 
-    def _kinematics(self) -> PostedKinematics | None:
-        given = self.data.get("kinematics")
-        return None if given is None else read_kinematics(given, self.fail)
 
-    def _setup(self) -> str | None:
-        value = self.data.get("setup")
-        if value is not None and (not isinstance(value, str) or not value.strip()):
-            raise self.fail(f"setup = {value!r}", "the name of a set-up")
-        return value
+def _switches(toml: TomlReader) -> frozenset[int]:
+    value = toml.data.get("block_delete", False)
+    if isinstance(value, bool):
+        return ALL_SWITCHES if value else frozenset()
+    if isinstance(value, list) and all(type(v) is int and v in ALL_SWITCHES for v in value):
+        return frozenset(value)
+    expected = "true, false, or a list of switches 1 to 9"
+    raise toml.error(f"block_delete = {value!r}", expected, where="block_delete")
 
-    def _switches(self) -> frozenset[int]:
-        value = self.data.get("block_delete", False)
-        if isinstance(value, bool):
-            return ALL_SWITCHES if value else frozenset()
-        if isinstance(value, list) and all(type(v) is int and v in ALL_SWITCHES for v in value):
-            return frozenset(value)
-        raise self.fail(f"block_delete = {value!r}", "true, false, or a list of switches 1 to 9")
 
-    def _offsets(self) -> Offsets | None:
-        given = self.data.get("offsets")
-        if given is None:
-            return None
-        if isinstance(given, str):
-            return read_offsets(self.path.parent / given)
-        if not isinstance(given, dict):
-            raise self.fail(f"offsets = {given!r}", "a table G54 = [x, y, z, a, b, c, r], or the name of a file")
-        offsets = Offsets()
-        for name, values in given.items():
-            most = 6 if name in HOMES else 7
-            if additional_offset(name) in offsets.additional:
-                raise self.fail(f"offsets.{name!r} is there twice: G54.1 and G154 name the same offsets")
-            if not is_offset(name):
-                raise self.fail(
-                    f"offsets.{name} is not an offset",
-                    f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)',
-                )
-            if not isinstance(values, list) or not 1 <= len(values) <= most:
-                raise self.fail(f"offsets.{name} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r")
-            set_offset(offsets, name, [self._number(f"offsets.{name}", value) for value in values])
-        return offsets
+def _offsets(toml: TomlReader) -> Offsets | None:
+    given = toml.data.get("offsets")
+    if given is None:
+        return None
+    if isinstance(given, str):
+        return read_offsets(Path(toml.file).parent / given)
+    table = toml.table("offsets", given, "a table G54 = [x, y, z, a, b, c, r], or the name of a file")
+    offsets = Offsets()
+    for name, values in table.items():
+        where, most = f"offsets.{name}", 6 if name in HOMES else 7
+        if additional_offset(name) in offsets.additional:
+            found = f"offsets.{name!r} is there twice: G54.1 and G154 name the same offsets"
+            raise toml.error(found, where=where)
+        if not is_offset(name):
+            expected = f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)'
+            raise toml.error(f"{where} is not an offset", expected, where=where)
+        if not isinstance(values, list) or not 1 <= len(values) <= most:
+            raise toml.error(f"{where} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r", where=where)
+        set_offset(offsets, name, [toml.number(where, value, LARGEST_MM) for value in values])
+    return offsets
 
-    def _tools(self) -> dict[int, ToolEntry] | None:
-        given = self.data.get("tools")
-        if given is None:
-            return None
-        if isinstance(given, str):
-            return read_tool_table(self.path.parent / given)
-        if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
-            raise self.fail(
-                "tools is not a list of tables", "[[tools]] with number, length_mm, ..., or the name of a file"
-            )
-        tools: dict[int, ToolEntry] = {}
-        for place, tool in enumerate(given, 1):
-            entry = self._tool(f"tools[{place}]", tool)
-            if entry.number in tools:
-                raise self.fail(f"tools[{place}]: tool {entry.number} appears twice")
-            tools[entry.number] = entry
-        return tools
 
-    def _tool(self, where: str, tool: Mapping[str, Any]) -> ToolEntry:
-        unknown = [key for key in tool if key not in TOOL_KEYS]
-        if unknown:
-            raise self.fail(f"{where}.{unknown[0]} is not known", ", ".join(TOOL_KEYS))
-        number = tool.get("number")
-        if type(number) is not int or number < 0:
-            raise self.fail(f"{where}.number = {number!r}", "a whole number")
-        lengths = [
-            self._number(f"{where}.{key}", tool[key]) if key in tool else math.nan
-            for key in ("length_mm", "diameter_mm", "stick_out_mm")
-        ]
-        for key, value in zip(("diameter_mm", "stick_out_mm"), lengths[1:], strict=True):
-            if value <= 0.0:
-                raise self.fail(f"{where}.{key} = {value:g}", "more than 0")
-        texts = [tool.get(key, "") for key in ("remark", "material")]
-        if not all(isinstance(text, str) for text in texts):
-            raise self.fail(f"{where}: remark and material are texts")
-        return ToolEntry(number, lengths[0], lengths[1], texts[0], lengths[2], texts[1])
+def _tools(toml: TomlReader) -> dict[int, ToolEntry] | None:
+    given = toml.data.get("tools")
+    if given is None:
+        return None
+    if isinstance(given, str):
+        return read_tool_table(Path(toml.file).parent / given)
+    if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
+        expected = "[[tools]] with number, length_mm, ..., or the name of a file"
+        raise toml.error("tools is not a list of tables", expected, where="tools")
+    tools: dict[int, ToolEntry] = {}
+    for place, tool in enumerate(given, 1):
+        entry = _tool(toml, f"tools[{place}]", tool)
+        if entry.number in tools:
+            found = f"tools[{place}]: tool {entry.number} appears twice"
+            raise toml.error(found, where=f"tools[{place}].number")
+        tools[entry.number] = entry
+    return tools
 
-    def _number(self, where: str, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_MM:
-            raise self.fail(f"{where} = {value!r}", f"a number within +-{LARGEST_MM:g}")
-        return float(value)
+
+def _tool(toml: TomlReader, where: str, tool: Mapping[str, Any]) -> ToolEntry:
+    toml.only(where, tool, TOOL_KEYS)
+    number = tool.get("number")
+    if type(number) is not int or number < 0:
+        raise toml.error(f"{where}.number = {number!r}", "a whole number", where=f"{where}.number")
+    lengths = [
+        toml.number(f"{where}.{key}", tool[key], LARGEST_MM) if key in tool else math.nan
+        for key in ("length_mm", "diameter_mm", "stick_out_mm")
+    ]
+    for key, value in zip(("diameter_mm", "stick_out_mm"), lengths[1:], strict=True):
+        if value <= 0.0:
+            raise toml.error(f"{where}.{key} = {value:g}", "more than 0", where=f"{where}.{key}")
+    texts = [tool.get(key, "") for key in ("remark", "material")]
+    if not all(isinstance(text, str) for text in texts):
+        raise toml.error(f"{where}: remark and material are texts", where=where)
+    return ToolEntry(number, lengths[0], lengths[1], texts[0], lengths[2], texts[1])

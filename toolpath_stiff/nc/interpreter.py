@@ -15,7 +15,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes import (
     FEED,
     LENGTH,
@@ -316,7 +316,7 @@ class ProgramRun:
         return read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)
 
     def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
-        return InputError(found, expected=expected, hint=hint, file=self.name, line=at + 1, column=column)
+        return ProgramError(found, expected=expected, hint=hint, file=self.name, line=at + 1, column=column)
 
     def _check_head(self, block: Block, numbered: bool) -> None:
         """A program number within a program: the next one begins where this one did not end."""

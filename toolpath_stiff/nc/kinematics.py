@@ -18,16 +18,16 @@ and She, written with rotations about lines.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.geometry import Vector
 from toolpath_stiff.nc.tables import LARGEST_MM
+from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.units import m_from_mm, mm_from_m
 
 TABLE, HEAD = "table", "head"
@@ -45,8 +45,6 @@ DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 PLACE_KEYS = {TABLE: "point_mm", HEAD: "pivot_mm"}
 TOLERANCE_MM, LEAST_TOLERANCE_MM, LARGEST_TOLERANCE_MM = 1e-3, 1e-5, 1.0
 PARALLEL = 1e-6  # sine of the angle between two axes that are one
-
-Fail = Callable[[str, str], InputError]
 
 
 @dataclass(frozen=True)
@@ -133,121 +131,96 @@ class PostedKinematics:
         )
 
 
-def read_kinematics(table: object, fail: Fail) -> PostedKinematics:
-    """The kinematics of a controller file's `[kinematics]`; `fail(found, expected)` makes the error that names it."""
-    if not isinstance(table, dict):
-        raise fail(f"kinematics = {table!r}", "a table [kinematics] with type, tcp and the rotary axes")
-    return _Reader(table, fail).kinematics()
+def read_kinematics(toml: TomlReader) -> PostedKinematics | None:
+    """The kinematics of a controller file's `[kinematics]`; None where there is none. Raises `InputError`."""
+    given = toml.data.get("kinematics")
+    if given is None:
+        return None
+    table = toml.table("kinematics", given, "a table [kinematics] with type, tcp and the rotary axes")
+    kind = toml.needed("kinematics", table, "type", f"one of {', '.join(TYPES)}")
+    toml.choice("kinematics.type", kind, TYPES, ", ".join(TYPES))
+    parts = TYPES[kind]
+    known = ("type", "tcp", "points", "tolerance_mm", *(key for key, _ in parts))
+    toml.only("kinematics", table, known, f" in the type {kind!r}")
+    expected = "true (X Y Z are the tool tip on the part) or false (of the machine's axes)"
+    tcp = toml.flag("kinematics.tcp", toml.needed("kinematics", table, "tcp", expected))
+    axes = tuple(_axis(toml, table, key, turns, tcp) for key, turns in parts)
+    _check_pair(toml, axes, parts)
+    return PostedKinematics(kind, axes, tcp, _points(toml, table, axes), _tolerance(toml, table))
 
 
-class _Reader:
-    """One `[kinematics]` table."""
-
-    def __init__(self, table: Mapping[str, Any], fail: Fail) -> None:
-        self.table, self.fail = table, fail
-
-    def kinematics(self) -> PostedKinematics:
-        kind = self._needed("type", f"one of {', '.join(TYPES)}")
-        if not isinstance(kind, str) or kind not in TYPES:
-            raise self.fail(f"kinematics.type = {kind!r}", ", ".join(TYPES))
-        parts = TYPES[kind]
-        known = ("type", "tcp", "points", "tolerance_mm", *(key for key, _ in parts))
-        for key in self.table:
-            if key not in known:
-                raise self.fail(f"kinematics.{key} is not known in the type {kind!r}", ", ".join(known))
-        tcp = self._needed("tcp", "true (X Y Z are the tool tip on the part) or false (of the machine's axes)")
-        if not isinstance(tcp, bool):
-            raise self.fail(f"kinematics.tcp = {tcp!r}", "true or false")
-        axes = tuple(self._axis(key, turns, tcp) for key, turns in parts)
-        _check_pair(axes, parts, self.fail)
-        return PostedKinematics(kind, axes, tcp, self._points(axes), self._tolerance())
-
-    def _needed(self, key: str, expected: str) -> Any:
-        if key not in self.table:
-            raise self.fail(f"kinematics.{key} is missing", expected)
-        return self.table[key]
-
-    def _points(self, axes: tuple[RotaryAxis, ...]) -> str:
-        placed = any(axis.turns == TABLE and axis.point is not None for axis in axes)
-        expected = '"program" (coordinates of G54) or "machine": what point_mm is'
-        points = self._needed("points", expected) if placed else self.table.get("points", PROGRAM)
-        if points not in (PROGRAM, MACHINE):
-            raise self.fail(f"kinematics.points = {points!r}", expected)
-        return str(points)
-
-    def _tolerance(self) -> float:
-        value = self._number("kinematics.tolerance_mm", self.table.get("tolerance_mm", TOLERANCE_MM))
-        if not LEAST_TOLERANCE_MM <= value <= LARGEST_TOLERANCE_MM:
-            raise self.fail(
-                f"kinematics.tolerance_mm = {value:g}", f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}"
-            )
-        return m_from_mm(value)
-
-    def _axis(self, key: str, turns: str, tcp: bool) -> RotaryAxis:
-        where, place = f"kinematics.{key}", PLACE_KEYS[turns]
-        part = self._needed(key, f"[{where}] with letter, {place}")
-        known = ("letter", "axis", "reversed", "rollover", place)
-        if not isinstance(part, dict):
-            raise self.fail(f"{where} = {part!r}", f"a table [{where}] with {', '.join(known)}")
-        for name in part:
-            if name not in known:
-                raise self.fail(f"{where}.{name} is not known", ", ".join(known))
-        letter = part.get("letter")
-        if not isinstance(letter, str) or letter not in tuple(LETTERS):
-            raise self.fail(f"{where}.letter = {letter!r}" if letter else f"{where}.letter is missing", "A, B or C")
-        if place not in part and not tcp:
-            what = (
-                "a point of the table's axis"
-                if turns == TABLE
-                else "[x, y, z] from the gauge line to the axis; z: the pivot length"
-            )
-            raise self.fail(f"{where}.{place} is missing, and tcp is false", what)
-        sign = -1.0 if self._flag(where, part, "reversed") else 1.0
-        x, y, z = self._direction(f"{where}.axis", part.get("axis", "xyz"[LETTERS.index(letter)]))
-        point = self._vector(f"{where}.{place}", part[place]) if place in part else None
-        metres = None if point is None else (m_from_mm(point[0]), m_from_mm(point[1]), m_from_mm(point[2]))
-        direction = (sign * x + 0.0, sign * y + 0.0, sign * z + 0.0)
-        return RotaryAxis(letter, turns, direction, metres, self._flag(where, part, "rollover"))
-
-    def _flag(self, where: str, part: Mapping[str, Any], key: str) -> bool:
-        value = part.get(key, False)
-        if not isinstance(value, bool):
-            raise self.fail(f"{where}.{key} = {value!r}", "true or false")
-        return value
-
-    def _direction(self, where: str, value: object) -> Vector:
-        if isinstance(value, str) and value in DIRECTIONS:
-            return DIRECTIONS[value]
-        if not isinstance(value, list):
-            raise self.fail(f"{where} = {value!r}", '"x", "y", "z" or a vector [i, j, k]')
-        i, j, k = self._vector(where, value)
-        length = math.hypot(i, j, k)
-        if length < PARALLEL:
-            raise self.fail(f"{where} = {value!r} has no direction", "a vector [i, j, k]")
-        return (i / length, j / length, k / length)
-
-    def _vector(self, where: str, value: object) -> Vector:
-        if not isinstance(value, list) or len(value) != 3:
-            raise self.fail(f"{where} = {value!r}", "three numbers [x, y, z]")
-        x, y, z = (self._number(where, v) for v in value)
-        return (x, y, z)
-
-    def _number(self, where: str, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_MM:
-            raise self.fail(f"{where} = {value!r}", f"a number within +-{LARGEST_MM:g}")
-        return float(value)
+def _points(toml: TomlReader, table: Mapping[str, Any], axes: tuple[RotaryAxis, ...]) -> str:
+    placed = any(axis.turns == TABLE and axis.point is not None for axis in axes)
+    expected = '"program" (coordinates of G54) or "machine": what point_mm is'
+    points = toml.needed("kinematics", table, "points", expected) if placed else table.get("points", PROGRAM)
+    return toml.choice("kinematics.points", points, (PROGRAM, MACHINE), expected)
 
 
-def _check_pair(axes: tuple[RotaryAxis, ...], parts: tuple[tuple[str, str], ...], fail: Fail) -> None:
+def _tolerance(toml: TomlReader, table: Mapping[str, Any]) -> float:
+    where = "kinematics.tolerance_mm"
+    value = toml.number(where, table.get("tolerance_mm", TOLERANCE_MM), LARGEST_MM)
+    if not LEAST_TOLERANCE_MM <= value <= LARGEST_TOLERANCE_MM:
+        expected = f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}"
+        raise toml.error(f"{where} = {value:g}", expected, where=where)
+    return m_from_mm(value)
+
+
+def _axis(toml: TomlReader, table: Mapping[str, Any], key: str, turns: str, tcp: bool) -> RotaryAxis:
+    where, place = f"kinematics.{key}", PLACE_KEYS[turns]
+    given = toml.needed("kinematics", table, key, f"[{where}] with letter, {place}")
+    known = ("letter", "axis", "reversed", "rollover", place)
+    part = toml.table(where, given, f"a table [{where}] with {', '.join(known)}")
+    toml.only(where, part, known)
+    letter = part.get("letter")
+    if not letter:
+        raise toml.error(f"{where}.letter is missing", "A, B or C", where=where)
+    letter = toml.choice(f"{where}.letter", letter, tuple(LETTERS), "A, B or C")
+    if place not in part and not tcp:
+        what = (
+            "a point of the table's axis"
+            if turns == TABLE
+            else "[x, y, z] from the gauge line to the axis; z: the pivot length"
+        )
+        raise toml.error(f"{where}.{place} is missing, and tcp is false", what, where=where)
+    sign = -1.0 if toml.flag(f"{where}.reversed", part.get("reversed", False)) else 1.0
+    x, y, z = _direction(toml, f"{where}.axis", part.get("axis", "xyz"[LETTERS.index(letter)]))
+    point = _vector(toml, f"{where}.{place}", part[place]) if place in part else None
+    metres = None if point is None else (m_from_mm(point[0]), m_from_mm(point[1]), m_from_mm(point[2]))
+    direction = (sign * x + 0.0, sign * y + 0.0, sign * z + 0.0)
+    rollover = toml.flag(f"{where}.rollover", part.get("rollover", False))
+    return RotaryAxis(letter, turns, direction, metres, rollover)
+
+
+def _direction(toml: TomlReader, where: str, value: object) -> Vector:
+    if isinstance(value, str) and value in DIRECTIONS:
+        return DIRECTIONS[value]
+    if not isinstance(value, list):
+        raise toml.error(f"{where} = {value!r}", '"x", "y", "z" or a vector [i, j, k]', where=where)
+    i, j, k = _vector(toml, where, value)
+    length = math.hypot(i, j, k)
+    if length < PARALLEL:
+        raise toml.error(f"{where} = {value!r} has no direction", "a vector [i, j, k]", where=where)
+    return (i / length, j / length, k / length)
+
+
+def _vector(toml: TomlReader, where: str, value: object) -> Vector:
+    if not isinstance(value, list) or len(value) != 3:
+        raise toml.error(f"{where} = {value!r}", "three numbers [x, y, z]", where=where)
+    x, y, z = (toml.number(where, v, LARGEST_MM) for v in value)
+    return (x, y, z)
+
+
+def _check_pair(toml: TomlReader, axes: tuple[RotaryAxis, ...], parts: tuple[tuple[str, str], ...]) -> None:
     """Raise the error of two axes that are one, or that one letter moves."""
     if len(axes) < 2:
         return
     first, second = (f"kinematics.{key}" for key, _ in parts)
     if axes[0].letter == axes[1].letter:
-        raise fail(f"{first}.letter and {second}.letter are both {axes[0].letter!r}", "two letters")
+        found = f"{first}.letter and {second}.letter are both {axes[0].letter!r}"
+        raise toml.error(found, "two letters", where=f"{second}.letter")
     (a, b, c), (d, e, f) = axes[0].direction, axes[1].direction
     if math.hypot(b * f - c * e, c * d - a * f, a * e - b * d) < PARALLEL:
-        raise fail(f"{first}.axis and {second}.axis are parallel", "two directions")
+        raise toml.error(f"{first}.axis and {second}.axis are parallel", "two directions", where=f"{second}.axis")
 
 
 FloatArray = NDArray[np.float64]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import MACHINE, PROGRAM, TABLE, PostedKinematics, RotaryAxis, tool_poses
 from toolpath_stiff.nc.moves import RAPID, Moves, Program, ToolUse
@@ -130,7 +130,7 @@ def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: s
     """Raise `InputError` for work offsets with A, B, C under tool centre point control: controls differ in them."""
     every = (*offsets.table, *offsets.additional.values())
     if kinematics.tcp and any(any(offset.axes[3:]) for offset in every):
-        raise InputError(
+        raise ProgramError(
             "a work offset with A, B or C, and tool centre point control (kinematics.tcp = true): controls differ in "
             "what X Y Z are then",
             expected="work offsets of X Y Z alone",
@@ -162,7 +162,7 @@ def _points_at(kinematics: PostedKinematics, zero: Pose | None, name: str) -> Po
     if kinematics.points != MACHINE or not used:
         return kinematics
     if zero is None:
-        raise InputError(
+        raise ProgramError(
             'kinematics.points = "machine" needs the place of G54 on the machine that the program was posted for',
             expected="G54 in the controller file's [offsets], or G10 L2 P1 in the program",
             hint='or give the points in program coordinates: points = "program"',
@@ -195,7 +195,7 @@ def _known_points(
     )
     cuts = fixed & (moves.motion != RAPID)
     if cuts.any():
-        raise InputError(
+        raise ProgramError(
             f"a cut that begins or ends at a point of the machine that the program was posted for (G53, G28, G30): "
             f"{reason}",
             expected="rapids alone there, and X Y Z in the move after them",

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import cutter_location
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
 from toolpath_stiff.nc.cutter_location.statements import HEAD_LINES, looks_like_cutter_location
@@ -67,7 +67,7 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
     for at in places:
         what = language_of(lines[at])
         if what is not None:
-            return InputError(
+            return ProgramError(
                 f"{lines[at].strip()[:40]!r} is {what}, which is not read",
                 expected="G code",
                 hint=HINTS[what],
@@ -216,9 +216,9 @@ def _read(asked: _Request) -> Program:
     """Choose the interpreter: the built-in one, LinuxCNC's, or that where the first refuses."""
     lines, name = asked.lines, asked.name
     if asked.interpreter not in INTERPRETERS:
-        raise InputError(f"interpreter {asked.interpreter!r}", expected=", ".join(INTERPRETERS))
+        raise ProgramError(f"interpreter {asked.interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in lines):
-        raise InputError("the program is empty", expected="an NC program", file=name)
+        raise ProgramError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
         return _read_cutter_location(asked)
     foreign = foreign_program(lines, name)
@@ -240,7 +240,7 @@ def _read(asked: _Request) -> Program:
 
 def _read_cutter_location(asked: _Request) -> Program:
     if asked.interpreter == "linuxcnc":
-        raise InputError(
+        raise ProgramError(
             "LinuxCNC's interpreter reads no cutter-location files",
             expected="--interpreter builtin",
             file=asked.name,
@@ -263,7 +263,7 @@ def _second_opinion(error: InputError, asked: _Request) -> Program:
     try:
         found = find_rs274(asked.rs274)
     except InputError as missing:
-        raise InputError(
+        raise ProgramError(
             error.found,
             expected=error.expected,
             hint=f"LinuxCNC's interpreter may read it: {missing.hint}",
@@ -312,7 +312,7 @@ def _read_built_in(asked: _Request) -> Program:
     run = ProgramRun(state, asked.lines, asked.name, asked.switches)
     warnings = run.run()
     if not state.recorder.cuts:
-        raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=asked.name)
+        raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=asked.name)
     g54 = asked.offsets.table[0].given or frames.offsets.table[0].given
     if frames.source == "option" and g54:
         warnings.append(

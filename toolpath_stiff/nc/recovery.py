@@ -13,7 +13,7 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.kinematics import HEAD, LETTERS, PostedKinematics, line_point, roll_pitch, tool_poses, turned
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves
@@ -88,7 +88,7 @@ def recover_moves(
 
 def _check_pieces(count: IntArray, moves: Moves, kinematics: PostedKinematics, name: str) -> None:
     if count.sum() > MOST_PIECES:
-        raise InputError(
+        raise ProgramError(
             f"dividing moves with turning axes within {mm_from_m(kinematics.tolerance):g} mm gives "
             f"{float(count.sum()):.0f} pieces",
             expected=f"at most {MOST_PIECES}",
@@ -141,7 +141,7 @@ def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> Non
     for column, letter in enumerate(LETTERS):
         used = (moves.start[:, 3 + column] != 0.0) | (moves.end[:, 3 + column] != 0.0)
         if letter not in letters and used.any():
-            raise InputError(
+            raise ProgramError(
                 f"{letter} turns, and the kinematics that the program was posted for has {' and '.join(letters)} alone",
                 expected=f"no {letter} words",
                 hint="see [kinematics] of the controller file",
@@ -182,7 +182,7 @@ def _lengths_at_heads(
     missing = tilted & ~held & np.isnan(length)
     if missing.any():
         first = int(np.argmax(missing))
-        raise InputError(
+        raise ProgramError(
             f"the head is tilted, and the length of tool {moves.tool[first]} is not known: the pivot is the pivot "
             "length and the tool's length above the tip",
             expected="the tool's length from the gauge line to the tip",

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Arc, Recorder, ToolUse, Unsupported
@@ -108,7 +108,7 @@ class CurrentBlock:
         """An error at a word of the block, or at the block."""
         text = f"{word.text} {found}" if word else found
         column = word.column if word else self.block.words[0].column
-        return InputError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)
+        return ProgramError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)
 
 
 # -- what a control keeps ----------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import ProgramError
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
@@ -60,9 +60,9 @@ def _lines(path: str | Path, what: str) -> list[str]:
     try:
         return Path(path).read_text(encoding="utf-8-sig").splitlines()
     except OSError as error:
-        raise InputError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+        raise ProgramError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise InputError(f"{what} is not a text file", file=str(path)) from None
+        raise ProgramError(f"{what} is not a text file", file=str(path)) from None
 
 
 def _number(text: str, what: str, path: str | Path, line: int) -> float:
@@ -71,7 +71,9 @@ def _number(text: str, what: str, path: str | Path, line: int) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or abs(value) > LARGEST_MM:
-        raise InputError(f"{what} = {text!r}", expected=f"a number within +-{LARGEST_MM:g}", file=str(path), line=line)
+        raise ProgramError(
+            f"{what} = {text!r}", expected=f"a number within +-{LARGEST_MM:g}", file=str(path), line=line
+        )
     return value
 
 
@@ -94,13 +96,13 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
     lines = _lines(path, "tool table")
     filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     if not filled:
-        raise InputError("the tool table is empty", file=str(path))
+        raise ProgramError("the tool table is empty", file=str(path))
     is_csv = "," in filled[0][1] and not filled[0][1].lstrip().upper().startswith(("T0", "T1", ";"))
     tools = _csv_tools(path, filled) if is_csv else _linuxcnc_tools(path, filled)
     found: dict[int, ToolEntry] = {}
     for line, tool in tools:
         if tool.number in found:
-            raise InputError(f"tool {tool.number} appears twice", file=str(path), line=line)
+            raise ProgramError(f"tool {tool.number} appears twice", file=str(path), line=line)
         found[tool.number] = tool
     return found
 
@@ -112,13 +114,13 @@ def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int
     missing = [name for name in columns[:2] if name not in heading]
     if unknown or missing:
         found = f"column {unknown[0]!r} is not known" if unknown else f"column {missing[0]!r} is missing"
-        raise InputError(found, expected=f"columns {', '.join(columns)}", file=str(path), line=lines[0][0])
+        raise ProgramError(found, expected=f"columns {', '.join(columns)}", file=str(path), line=lines[0][0])
     rows = []
     for line, text in lines[1:]:
         cells = dict(zip(heading, (cell.strip() for cell in next(csv.reader([text]))), strict=False))
         number = _number(cells.get("tool", ""), "tool", path, line)
         if number != int(number) or number < 0:
-            raise InputError(f"tool = {cells['tool']!r}", expected="a whole number", file=str(path), line=line)
+            raise ProgramError(f"tool = {cells['tool']!r}", expected="a whole number", file=str(path), line=line)
         length = _number(cells.get("length_mm", ""), "length_mm", path, line)
         diameter, stick_out = (
             _number(cells[name], name, path, line) if cells.get(name) else math.nan
@@ -138,7 +140,7 @@ def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tupl
         words = dict(re.findall(r"([A-Za-z])\s*([^\sA-Za-z]+(?:[eE][+-]?\d+)?)", content))
         words = {letter.upper(): value for letter, value in words.items()}
         if "T" not in words or not words["T"].isdigit():
-            raise InputError(
+            raise ProgramError(
                 f"{content.strip()!r} is not a tool",
                 expected="T<number> P<pocket> Z<length mm> D<diameter mm> ;remark",
                 file=str(path),
@@ -190,7 +192,7 @@ def read_offsets(path: str | Path) -> Offsets:
     filled = [(number, line.split("#")[0].strip()) for number, line in enumerate(lines, 1)]
     filled = [(number, line) for number, line in filled if line]
     if not filled:
-        raise InputError("the offsets file is empty", expected="lines such as G55 = [100, 0, 0]", file=str(path))
+        raise ProgramError("the offsets file is empty", expected="lines such as G55 = [100, 0, 0]", file=str(path))
     offsets = Offsets()
     for line, text in filled:
         parameter = re.fullmatch(r"(\d+)\s+(\S+)", text)
@@ -202,12 +204,12 @@ def read_offsets(path: str | Path) -> Offsets:
             values = [_number(v.strip(), name, path, line) for v in assignment[2].split(",") if v.strip()]
             most = 6 if name in HOMES else 7
             if not 1 <= len(values) <= most:
-                raise InputError(
+                raise ProgramError(
                     f"{name} has {len(values)} numbers", expected=f"1 to {most}", file=str(path), line=line
                 )
             set_offset(offsets, name, values)
         else:
-            raise InputError(
+            raise ProgramError(
                 f"{text!r} is not an offset",
                 expected="G54 = [x, y, z, a, b, c, r] (to G59.3, G28, G30, G54.1 P1), or LinuxCNC's `5221 12.5`",
                 file=str(path),

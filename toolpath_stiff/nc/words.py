@@ -15,7 +15,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
@@ -77,7 +77,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
             start += 1
         switch = int(compact[1:start] or 1)
         if not 1 <= switch <= 9:
-            raise InputError(
+            raise ProgramError(
                 f"block-delete switch {compact[:start]!r}",
                 expected="/ or /1 to /9",
                 file=name,
@@ -94,10 +94,10 @@ def _program_number(compact: str, column: int, line: int, name: str) -> Block:
     """`O1234` alone is a program's number; any other O word controls subprograms or loops."""
     if compact[1:].isascii() and compact[1:].isdigit():
         return Block(line, (Word("O", float(compact[1:]), column, compact),))
-    raise InputError(
+    raise ProgramError(
         f"O word {compact[:20]!r}: subprograms and loops are not supported",
         expected="plain moves",
-        hint="expand it before analysing (the control or the post can do it), or give --interpreter linuxcnc",
+        hint="expand it before analyzing (the control or the post can do it), or give --interpreter linuxcnc",
         file=name,
         line=line,
         column=column,
@@ -119,7 +119,7 @@ def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Seque
             if character == ")":
                 inside = 0
             elif character == "(":
-                raise InputError(
+                raise ProgramError(
                     "a comment within a comment",
                     expected="`)` before the next `(`",
                     file=name,
@@ -130,7 +130,7 @@ def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Seque
             inside = column
         elif character == ";":
             if not semicolon and text[column:].strip():
-                raise InputError(
+                raise ProgramError(
                     f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect",
                     expected="comments in parentheses, one block a line",
                     file=name,
@@ -139,13 +139,13 @@ def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Seque
                 )
             break
         elif character == ")":
-            raise InputError("`)` without `(`", file=name, line=line, column=column)
+            raise ProgramError("`)` without `(`", file=name, line=line, column=column)
         elif not character.isspace() and character != "\ufeff":
             # Of other scripts some letters grow in upper case, and some become ASCII ones.
             characters.append(character.upper() if character.isascii() else character)
             columns.append(column)
     if inside:
-        raise InputError(
+        raise ProgramError(
             "a comment is not closed", expected="`)` on the same line", file=name, line=line, column=inside
         )
     return "".join(characters), columns
@@ -173,7 +173,7 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
         original = text[column - 1 : columns[end - 1]]
         if letter == "N":
             if words:
-                raise InputError(
+                raise ProgramError(
                     f"line number {original!r} after another word",
                     expected="N at the beginning of the line",
                     file=name,
@@ -181,11 +181,11 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
                     column=column,
                 )
         elif letter not in LETTERS:
-            raise InputError(f"word {original!r} is not known", file=name, line=line, column=column)
+            raise ProgramError(f"word {original!r} is not known", file=name, line=line, column=column)
         else:
             value = float(number)
             if not math.isfinite(value):
-                raise InputError(f"{original!r} is not a finite number", file=name, line=line, column=column)
+                raise ProgramError(f"{original!r} is not a finite number", file=name, line=line, column=column)
             words.append(Word(letter, value, column, original))
         position = end
     return words
@@ -212,7 +212,7 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
         found, expected = f"the polar word {character!r} has no number", f"a number after {character}"
     elif character == "%":
         found, expected = "`%` among other words", "`%` alone on its line"
-    return InputError(found, expected=expected, hint=hint, file=name, line=line, column=column)
+    return ProgramError(found, expected=expected, hint=hint, file=name, line=line, column=column)
 
 
 def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...]:
@@ -236,7 +236,7 @@ def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...
         except (GCodeWordStrError, ValueError):
             alone = None
         if alone is None or float(alone.value) != word.value:
-            raise InputError(
+            raise ProgramError(
                 f"word {word.text!r} cannot be read",
                 expected=_expected(word.letter),
                 file=name,
@@ -282,7 +282,7 @@ def read_lines(path: str | Path) -> tuple[str, ...]:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise InputError(f"cannot read {str(path)!r}: {error.strerror}") from None
+        raise ProgramError(f"cannot read {str(path)!r}: {error.strerror}") from None
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -302,7 +302,7 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
     binary = BINARY.search(joined)
     if binary is not None:
         at = binary.start()
-        raise InputError(
+        raise ProgramError(
             f"binary byte 0x{ord(binary[0]):02X}",
             expected="the text of an NC program",
             file=name,

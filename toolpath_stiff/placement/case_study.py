@@ -12,7 +12,8 @@ from importlib import resources
 from itertools import pairwise
 from typing import Any
 
-from toolpath_stiff.analysis import Analysis, analyse
+from toolpath_stiff import defaults
+from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.nc import Program, parse_program
@@ -67,19 +68,27 @@ def origin_of(x_mm: float, y_mm: float, z_mm: float, turn_deg: float) -> Pose:
     return (m_from_mm(x_mm), m_from_mm(y_mm), m_from_mm(z_mm), 0.0, 0.0, rad_from_deg(turn_deg))
 
 
-def run_case_study(model: StiffnessModel, step: float = 1e-3) -> CaseStudy:
-    """Analyse the path in every region, over the heights, and its non-planar variants.
+def run_case_study(model: StiffnessModel, step: float = defaults.STEP) -> CaseStudy:
+    """Analyze the path in every region, over the heights, and its non-planar variants.
 
     Raises
     ------
     UnreachableError
         The machine cannot reach a region (the regions are those of the reference machine).
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> study = run_case_study(build_model(load_machine("nist")), step=0.02)
+    >>> [found["holds"] for found in study.summary["conclusions"]]
+    [True, True, True]
     """
     program = case_study_program()
-    regions = {name: analyse(model, program, origin=origin_of(*at), step=step) for name, at in REGIONS.items()}
+    regions = {name: analyze(model, program, origin=origin_of(*at), step=step) for name, at in REGIONS.items()}
     figures = {name: _figures(analysis) for name, analysis in regions.items()}
     heights = [
-        {"z_mm": z, **_figures(analyse(model, program, origin=origin_of(150.0, 100.0, z, 0.0), step=step))}
+        {"z_mm": z, **_figures(analyze(model, program, origin=origin_of(150.0, 100.0, z, 0.0), step=step))}
         for z in HEIGHTS_MM
     ]
     waves = [_wave(model, amplitude, step) for amplitude in WAVES_MM]
@@ -156,7 +165,7 @@ def _wave(model: StiffnessModel, amplitude: float, step: float) -> dict[str, Any
     """The wavy square in the four regions, and whether its mean still does not depend on where it lies."""
     program = wavy_program(amplitude)
     figures = {
-        name: _figures(analyse(model, program, origin=origin_of(*at), step=step)) for name, at in REGIONS.items()
+        name: _figures(analyze(model, program, origin=origin_of(*at), step=step)) for name, at in REGIONS.items()
     }
     return {
         "amplitude_mm": amplitude,

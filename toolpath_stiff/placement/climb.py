@@ -14,13 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.placement.evaluator import Evaluator, PlacedRows, PlacementFigures
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 DIFFERENCE = 1e-6  # of each range, for the derivatives
 PENALTY = 100.0  # what a shortfall costs, in units of the objective
@@ -44,7 +40,7 @@ class Bounds:
     heights: tuple[float, ...] = ()
 
     @property
-    def free(self) -> NDArray[np.int64]:
+    def free(self) -> IntArray:
         """Columns of a placement that vary."""
         return np.flatnonzero(self.high > self.low)
 
@@ -137,7 +133,7 @@ class Climber:
     rules: Rules
 
     @property
-    def free(self) -> NDArray[np.int64]:
+    def free(self) -> IntArray:
         """Columns that a climb may vary: a height from a list stays."""
         free = self.bounds.free
         return free[free != 2] if self.bounds.heights else free
@@ -335,7 +331,7 @@ def _block(slopes: FloatArray, rest: list[float]) -> FloatArray:
     return np.concatenate([slopes.T, np.tile(np.array(rest), (n, 1))], axis=1)
 
 
-def front_rows(figures: PlacementFigures, kept: NDArray[np.bool_]) -> IntArray:
+def front_rows(figures: PlacementFigures, kept: BoolArray) -> IntArray:
     """Rows of those kept that no other beats in all of mean, range and weakest, by rising mean; equals stand once."""
     rows = np.flatnonzero(kept & np.isfinite(figures.mean))
     values, first = np.unique(figures.objectives[rows], axis=0, return_index=True)

@@ -8,12 +8,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.analysis import Analysis
 from toolpath_stiff.analysis.loads import Load, plunging_rows
 from toolpath_stiff.analysis.results import assumptions
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.climb import Bounds
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
@@ -30,8 +30,6 @@ from toolpath_stiff.units import (
     rad_from_deg,
     um_from_m,
 )
-
-FloatArray = NDArray[np.float64]
 
 PLACEMENT = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "rotation_deg")
 # The three objectives and where their values stand.

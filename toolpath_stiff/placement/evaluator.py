@@ -10,20 +10,26 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.loads import Load, load_directions
 from toolpath_stiff.analysis.poses import evaluate
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.kinematics import neutral_axes, solve_struts, solve_struts_at
-from toolpath_stiff.machine.limits import machine_limits, reach
+from toolpath_stiff.machine.limits import (
+    AXES,
+    FRAME,
+    PLATFORM,
+    SINGULARITY,
+    STRUT,
+    Limit,
+    distinct_limits,
+    reach,
+    smallest_margin,
+)
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, compiled, core
 from toolpath_stiff.stiffness.model import StiffnessModel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 POSES_AT_A_TIME = 30_000  # fits the processor's cache
 # Evaluations of the whole path in a search, about: says whether numba's half a second is earned back.
@@ -129,7 +135,7 @@ class Evaluator:
             (rows, float(self.tool_length[rows[0]]), closed_form.prepare(machine, float(self.tool_length[rows[0]])))
             for rows in _groups(self.tool_length)
         ]
-        self.spans = {limit.name: limit.span for limit in machine_limits(machine)}
+        self.limits = distinct_limits(machine)
         self.axes = neutral_axes(machine)
         neutral = solve_struts_at(machine, machine.limits.neutral_pose)
         self.neutral_determinant = float(np.abs(np.linalg.det(neutral.jacobian[0])))
@@ -249,26 +255,16 @@ class Evaluator:
         self, position: FloatArray, rotation: FloatArray | None, lengths: FloatArray, index: FloatArray, tool: float
     ) -> FloatArray:
         """(n,) smallest margin to any limit, as `machine.limits.reach` has it; poses last: (3, n), (6, n), (n,)."""
-        machine, spans = self.model.machine, self.spans
-        limits = machine.limits
-        margin = np.full(lengths.shape[1], np.inf)
-        low, high = limits.strut_length
-        np.minimum(margin, (lengths.min(axis=0) - low) / spans["strut1 min length"], out=margin)
-        if np.isfinite(high):
-            np.minimum(margin, (high - lengths.max(axis=0)) / spans["strut1 max length"], out=margin)
-        bounds = (limits.frame_joint_angle, limits.platform_joint_angle)
-        for of_platform, bound in enumerate(bounds):
-            if np.isfinite(bound):
-                cosine = (self._along_axes(bool(of_platform), position, rotation, tool) / lengths).min(axis=0)
-                np.minimum(margin, (bound - np.arccos(np.clip(cosine, -1.0, 1.0))) / bound, out=margin)
-        lower, upper = limits.workspace
-        for axis, name in enumerate("xyz"):
-            if np.isfinite(lower[axis]):
-                np.minimum(margin, (position[axis] - lower[axis]) / spans[f"workspace {name} min"], out=margin)
-            if np.isfinite(upper[axis]):
-                np.minimum(margin, (upper[axis] - position[axis]) / spans[f"workspace {name} max"], out=margin)
-        np.minimum(margin, (index - limits.singularity) / (1.0 - limits.singularity), out=margin)
-        return margin
+
+        def extreme(limit: Limit) -> FloatArray:
+            if limit.quantity == STRUT:
+                return np.asarray(lengths.min(axis=0) if limit.lower else lengths.max(axis=0))
+            if limit.quantity in (FRAME, PLATFORM):
+                along = self._along_axes(limit.quantity == PLATFORM, position, rotation, tool)
+                return np.asarray(np.arccos(np.clip((along / lengths).min(axis=0), -1.0, 1.0)))
+            return index if limit.quantity == SINGULARITY else position[AXES.index(limit.quantity)]
+
+        return np.broadcast_to(smallest_margin(self.limits, extreme), index.shape).copy()
 
     def _along_axes(
         self, of_platform: bool, position: FloatArray, rotation: FloatArray | None, tool: float

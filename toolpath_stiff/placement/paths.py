@@ -12,29 +12,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.analysis.poses import evaluate
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import Pose
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from toolpath_stiff.units import Pose, rad_from_deg
 
 Read = Callable[[Pose], Program]  # the program as it is read where its zero sits there
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others
 LEG_SAMPLES = 40  # of an anchored rapid, at most; 25 mm apart over a metre, and reach changes slowly
 
-CORNER = np.deg2rad(10.0)  # a sharper one is kept before samples along straight cuts are
+CORNER = rad_from_deg(10.0)  # a sharper one is kept before samples along straight cuts are
 SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
 
 
@@ -158,7 +153,7 @@ def work_path(
     moves = program.moves
     fixed = (moves.motion != RAPID) & moves.from_machine.any(axis=1)
     if fixed.any():
-        raise InputError(
+        raise ProgramError(
             "a cutting move from or to machine coordinates (G53, G28) does not move with the work",
             hint="end it in work coordinates before placing the program",
             file=program.name,
@@ -236,7 +231,7 @@ def _leg(
         count = int(np.clip(np.ceil(length / 5e-3), 2, LEG_SAMPLES))
     u = np.linspace(0.0, 1.0, count)
 
-    def repeated(values: NDArray[Any]) -> NDArray[Any]:
+    def repeated(values: AnyArray) -> AnyArray:
         return np.repeat(values[:, None], count, axis=1)
 
     return Anchored(

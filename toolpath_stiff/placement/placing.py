@@ -1,4 +1,4 @@
-"""A program placed: search or an earlier search's front, one placement chosen, analysed, and everything said about it.
+"""A program placed: search or an earlier search's front, one placement chosen, analyzed, and everything said about it.
 
 `place_program` searches; `place_again` takes another point of a front that was found before, and refuses where
 anything has changed since that search (`fingerprint`). Both return `Placed`, which the command line saves and prints.
@@ -12,10 +12,9 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.analysis.results import Analysis, analyse
+from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.writer import machine_toml
@@ -39,8 +38,6 @@ from toolpath_stiff.placement.search import SearchRules, search_placements
 from toolpath_stiff.rewriting import Rewritten, check_decimals, check_rewritable, rewrite_program
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import Pose, mm_from_m
-
-FloatArray = NDArray[np.float64]
 
 COMPARED = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "min": "min_N_per_mm"}
 
@@ -70,7 +67,7 @@ class Task:
     bounds, rules
         What may vary; what a placement must keep and be good at.
     load, step, force
-        As `analyse` takes them.
+        As `analyze` takes them.
     rewriting
         Whether and how the program itself is written; None: not.
     """
@@ -114,7 +111,7 @@ class Placed:
 
 
 def place_program(task: Task, progress: Callable[[int, int], None] | None = None) -> Placed:
-    """Search, and place the program where the search recommends.
+    r"""Search, and place the program where the search recommends.
 
     Raises
     ------
@@ -122,6 +119,24 @@ def place_program(task: Task, progress: Callable[[int, int], None] | None = None
         The program cannot be placed, or not be written there (before the search where that can be seen).
     UnreachableError
         No placement keeps the limits.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.nc import parse_program
+    >>> from toolpath_stiff.stiffness.model import build_model
+    >>> present = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
+    >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc", origin=present)
+    >>> here = np.array([0.0, 0.1, 0.8, 0.0, 0.0, 0.0])  # a search of some seconds has bounds apart
+    >>> task = Task(
+    ...     build_model(load_machine("nist")), slot, present, lambda zero: slot, Bounds(here, here),
+    ...     SearchRules(objective="mean", points=5), Load(), step=0.01, force=1000.0,
+    ... )
+    >>> placed = place_program(task)
+    >>> [round(placed.summary[which]["mean_N_per_mm"]) for which in ("before", "chosen")]
+    [54352, 54097]
+    >>> placed.summary["warnings"][0].partition(",")[0]
+    'WORSE: at the recommended placement the mean is lower than at the present one'
     """
     check_task(task)
     path = _path(task)
@@ -193,11 +208,11 @@ def _path(task: Task) -> WorkPath:
 def _placed(
     task: Task, rows: list[dict[str, Any]], search: dict[str, Any], number: int, present: PlacementFigures
 ) -> Placed:
-    """Analyse, before and at the chosen point; collect what is to be said."""
-    before, reason = _analysed(task, task.program, task.present)
+    """Analyze, before and at the chosen point; collect what is to be said."""
+    before, reason = _analyzed(task, task.program, task.present)
     at = pose_of(placement_of(rows[number - 1]))
     program = task.read(at) if task.program.moves.from_machine.any() else task.program
-    best, beyond = _analysed(task, program, at)
+    best, beyond = _analyzed(task, program, at)
     if best is None:
         raise UnreachableError(f"placement {number} of the front: {beyond}", hint="search again")
     margins = {key: rows[number - 1][key] for key in ("margin", "rapid_margin")}
@@ -210,10 +225,10 @@ def _placed(
     return Placed(task, summary, best, before, program, rewritten)
 
 
-def _analysed(task: Task, program: Program, at: Pose) -> tuple[Analysis | None, str]:
+def _analyzed(task: Task, program: Program, at: Pose) -> tuple[Analysis | None, str]:
     """The program at a placement, or None and why."""
     try:
-        return analyse(task.model, program, origin=at, load=task.load, step=task.step, force=task.force), ""
+        return analyze(task.model, program, origin=at, load=task.load, step=task.step, force=task.force), ""
     except UnreachableError as error:
         return None, str(error)
 
@@ -297,16 +312,16 @@ def rewriting_differences(
     Parameters
     ----------
     placed
-        The untouched program, analysed at the placement.
+        The untouched program, analyzed at the placement.
     rewritten
-        Is read and analysed at the original origin with the same load, force and step.
+        Is read and analyzed at the original origin with the same load, force and step.
     original_origin
         m and rad, as it was given to `rewrite_program`.
     **reading
         `offsets`, `tools`, `block_delete`, as for `parse_program`.
     """
     program = parse_program(rewritten.text, placed.program.name, origin=original_origin, **reading)
-    again = analyse(
+    again = analyze(
         placed.model, program, origin=original_origin, load=placed.load, step=placed.step, force=placed.force
     )
     wanted, found = (stiffness_figures(analysis, analysis.counted) for analysis in (placed, again))

@@ -11,10 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.poses import evaluate
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
@@ -25,16 +26,6 @@ from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-# Weights of mean, minus range, weakest.
-OBJECTIVES = {
-    "balanced": (1.0, 1.0, 0.0),
-    "mean": (1.0, 0.0, 0.0),
-    "range": (0.0, 1.0, 0.0),
-    "weakest": (0.0, 0.0, 1.0),
-}
 SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
 SCOUTS = 1000  # placements tried at random before the evolution
 GENERATIONS, CHILDREN, ARCHIVE = 36, 60, 120
@@ -54,7 +45,7 @@ class SearchRules:
     Attributes
     ----------
     objective
-        One of `OBJECTIVES`, for the recommendation.
+        One of `defaults.OBJECTIVES`, for the recommendation.
     margin
         Smallest margin to any limit, as a share of its span.
     allow_extrapolation
@@ -67,12 +58,12 @@ class SearchRules:
         Most points of the front.
     """
 
-    objective: str = "balanced"
-    margin: float = 0.01
+    objective: str = defaults.OBJECTIVE
+    margin: float = defaults.MARGIN
     allow_extrapolation: bool = False
     keepouts: tuple[Keepout, ...] = ()
-    seed: int = 1
-    points: int = 60
+    seed: int = defaults.PLACEMENT_SEED
+    points: int = defaults.FRONT_POINTS
 
 
 @dataclass(frozen=True)
@@ -140,7 +131,7 @@ class _Search:
     def climber(self, name: str) -> Climber:
         return Climber(self.evaluators[name], self.bounds, self.rules)
 
-    def kept(self, figures: PlacementFigures) -> NDArray[np.bool_]:
+    def kept(self, figures: PlacementFigures) -> BoolArray:
         return np.asarray(self.rules.violation(figures) == 0.0)
 
 
@@ -151,7 +142,7 @@ def search_placements(
     bounds: Bounds,
     asked: SearchRules | None = None,
     *,
-    force: float = 1000.0,
+    force: float = defaults.FORCE,
     present: FloatArray | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> PlacementResult:
@@ -176,8 +167,8 @@ def search_placements(
         No placement keeps the rules; says which one binds at the least bad placement, at which line, by how much.
     """
     asked = asked or SearchRules()
-    if asked.objective not in OBJECTIVES:
-        raise InputError(f"objective {asked.objective!r}", expected=f"one of {', '.join(OBJECTIVES)}")
+    if asked.objective not in defaults.OBJECTIVES:
+        raise InputError(f"objective {asked.objective!r}", expected=f"one of {', '.join(defaults.OBJECTIVES)}")
     report = progress or (lambda done, total: None)
     rng = np.random.default_rng(asked.seed)
     search = _Search(model, path, load, force, bounds, asked, rules=Rules(asked.margin))
@@ -196,6 +187,15 @@ def search_placements(
     ends = _climbed(search, candidates, now)
     report(3, 4)
     candidates = np.vstack([candidates, ends] + ([present[None]] if present is not None and held else []))
+    found = _result(search, candidates, now, unmended)
+    report(4, 4)
+    return found
+
+
+def _result(
+    search: _Search, candidates: FloatArray, now: PlacementFigures | None, unmended: tuple[tuple[int, str], ...]
+) -> PlacementResult:
+    """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
     figures = search.evaluators["whole"].figures(candidates)
     if not search.kept(figures).any():
         raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
@@ -204,8 +204,7 @@ def search_placements(
     if best not in rows:  # equal to another in all three
         rows = np.append(rows, best)
     rows = rows[np.argsort(figures.mean[rows], kind="stable")]
-    rows = thin(figures.take(rows).objectives, rows, asked.points, best)
-    report(4, 4)
+    rows = thin(figures.take(rows).objectives, rows, search.asked.points, best)
     return PlacementResult(
         front=candidates[rows],
         figures=figures.take(rows),
@@ -308,8 +307,8 @@ def _survivors(
 
 def _climbed(search: _Search, candidates: FloatArray, now: PlacementFigures | None) -> FloatArray:
     """The recommendation and the ends of the front, climbed to from several of the candidates."""
-    asked = OBJECTIVES[search.asked.objective]
-    ends = [Goal(weights, NO_FLOORS) for weights in OBJECTIVES.values()]
+    asked = defaults.OBJECTIVES[search.asked.objective]
+    ends = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
     figures = search.evaluators["middle"].figures(candidates)
     if now is not None and now.margin[0] >= 0.0:
         goal = Goal(asked, now.objectives[0])
@@ -347,7 +346,7 @@ def _recommended(
     search: _Search, candidates: FloatArray, figures: PlacementFigures, now: PlacementFigures | None
 ) -> int:
     """Row of the recommendation: the best of those that are no worse in anything, else the least worse."""
-    goal = Goal(OBJECTIVES[search.asked.objective], NO_FLOORS)
+    goal = Goal(defaults.OBJECTIVES[search.asked.objective], NO_FLOORS)
     possible = np.flatnonzero(search.kept(figures))
     if now is not None and now.margin[0] >= 0.0:
         objectives = figures.objectives[possible]

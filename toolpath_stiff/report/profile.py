@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.statistics import NORMAL_95, stiffness_figures, weakest_places
+from toolpath_stiff import defaults
+from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
 from toolpath_stiff.report.figure import (
     DPI,
     INK,
@@ -152,7 +153,7 @@ def profile_band(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatAr
     if band is None:
         return None
     _, k = profile_curve(analysis, with_plunges)
-    reach = NORMAL_95 * n_per_mm_from_n_per_m(band.deviation)
+    reach = defaults.NORMAL_95 * n_per_mm_from_n_per_m(band.deviation)
     return k - reach, k + reach
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes import MOTION, PLANE
 from toolpath_stiff.nc.interpreter import execute
@@ -185,7 +185,7 @@ class Controls:
 
     def refusal(self, found: str, hint: str = "") -> InputError:
         """Why the current block cannot be rewritten."""
-        return InputError(found, hint=hint, file=self.source.name, line=self.block.line)
+        return ProgramError(found, hint=hint, file=self.source.name, line=self.block.line)
 
     # -- units and axes --------------------------------------------------------------------------------------------
 

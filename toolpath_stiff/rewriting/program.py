@@ -1,6 +1,6 @@
 """A program written for another placement, or its placement as offsets to key in at the control.
 
-`rewrite_program` returns the text that, analysed at the original origin, takes the tool along the placed path. Every
+`rewrite_program` returns the text that, analyzed at the original origin, takes the tool along the placed path. Every
 motion word has new numbers; everything else stays byte for byte: comments, line numbers, order, blank lines, tape
 marks, line ends, upper and lower case. The rapid with which the tool comes from where the control was switched on is
 the one move that cannot match.
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
 from toolpath_stiff.nc.frames import Frames
@@ -125,7 +125,7 @@ def _state(name: str, origin: ShopPose, offsets: Offsets | None, tools: dict[int
 
 def _check_plain(program: Program) -> None:
     if program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS:
-        raise InputError(
+        raise ProgramError(
             "a program is rewritten by the words of the built-in interpreter in the dialects "
             f"{' and '.join(PLAIN_DIALECTS)}; this one was read by {program.interpreter!r} as {program.dialect!r}",
             hint="place it without --write",
@@ -136,14 +136,14 @@ def _check_plain(program: Program) -> None:
 def check_rewritable(program: Program) -> None:
     """Raise `InputError` for a file that is not a program of a control, or is one of another machine's."""
     if program.kinematics:
-        raise InputError(
+        raise ProgramError(
             f"a program posted for another kinematics ({program.kinematics}) is not rewritten: its words are those of "
             "that machine's axes",
             hint="place it without --write, set the work so in the CAM system, and post it for this machine",
             file=program.name,
         )
     if program.dialect == CUTTER_LOCATION:
-        raise InputError(
+        raise ProgramError(
             "a cutter-location file is not rewritten: it is not a program that a control runs",
             hint="place it without --write, set the work so in the CAM system, or place the posted program",
             file=program.name,
@@ -162,7 +162,7 @@ def check_decimals(decimals: int | None) -> None:
     toolpath_stiff.errors.InputError: 12 decimals; expected 2 to 9
     """
     if decimals is not None and not FEWEST_DECIMALS <= decimals <= MOST_DECIMALS:
-        raise InputError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
+        raise ProgramError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
 
 
 def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
@@ -192,7 +192,7 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
 def _refuse_left_out(words: bool, number: int, name: str) -> None:
     """A block that --block-delete leaves out would stay as it was, and be wrong once the switch is off."""
     if words:
-        raise InputError(
+        raise ProgramError(
             "a block that --block-delete leaves out cannot be rewritten",
             hint="take it out of the program, or do without --block-delete",
             file=name,
@@ -207,7 +207,7 @@ def _text_of(program: Program) -> tuple[str, str]:
     try:
         content = Path(program.path).read_bytes()
     except OSError as error:
-        raise InputError(f"cannot read {program.path!r}: {error.strerror}") from None
+        raise ProgramError(f"cannot read {program.path!r}: {error.strerror}") from None
     encoding = "utf-8-sig" if content.startswith(b"\xef\xbb\xbf") else "utf-8"
     try:
         return content.decode(encoding), encoding

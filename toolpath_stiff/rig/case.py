@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.effects import CATALOGUE, Scale, with_effect
 from toolpath_stiff.rig.hidden import (
@@ -32,16 +33,13 @@ from toolpath_stiff.rig.hidden import (
     readings,
 )
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, reachable
-from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 Table = dict[str, Any]
 
 LAYOUTS = ("paper", "tilted", "campaign")
 POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-DEFAULT_FORCE = 1000.0  # N, where a file gives none (assumed; said aloud by whoever reads the file)
 DEFAULT_SETUP = "table"
 
 # Clinton, Zhang, Wavering (1997), Table 1: x, y in mm, measured at both heights; published.
@@ -174,15 +172,15 @@ def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows
         position=m_from_mm(np.stack([column(name, 0.0) for name in POSE[:3]], axis=1)),
         angles=rad_from_deg(np.stack([column(name, 0.0) for name in POSE[3:]], axis=1)),
         direction=direction,
-        force=column("force_N", DEFAULT_FORCE),
+        force=column("force_N", defaults.FORCE),
         extension=m_from_mm(column("tool_extension_mm", 0.0)),
-        time=60.0 * column("time_min", 0.0),
+        time=s_from_min(column("time_min", 0.0)),
         elapsed=np.linspace(0.0, 1.0, n) if elapsed is None else elapsed,
         setup=np.array(table["setup"] if "setup" in table else [DEFAULT_SETUP] * n, dtype=np.str_),
     )
 
 
-def clamp_of(table: Mapping[str, Any]) -> NDArray[np.int64]:
+def clamp_of(table: Mapping[str, Any]) -> IntArray:
     """(n,) group of each row: its clamp, or without that column its pose and set-up."""
     if "clamp" in table:
         keys = [(int(clamp),) for clamp in table["clamp"]]
@@ -227,7 +225,7 @@ def make_case(
     layout: str = "tilted",
     hidden: str | Sequence[str] | None = None,
     noise: float = 0.02,
-    machine: str | Nominal = "nist",
+    machine: str | Nominal = defaults.MACHINE,
     plan: Mapping[str, Any] | None = None,
     size: float | None = None,
     nuisances: Nuisances | None = None,
@@ -267,7 +265,7 @@ def draw_case(
     layout: str = "tilted",
     hidden: str | Sequence[str] | None = None,
     noise: float = 0.02,
-    machine: str | Nominal = "nist",
+    machine: str | Nominal = defaults.MACHINE,
     plan: Mapping[str, Any] | None = None,
     size: float | None = None,
     nuisances: Nuisances | None = None,

@@ -16,17 +16,14 @@ from typing import Any
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, Oddity, Rows, readings
 from toolpath_stiff.rig.nominal import Nominal
-from toolpath_stiff.units import m_from_mm, m_from_um
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.units import m_from_mm, m_from_um, per_s_from_per_min
 
 Parameters = dict[str, Any]
 NM_PER_N = 1e-9  # m/N in nm/N
-SECONDS_PER_MINUTE = 60.0
 
 # Largest compliances that are tried, nm/N: far beyond 30 % of a tip that gives 8 to 31 nm/N.
 SOFT = 60.0
@@ -172,7 +169,7 @@ CATALOGUE: dict[str, Change] = {
         "gauge_target": p["setup"] or "XYZ"[p["direction"] - 1],
         "gauge_factor": 1.0 + p["scale"] / 100.0,
     },
-    "thermal_drift": lambda h, p: {"drift": m_from_um(p["rate"]) / SECONDS_PER_MINUTE},
+    "thermal_drift": lambda h, p: {"drift": per_s_from_per_min(m_from_um(p["rate"]))},
 }
 
 
@@ -186,7 +183,7 @@ def with_effect(hidden: HiddenMachine, name: str, parameters: Mapping[str, Any])
 class Scale:
     """How large an effect shows on one campaign, and its strength for a wanted size."""
 
-    def __init__(self, nominal: Nominal, rows: Rows, clamps: NDArray[np.int64], nuisances: Nuisances) -> None:
+    def __init__(self, nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances) -> None:
         self.nominal, self.rows = nominal, rows
         self.vertices = int(nominal.vertices.max()) + 1
         self.setups = sorted(set(rows.setup.tolist()))
@@ -251,7 +248,7 @@ class Covariance:
     rank 8 and enters by Woodbury's identity, (N + S S^T)^-1 = N^-1 - N^-1 S (1 + S^T N^-1 S)^-1 S^T N^-1.
     """
 
-    def __init__(self, clamps: NDArray[np.int64], spread: FloatArray, nuisances: Nuisances) -> None:
+    def __init__(self, clamps: IntArray, spread: FloatArray, nuisances: Nuisances) -> None:
         self.clamps = clamps
         self.noise = max(nuisances.repeat, 1e-3) ** 2
         share = nuisances.clamping**2

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from toolpath_stiff import defaults
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import Content, read_text, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
@@ -41,7 +42,7 @@ NUMBERS: dict[str, tuple[float, float, float | None]] = {
     **dict.fromkeys(POSE[:3], (-1e5, 1e5, None)),
     **dict.fromkeys(POSE[3:], (-360.0, 360.0, 0.0)),
     **dict.fromkeys(("dx", "dy", "dz"), (-1e3, 1e3, None)),
-    "force_N": (1e-3, 1e6, 1000.0),
+    "force_N": (1e-3, 1e6, defaults.FORCE),
     "time_min": (0.0, 1e5, 0.0),
     "tool_extension_mm": (-1e4, 1e4, 0.0),
     "temperature_C": (-50.0, 100.0, 20.0),
@@ -247,7 +248,7 @@ def new_exercise(
     layout: str = "tilted",
     hidden: str | None = None,
     noise: float = 0.02,
-    machine: str = "nist",
+    machine: str = defaults.MACHINE,
     plan_file: str | None = None,
     rules: Rules = NO_OTHER,
 ) -> int:

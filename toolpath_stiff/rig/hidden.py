@@ -18,14 +18,11 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, platform_points, rotations, true_poses
 from toolpath_stiff.rig.structure import Geometry, Links, secant_compliance
 from toolpath_stiff.units import n_per_m_from_n_per_mm, n_per_mm_from_n_per_m
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 REACH = 0.3  # m, half the width of the workspace that the paper measured
 REFERENCE_LOAD = 1000.0  # N
@@ -46,7 +43,6 @@ ODDITIES_IN_TIME = {
 }
 OUTSIDE = (*ODDITIES, *ODDITIES_IN_TIME)
 
-StrArray = NDArray[np.str_]
 
 HERTZ_LOAD = 500.0  # N, load at which contact_nonlinearity's compliance is quoted (assumed; effects catalogue)
 SLACK_LOAD = 0.1  # N, below which a joint's secant compliance is held: far below any load of a campaign
@@ -157,7 +153,7 @@ class Rows:
     extension: FloatArray
     time: FloatArray
     elapsed: FloatArray
-    setup: StrArray
+    setup: TextArray
 
     def take(self, index: IntArray) -> Rows:
         """Some of the rows."""
@@ -378,9 +374,7 @@ def disturb_machine(hidden: HiddenMachine, nuisances: Nuisances, rng: Generator)
     )
 
 
-def disturb_readings(
-    stiffness: FloatArray, clamps: NDArray[np.int64], nuisances: Nuisances, rng: Generator
-) -> FloatArray:
+def disturb_readings(stiffness: FloatArray, clamps: IntArray, nuisances: Nuisances, rng: Generator) -> FloatArray:
     """(n,) N/m as printed, from what undisturbed instruments would show; `clamps` (n,) numbers the clamps from 0."""
     n = len(stiffness)
     wide = np.where(rng.random(n) < nuisances.outliers, nuisances.outlier_width, 1.0)

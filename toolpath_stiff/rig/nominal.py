@@ -16,14 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_text
-from toolpath_stiff.units import m_from_mm, rad_from_deg
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_um, rad_from_deg
 
 # Joints of one vertex of the frame lie within this angle about the machine's axis; vertices are far more apart.
 VERTEX_WIDTH = rad_from_deg(15.0)
@@ -63,7 +61,7 @@ class Nominal:
     neutral_pose: FloatArray
 
     @property
-    def vertices(self) -> NDArray[np.int64]:
+    def vertices(self) -> IntArray:
         """(6,) number of the frame vertex that holds each strut, counted from 0 in the order of the struts."""
         azimuth = np.arctan2(self.frame_joints[:, 1], self.frame_joints[:, 0])
         found: list[float] = []
@@ -77,7 +75,7 @@ class Nominal:
         return numbers
 
 
-def load_nominal(machine: str = "nist") -> Nominal:
+def load_nominal(machine: str = defaults.MACHINE) -> Nominal:
     """Nominal machine by the name of a packaged file or by path.
 
     Raises
@@ -128,7 +126,7 @@ def parse_nominal(text: str, file: str) -> Nominal:
         platform_joints=_joints(table, "platform_joints", file),
         tool_length=m_from_mm(float(_numbers(table.get("reference_tool", {}), "length_mm", 1, file)[0])),
         law_lengths=m_from_mm(_numbers(table.get("strut_law", {}), "length_mm", 2, file)),
-        law_stiffnesses=_numbers(table.get("strut_law", {}), "stiffness_N_per_um", 2, file) * 1e6,
+        law_stiffnesses=n_per_m_from_n_per_um(_numbers(table.get("strut_law", {}), "stiffness_N_per_um", 2, file)),
         strut_range=(
             m_from_mm(float(_numbers(lengths, "min_mm", 1, file)[0])),
             m_from_mm(float(_numbers(lengths, "max_mm", 1, file)[0])),

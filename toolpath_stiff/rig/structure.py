@@ -15,10 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from toolpath_stiff.arrays import FloatArray, IntArray
 
 HUB, TIP = 6, 7  # nodes of the platform truss after its six joints
 SECANT_STEPS = 60

@@ -20,13 +20,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Machine
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 BLOCK = 2048  # poses; the nine-row work arrays (150 kB each) then stay in a core's second-level cache
 # Determinants of unit directions lie within 0 and 1. At 1e-3 the elimination loses three of sixteen digits.

@@ -7,12 +7,9 @@ time on a machine; the result is cached on disk. `core` chooses this route by it
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.stiffness.closed_form import SMALL_DETERMINANT, ClosedForm, well_conditioned
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 def available() -> bool:

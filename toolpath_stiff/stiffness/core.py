@@ -16,13 +16,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.stiffness import closed_form, exact
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, LoadPath
+from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
-
-FloatArray = NDArray[np.float64]
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
 CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2 ms a call is not earned back
@@ -30,7 +29,7 @@ CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2
 COMPILED_FROM = 1_500_000
 ROUTES = ("exact", "closed_form", "compiled")
 
-Along = Callable[[FloatArray, NDArray[np.int64]], FloatArray]
+Along = Callable[[FloatArray, IntArray], FloatArray]
 
 DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
 CLIMBS = 3  # from so many of the best
@@ -60,7 +59,7 @@ def tip_compliance(
     position: FloatArray,
     rotation: FloatArray | None = None,
     tool_length: FloatArray | float = np.nan,
-    force: float = DEFAULT_FORCE,
+    force: float = defaults.FORCE,
     route: str | None = None,
 ) -> FloatArray:
     """Compliance of the tool tip at n poses, load-dependent effects left out.
@@ -156,7 +155,7 @@ def compliance_along(
     position: FloatArray,
     rotation: FloatArray | None = None,
     tool_length: FloatArray | float = np.nan,
-    force: float = DEFAULT_FORCE,
+    force: float = defaults.FORCE,
 ) -> FloatArray:
     """Compliance of the tip along unit vectors (n, 3), load-dependent effects included: (n,) m/N."""
     result = np.empty(len(position))
@@ -174,7 +173,7 @@ def extreme_directions(
     position: FloatArray,
     rotation: FloatArray | None = None,
     tool_length: FloatArray | float = np.nan,
-    force: float = DEFAULT_FORCE,
+    force: float = defaults.FORCE,
     softest: bool = True,
     across: FloatArray | None = None,
 ) -> FloatArray:
@@ -191,7 +190,7 @@ def extreme_directions(
         turn = None if rotation is None else rotation[rows]
         path = _path(model, position[rows], turn, lengths[rows], force)
 
-        def along(directions: FloatArray, poses: NDArray[np.int64], path: LoadPath = path) -> FloatArray:
+        def along(directions: FloatArray, poses: IntArray, path: LoadPath = path) -> FloatArray:
             return exact.compliance_along(model, path.take(poses), directions)
 
         normals = None if across is None else across[rows]

@@ -30,17 +30,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.errors import EffectError, InputError, PoseError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import mm_from_m
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 WHOLE_STEPS, MOST_STEPS, LINE_STEPS = 25, 200, 40
 SETTLED = 1e-8  # of the load: the tip's compliance is then certain to some 1e-8 of itself
@@ -84,7 +81,7 @@ class SharedLoad:
         return np.maximum(slope, LEAST_TANGENT * here), here, form
 
 
-def settle(load: SharedLoad, first: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def settle(load: SharedLoad, first: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Strut forces that agree with the compliances that they cause.
 
     Parameters
@@ -245,9 +242,9 @@ def refuse_law_beyond_zero(lengths: FloatArray, stiffness: FloatArray) -> None:
     if not (stiffness <= 0.0).any():
         return
     worst = np.unravel_index(np.argmin(stiffness), stiffness.shape)
-    raise InputError(
+    raise PoseError(
         f"strut {worst[1] + 1} would be {mm_from_m(float(lengths[worst])):.1f} mm long, where the machine's strut law "
-        f"gives {stiffness[worst] / 1e6:.4g} N/um",
+        f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um",
         expected="a stiffness above 0",
         hint="bound the strut length in the machine file so that the law stays positive",
     )
@@ -376,7 +373,7 @@ def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wren
     assert part.strut_forces is not None
     wrench = wrenches[regular] * part.force[:, None]
 
-    def compliance(forces: FloatArray, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    def compliance(forces: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray]:
         links = assemble_links(model, replace(part.take(rows), strut_forces=forces))
         return links.strut, np.zeros((len(rows), 6, 12)) if links.loads is None else links.loads[:, :6]
 
@@ -392,7 +389,7 @@ def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wren
 def _unsettled(model: StiffnessModel, path: LoadPath, row: int) -> InputError:
     x, y, z = (mm_from_m(float(v)) for v in path.position[row])
     names = ", ".join(active.effect.name for active in model.effects if active.effect.load_dependent)
-    return InputError(
+    return EffectError(
         f"the strut forces do not settle at X{x:.1f} Y{y:.1f} Z{z:.1f} (mm) under {path.force[row]:g} N with {names}",
         expected="a stretch of each strut that grows with its force",
         hint="check the parameters of these effects",
@@ -421,7 +418,7 @@ def _possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> 
     x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[int(np.argmax(bad))])
     those = f"effect{'s' if len(foreign) > 1 else ''} {', '.join(effect.name for effect in foreign)}"
     check = command_line("effects", "check", guard.file_of(foreign[0]))
-    raise InputError(
+    raise EffectError(
         f"with {those} the tip has no positive stiffness at X{x:g} Y{y:g} Z{z:g} mm",
         expected="a compliance that is positive definite",
         hint=f"`{check}` tries an effect by itself",

@@ -15,15 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, TextArray
+from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Machine, with_parameter
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.effects import find_effect, guard, known_effects
 from toolpath_stiff.stiffness.effects.contract import (
-    DEFAULT_FORCE,
     SETUP,
     Conditions,
     Effect,
@@ -32,8 +33,6 @@ from toolpath_stiff.stiffness.effects.contract import (
 )
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.units import mm_from_m
-
-FloatArray = NDArray[np.float64]
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
 TOOL = "tool_extension_mm"
@@ -144,6 +143,22 @@ def build_model(
     ------
     InputError
         An entry names an unknown effect or has wrong parameters, or an effect appears twice.
+
+    Examples
+    --------
+    How far the tip gives way in its softest direction; then with one strut at 70 % of its stiffness:
+
+    >>> import numpy as np
+    >>> from toolpath_stiff.machine import load_machine
+    >>> from toolpath_stiff.stiffness import core
+    >>> from toolpath_stiff.stiffness.effects import find_effect
+    >>> machine = load_machine("nist")
+    >>> weak = ActiveEffect(find_effect("weak_strut"), {"strut": 1, "factor": 0.7})
+    >>> for model in (build_model(machine), build_model(machine, extra=[weak])):
+    ...     compliance = core.tip_compliance(model, np.array([[0.0, 0.0, 0.8]]))
+    ...     print(f"{1e9 * np.linalg.eigvalsh(compliance[0])[-1]:.2f} nm/N")
+    18.24 nm/N
+    21.14 nm/N
     """
     files = tuple(effect_files)
     if files:
@@ -158,7 +173,7 @@ def build_model(
     names = [active.effect.name for active in (*acting, *reading)]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(
+            raise EffectError(
                 f"machine {machine.name}: effect {name} is given twice",
                 hint="keep one of them (finite platform bars count as platform_flexibility)",
             )
@@ -194,7 +209,7 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
         The model has no such parameter, or it leaves its bounds.
     """
     if model.given is None:
-        raise InputError(f"a model without its machine has no parameter {name!r}")
+        raise EffectError(f"a model without its machine has no parameter {name!r}")
     if name in STRUT_LAW:
         moved = with_parameter(model.given, name, change)
         return _assembled(moved, model.effects, model.instruments, model.conditions)
@@ -207,10 +222,10 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
                 value = active.values[parameter.name] + change * parameter.si
                 low, high = (bound * parameter.si for bound in parameter.bounds)
                 if not low <= value <= high:
-                    raise InputError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
+                    raise EffectError(f"{name} = {value / parameter.si:g}", expected=parameter.expected)
                 kind[i] = ActiveEffect(active.effect, {**active.values, parameter.name: value})
                 return _assembled(model.given, effects["effects"], effects["instruments"], model.conditions)
-    raise InputError(f"machine {model.given.name} has no parameter {name!r}")
+    raise EffectError(f"machine {model.given.name} has no parameter {name!r}")
 
 
 def _activate(machine: Machine, entry: EffectEntry, files: tuple[str | Path, ...], instrument: bool) -> ActiveEffect:
@@ -234,8 +249,8 @@ def load_path(
     position: ArrayLike,
     rotation: ArrayLike | None = None,
     tool_length: ArrayLike = np.nan,
-    force: ArrayLike = DEFAULT_FORCE,
-    setup: NDArray[np.str_] | None = None,
+    force: ArrayLike = defaults.FORCE,
+    setup: TextArray | None = None,
     time: FloatArray | None = None,
     temperature: FloatArray | None = None,
     direction: FloatArray | None = None,
@@ -431,7 +446,7 @@ def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
     if setup in ("", NO_SETUP, *known) or takes_any or not known:
         return
     near = difflib.get_close_matches(setup, known, n=1)
-    raise InputError(
+    raise EffectError(
         f"{said_by}: set-up {setup!r} is not known",
         expected=f"one of {', '.join(known)}, or {NO_SETUP}",
         hint=f"did you mean {near[0]}?" if near else "a machine file lists its set-ups as `names` of [setup]",

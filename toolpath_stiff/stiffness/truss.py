@@ -13,12 +13,11 @@ elimination, k = F / x (equation 4). It knows neither effects nor batches: it ex
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import EffectError
 from toolpath_stiff.machine.model import Machine
-
-FloatArray = NDArray[np.float64]
 
 HUB, TIP = 6, 7
 
@@ -60,7 +59,7 @@ def free_platform_flexibility(platform_joints: FloatArray) -> FloatArray:
         bar = nodes[j] - nodes[i]
         length = np.linalg.norm(bar)
         if length < 1e-9:
-            raise InputError(
+            raise EffectError(
                 f"platform nodes {i + 1} and {j + 1} coincide, so the platform truss has a bar of no length",
                 hint="set bar_stiffness_N_per_m = inf (a rigid platform)",
             )
@@ -73,7 +72,7 @@ def free_platform_flexibility(platform_joints: FloatArray) -> FloatArray:
     # Springs on the rigid motions alone: balanced loads do not feel them, and the matrix can be inverted.
     held = stiffness + basis @ basis.T
     if np.linalg.cond(held) > 1e10:
-        raise InputError(
+        raise EffectError(
             "the platform truss is a mechanism: its bars do not lock the joints and the tip",
             hint="set bar_stiffness_N_per_m = inf (a rigid platform)",
         )
@@ -110,7 +109,7 @@ def structure_stiffness(machine: Machine, position: ArrayLike, rotation: ArrayLi
     """
     bar_stiffness = machine.platform_bar_stiffness
     if not np.isfinite(bar_stiffness):
-        raise InputError(
+        raise EffectError(
             "the reference solver cannot take rigid platform bars",
             expected="a finite bar stiffness",
             hint="use 1e12 N/m, which lowers the tip stiffness by 5e-5",

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff import defaults
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table, read_table
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -62,7 +63,7 @@ class Measurements:
     stiffness
         (n,) N/m; nan where a plan leaves it empty.
     force
-        (n,) N, `DEFAULT_FORCE` where not given.
+        (n,) N, `defaults.FORCE` where not given.
     sd
         (n,) N/m, total standard deviation of one reading.
     tool_extension
@@ -151,12 +152,12 @@ def read_measurements(
     """
     names = [paths] if isinstance(paths, str | Path) else list(paths)
     if not names:
-        raise InputError("no measurements", expected="a CSV file, or nist-table1")
+        raise MeasurementError("no measurements", expected="a CSV file, or nist-table1")
     seen: set[str] = set()
     files = []
     for name in map(str, names):
         if name in seen:
-            raise InputError(f"{name!r} is given twice", hint="name it once")
+            raise MeasurementError(f"{name!r} is given twice", hint="name it once")
         seen.add(name)
         files.append(_read_file(name, planned))
     errors: list[InputError] = []
@@ -213,7 +214,7 @@ def _columns(files: list[RowFile]) -> Measurements:
         angles=numbers("angles"),
         direction=numbers("direction"),
         stiffness=numbers("stiffness"),
-        force=np.where(given["force_N"], force, DEFAULT_FORCE),
+        force=np.where(given["force_N"], force, defaults.FORCE),
         sd=numbers("sd"),
         tool_extension=np.where(given["tool_extension_mm"], extension, 0.0),
         time=time,
@@ -245,7 +246,7 @@ def _incomplete(given: Mapping[str, NDArray[np.bool_]]) -> list[str]:
     n, notes = len(given["force_N"]), []
     if not given["force_N"].all():
         lacking = n - int(given["force_N"].sum())
-        notes.append(f"{lacking} of {n} readings do not say at which force: {DEFAULT_FORCE:g} N assumed")
+        notes.append(f"{lacking} of {n} readings do not say at which force: {defaults.FORCE:g} N assumed")
     for name, there in given.items():
         if name not in ("force_N", "setup", "loop") and there.any() and not there.all():
             notes.append(f"column {name} is empty in {n - int(there.sum())} of {n} readings: treated as absent there")
@@ -295,7 +296,7 @@ def _checked(data: Measurements, machine: Machine) -> Measurements:
             found = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
         else:
             continue
-        errors.append(InputError(found, hint="check the pose's unit", file=data.file[i], line=int(data.line[i])))
+        errors.append(MeasurementError(found, hint="check the pose's unit", file=data.file[i], line=int(data.line[i])))
     if errors:
         raise InputErrors(errors)
     stand = reach(machine, data.position, struts, rotation)

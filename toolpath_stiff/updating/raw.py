@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.tables import Columns, Table, read_table
 from toolpath_stiff.units import m_from_um, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.rows import (
@@ -130,7 +130,7 @@ def read_raw(table: Table) -> list[Loop]:
     file = table.file
     _check_heading(list(table.heading), file, table.heading_line)
     if not table.rows:
-        raise InputError("no records below the heading", file=file, line=table.heading_line)
+        raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
     groups: dict[tuple[str, ...], list[tuple[int, dict[str, str], list[float]]]] = {}
     errors = []
     for line, cells in table.rows:
@@ -143,7 +143,7 @@ def read_raw(table: Table) -> list[Loop]:
             values = [_signed(record, name) for name in READINGS]
             values += [optional_number(record, name) for name in CONDITIONS]
         except InputError as error:
-            errors.append(InputError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
             continue
         key = tuple(record.get(name, "") for name in PLACE)
         groups.setdefault(key, []).append((line, record, values))
@@ -155,22 +155,24 @@ def read_raw(table: Table) -> list[Loop]:
 def _check_heading(heading: list[str], file: str, line: int) -> None:
     for name in heading:
         if name not in (*PLACE, *READINGS, *CONDITIONS):
-            raise InputError(
+            raise MeasurementError(
                 f"unknown column {name!r}",
                 expected=f"some of {', '.join((*PLACE, *READINGS, *CONDITIONS))}",
                 file=file,
                 line=line,
             )
         if heading.count(name) > 1:
-            raise InputError(f"column {name} stands twice", file=file, line=line)
+            raise MeasurementError(f"column {name} stands twice", file=file, line=line)
     vector = "direction" not in heading
     angles = ANGLES if any(name in heading for name in ANGLES) else ()
     for name in (*POSITION, *angles, *(VECTOR if vector else ("direction",)), *READINGS):
         if name not in heading:
             found = "no direction" if vector and name in VECTOR else f"column {name} is missing"
-            raise InputError(found, expected=f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}", file=file, line=line)
+            raise MeasurementError(
+                found, expected=f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}", file=file, line=line
+            )
     if not vector and any(name in heading for name in VECTOR):
-        raise InputError("two directions", expected="direction, or dx,dy,dz", file=file, line=line)
+        raise MeasurementError("two directions", expected="direction, or dx,dy,dz", file=file, line=line)
 
 
 def _signed(record: Mapping[str, str], name: str) -> float:
@@ -179,7 +181,7 @@ def _signed(record: Mapping[str, str], name: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= SIGNED[name]:
-        raise InputError(f"{name} = {record[name]!r}", expected=f"a number within +-{SIGNED[name]:g}")
+        raise MeasurementError(f"{name} = {record[name]!r}", expected=f"a number within +-{SIGNED[name]:g}")
     return value
 
 
@@ -207,7 +209,7 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
     where = {"file": file or None, "line": loop.line}
     high, low = float(loop.jog.max()), float(loop.jog.min())
     if not (low < -SAME_JOG and high > SAME_JOG):
-        raise InputError(
+        raise MeasurementError(
             f"{loop.title}: jogged from {um_from_m(low):g} to {um_from_m(high):g} um",
             expected="extremes on both sides of zero, as 0, +200, -200, 0 um",
             **where,  # type: ignore[arg-type]
@@ -218,7 +220,7 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
     deflection = (high - low) - moved
     stiffness = force / deflection if deflection else math.inf
     if not SOFTEST <= n_per_mm_from_n_per_m(stiffness) <= STIFFEST:
-        raise InputError(
+        raise MeasurementError(
             f"{loop.title}: {force:g} N over a deflection of {um_from_m(deflection):g} um",
             expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm",
             hint="force, jog and displacement count positive the same way; displacement is what the indicator read",

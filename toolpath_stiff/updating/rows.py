@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
 
@@ -117,7 +117,9 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
     file, heading, line = table.file, list(table.heading), table.heading_line
     _check_heading(heading, file, line, planned)
     if not table.rows:
-        raise InputError("no rows below the heading", expected="one row a measured stiffness", file=file, line=line)
+        raise MeasurementError(
+            "no rows below the heading", expected="one row a measured stiffness", file=file, line=line
+        )
     known = {*KNOWN, *WIDE, *WIDE_MODEL}
     more = [name for name in heading if name not in known and _all_numbers(table, heading.index(name))]
     notes = [*table.notes] + [
@@ -133,7 +135,7 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
         try:
             rows += _rows_of(table.record(cells), more, file, line, planned)
         except InputError as error:
-            errors.append(InputError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
+            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
     errors += duplicates(rows)
     if errors:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
@@ -148,7 +150,7 @@ def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> N
     wrong = wrong or (None if wide else _check_long(heading, planned))
     if wrong is not None:
         found, expected, hint = wrong
-        raise InputError(found, expected=expected, hint=hint, file=file, line=line)
+        raise MeasurementError(found, expected=expected, hint=hint, file=file, line=line)
 
 
 Wrong = tuple[str, str, str]  # what was found, what was expected, a hint
@@ -241,14 +243,14 @@ def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tu
     displacement = optional_number(record, "displacement_um")
     quotient = force / (displacement / 1e3)  # N/mm
     if math.isnan(printed) and math.isnan(quotient) and not planned:
-        raise InputError("no stiffness", expected="stiffness_N_per_mm, or force_N and displacement_um")
+        raise MeasurementError("no stiffness", expected="stiffness_N_per_mm, or force_N and displacement_um")
     if abs(quotient - printed) > AGREEMENT * printed:
-        raise InputError(
+        raise MeasurementError(
             f"stiffness {printed:g} N/mm, but force over displacement is {quotient:.6g} N/mm",
             hint="correct one of them or leave one out",
         )
     if not math.isnan(quotient) and not SOFTEST <= quotient <= STIFFEST:
-        raise InputError(
+        raise MeasurementError(
             f"{force:g} N over {m_from_um(displacement) * 1e6:g} um is {quotient:.4g} N/mm",
             expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm; is the unit right?",
         )
@@ -260,12 +262,12 @@ def direction_of(record: Mapping[str, str]) -> tuple[float, ...]:
     if "direction" in record:
         name = record["direction"].upper().removeprefix("+").removeprefix("-")
         if name not in AXES:
-            raise InputError(f"direction {record['direction']!r}", expected="X, Y or Z (others as dx,dy,dz)")
+            raise MeasurementError(f"direction {record['direction']!r}", expected="X, Y or Z (others as dx,dy,dz)")
         return AXES[name]
     vector = [number(record, name) for name in VECTOR]
     size = math.hypot(*vector)
     if size == 0.0:
-        raise InputError("direction 0,0,0", expected="a vector that points somewhere")
+        raise MeasurementError("direction 0,0,0", expected="a vector that points somewhere")
     return tuple(component / size for component in vector)
 
 
@@ -278,11 +280,11 @@ def number(record: Mapping[str, str], name: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         dated = "the spreadsheet has made a date of it" if DATE.match(text) else ""
-        raise InputError(f"{name} = {text!r}", expected="a finite number", hint=dated)
+        raise MeasurementError(f"{name} = {text!r}", expected="a finite number", hint=dated)
     low, high = BOUNDS.get(name, (-math.inf, math.inf))
     if not low <= value <= high:
         doubt = "; is the unit right?" if value > 0.0 else ""
-        raise InputError(f"{name} = {text}", expected=f"{low:g} to {high:g}{doubt}")
+        raise MeasurementError(f"{name} = {text}", expected=f"{low:g} to {high:g}{doubt}")
     return value
 
 
@@ -294,7 +296,7 @@ def optional_number(record: Mapping[str, str], name: str) -> float:
 def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
     """Rows that say the same as an earlier one: all cells alike or, within a file, one repeat number twice."""
     first: dict[tuple[str, ...], Row] = {}
-    errors = []
+    errors: list[InputError] = []
     for row in rows:
         # repr: nan differs from itself, its text does not.
         at = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels)
@@ -303,7 +305,7 @@ def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
         seen = first.setdefault(key, row)
         if seen is not row:
             errors.append(
-                InputError(
+                MeasurementError(
                     f"row repeats line {seen.line}" + (f" of {seen.file}" if seen.file != row.file else ""),
                     hint="number repeated readings in a column repeat, or remove it",
                     line=row.line,

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.cutter_location.geometry import AxisError
 from toolpath_stiff.nc.cutter_location.modes import one_frame
@@ -103,7 +103,7 @@ def read(
 
 
 def _no_cut(name: str) -> InputError:
-    return InputError(NO_CUT, expected="GOTO/ after FEDRAT/, not after RAPID", file=name)
+    return ProgramError(NO_CUT, expected="GOTO/ after FEDRAT/, not after RAPID", file=name)
 
 
 # -- running -----------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.cutter_location import geometry
 from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, number_of
@@ -103,7 +103,7 @@ class State:
     def fail(self, found: str, expected: str = "", hint: str = "", at: Argument | None = None) -> InputError:
         """The error for the statement being executed."""
         place = at or self.statement
-        return InputError(
+        return ProgramError(
             found, expected=expected, hint=hint, file=self.name, line=place.line, column=max(place.column, 1)
         )
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.tables import LARGEST_MM
 
 EXTENSIONS = (".apt", ".aptsource", ".cl", ".cls", ".clsf", ".ncl")
@@ -158,7 +158,7 @@ def _pieces(lines: tuple[str, ...], at: int, begin: int, name: str) -> tuple[lis
         code = lines[at].partition("$$")[0]
         code, continues, rest = code.partition("$")
         if rest.strip():
-            raise InputError(
+            raise ProgramError(
                 f"{rest.strip()[:20]!r} after a $, which continues a statement on the next line",
                 expected="nothing, or $$ and a comment",
                 file=name,
@@ -170,7 +170,7 @@ def _pieces(lines: tuple[str, ...], at: int, begin: int, name: str) -> tuple[lis
         if not continues:
             return pieces, at
         if at >= len(lines) or _NEW_STATEMENT.match(lines[at]):
-            raise InputError(
+            raise ProgramError(
                 "a $ at the end of a line, and no line that continues the statement",
                 expected="the rest of the statement",
                 file=name,
@@ -197,7 +197,7 @@ def _parse(pieces: list[tuple[int, int, str]], name: str) -> Statement | None:
         return Statement(line, column, "", _arguments(joined, 0, place), joined.strip())
     found = _WORD.match(joined)
     if found is None:
-        raise InputError(
+        raise ProgramError(
             f"{joined.strip()[:40]!r} is not a statement of a cutter-location file",
             expected="a word, or a word and / and its arguments",
             hint="definitions and computations need APT's processor: give the file that it or the CAM system writes"
@@ -240,7 +240,7 @@ def number_of(argument: Argument, name: str, what: str = "a number") -> float:
     if _IS_NUMBER.fullmatch(argument.text):
         value = float(argument.text.upper().replace("D", "E"))
     if not abs(value) <= LARGEST_MM * 100.0:
-        raise InputError(
+        raise ProgramError(
             f"{argument.text[:30]!r}", expected=what, file=name, line=argument.line, column=argument.column
         )
     return value

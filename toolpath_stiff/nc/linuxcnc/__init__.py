@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
 from toolpath_stiff.nc.linuxcnc.canon import Follower
@@ -119,7 +119,7 @@ class _Session:
         if shift == (0.0, 0.0, 0.0) and self._uses(MACHINE_CODES) and place != g54:
             raise self._machine_error()
         if not follower.recorder.cuts:
-            raise InputError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=self.name)
+            raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=self.name)
         return Reading(
             moves=follower.recorder.moves(),
             origin=place,
@@ -148,7 +148,7 @@ class _Session:
 
     def _machine_error(self) -> InputError:
         number = next((line.number for line in self.lines if MACHINE_CODES.search(line.plain)), None)
-        return InputError(
+        return ProgramError(
             "machine coordinates (G53, G28, G30) in a program whose zero lies elsewhere than its G10 says, or is "
             "turned: LinuxCNC's interpreter knows the machine by its offsets alone",
             expected="G54 as the program or the offsets file sets it",
@@ -168,7 +168,7 @@ class _Session:
         if offsets.table[0].rotation:
             plain = [index for index, offset in enumerate(offsets.table) if not offset.rotation]
             if not plain:
-                raise InputError(
+                raise ProgramError(
                     "every work offset is turned: LinuxCNC's rs274 begins with wrong numbers",
                     expected="one of G54 to G59.3 without a rotation",
                     file=self.name,
@@ -200,7 +200,7 @@ class _Session:
         except StoppedError as error:
             loops = [str(line.number) for line in self.lines if LOOPS.match(line.words)][:MOST_NAMED]
             hint = f"loops begin in the lines {', '.join(loops)}" if loops else ""
-            raise InputError(str(error), hint=hint, file=self.name, line=error.line) from None
+            raise ProgramError(str(error), hint=hint, file=self.name, line=error.line) from None
         follower = self._follow(run, (0.0, 0.0, 0.0))
         if run.message or not follower.ended:
             raise self._refusal(run.message, len(prefix))
@@ -221,7 +221,7 @@ class _Session:
             text = f"the end of O word {seeking[1]} is missing"
         elif "File ended" in text:  # it did not see the M2 that the copy ends with
             line, text = unclosed(self.lines), "the end of an O word is missing"
-        return InputError(
+        return ProgramError(
             f"LinuxCNC's interpreter refuses: {text or 'it stopped without a message'}",
             file=self.name,
             line=line or None,

@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
@@ -98,7 +98,7 @@ class Follower:
 
     def fail(self, line: int, found: str, expected: str = "", hint: str = "") -> InputError:
         """An error of a line of the program."""
-        return InputError(found, expected=expected, hint=hint, file=self.name, line=line or None)
+        return ProgramError(found, expected=expected, hint=hint, file=self.name, line=line or None)
 
     # -- frames ----------------------------------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.tables import FIRST_OFFSET, HOME_G28, HOME_G30, OFFSET_STRIDE, ROTATION, Offsets, ToolEntry
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -62,7 +62,7 @@ def _split_line(text: str, number: int, name: str) -> Line:
     compact = "".join(words.replace("\ufeff", "").split())
     if not compact.isascii():  # before upper case: of other scripts some letters become ASCII ones
         foreign = next(c for c in words if not c.isascii() and not c.isspace() and c != "\ufeff")
-        raise InputError(
+        raise ProgramError(
             f"{foreign!r} outside a comment",
             expected="letters and digits of the NC language",
             file=name,
@@ -85,7 +85,7 @@ def _cut_comments(text: str, number: int, name: str) -> tuple[str, tuple[tuple[i
     for column, character in enumerate(text, 1):
         if start:
             if character == "(":
-                raise InputError("a comment within a comment", expected="`)`", file=name, line=number, column=column)
+                raise ProgramError("a comment within a comment", expected="`)`", file=name, line=number, column=column)
             if character == ")":
                 comments.append((start, text[start : column - 1]))
                 start = 0
@@ -94,14 +94,14 @@ def _cut_comments(text: str, number: int, name: str) -> tuple[str, tuple[tuple[i
             start = column
             words.append(" ")
         elif character == ")":
-            raise InputError("`)` without `(`", file=name, line=number, column=column)
+            raise ProgramError("`)` without `(`", file=name, line=number, column=column)
         elif character == ";":
             comments.append((column, text[column:]))
             break
         else:
             words.append(character)
     if start:
-        raise InputError(
+        raise ProgramError(
             "a comment is not closed", expected="`)` on the same line", file=name, line=number, column=start
         )
     return "".join(words), tuple(comments)
@@ -161,7 +161,7 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
         comment = ""
     text = f"N{line.number}{line.words}{comment}"
     if len(text) > LONGEST_LINE:
-        raise InputError(
+        raise ProgramError(
             f"a line of {len(text)} characters without blanks and comments",
             expected=f"at most {LONGEST_LINE}, as LinuxCNC reads",
             file=name,
@@ -196,7 +196,7 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
 
 
 def _refused(found: str, name: str, line: int, column: int | None = None) -> InputError:
-    return InputError(
+    return ProgramError(
         f"{found}: LinuxCNC's interpreter is not started on such a program",
         expected="a program that runs no other",
         hint="remove it, or read the program with --interpreter builtin",
@@ -214,7 +214,7 @@ def _check_m_codes(line: Line, name: str) -> None:
         try:
             code = float(digits)
         except ValueError:
-            raise InputError(f"M{digits} is not an M code", file=name, line=line.number) from None
+            raise ProgramError(f"M{digits} is not an M code", file=name, line=line.number) from None
         # Rounded as LinuxCNC does (interp_read.cc: the nearest integer), and to be safe both neighbours.
         if 99.0 < code < 200.0:
             raise _refused(f"the user M code M{digits} (M100 to M199 run a program)", name, line.number)
@@ -243,7 +243,7 @@ def _check_calls(lines: list[Line], name: str) -> None:
             calls.append((_key(called[1]), line.number))
     for key, number in calls:
         if key not in defined:
-            raise InputError(
+            raise ProgramError(
                 f"subprogram O{key} is not in the program",
                 expected="subprograms in the same file",
                 hint="copy it into the program; other files are not read",

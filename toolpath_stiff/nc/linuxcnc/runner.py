@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.errors import ProgramError, TpsError
 
 HOW_TO_GET = "install LinuxCNC (Debian, Ubuntu: apt install linuxcnc-uspace), or name the program with --rs274 PATH"
 PROGRAM, CANON, PARAMETERS, TOOLS, ERRORS = "program.ngc", "canon.txt", "rs274.var", "tool.tbl", "errors.txt"
@@ -58,7 +58,7 @@ def find_rs274(path: str | None = None) -> str:
     found = shutil.which(path or "rs274")
     if found is None:
         what = f"{path!r} is not a program that can be run" if path else "LinuxCNC's interpreter rs274 is not installed"
-        raise InputError(what, hint=HOW_TO_GET)
+        raise ProgramError(what, hint=HOW_TO_GET)
     return str(Path(found).resolve())
 
 
@@ -104,7 +104,7 @@ def _execute(command: list[str], folder: Path, limits: Limits) -> int:
                 start_new_session=True,
             )
         except OSError as error:
-            raise InputError(f"cannot run {command[0]!r}: {error.strerror}", hint=HOW_TO_GET) from None
+            raise ProgramError(f"cannot run {command[0]!r}: {error.strerror}", hint=HOW_TO_GET) from None
         try:
             return _wait(process, folder, limits)
         finally:

@@ -48,7 +48,7 @@ def batch_page(outcomes: Sequence[Outcome]) -> str:
         title=f"Stiffness of {_programs(len(outcomes))}",
         verdict=_verdict(good, failed),
         headline=_headline(good),
-        text="Every program that could be analysed has its own report: its name opens it." if good else "",
+        text="Every program that could be analyzed has its own report: its name opens it." if good else "",
         about="   ·   ".join(_about(good)),
         figures=_totals(good, failed),
         warnings=[],
@@ -66,7 +66,7 @@ def _programs(count: int) -> str:
 def _verdict(good: Sequence[Outcome], failed: Sequence[Outcome]) -> str:
     if failed:
         return f"{number(len(failed))} of {_programs(len(good) + len(failed))} failed"
-    return f"{_programs(len(good))} analysed"
+    return f"{_programs(len(good))} analyzed"
 
 
 def _headline(good: Sequence[Outcome]) -> str:
@@ -92,7 +92,7 @@ def _about(good: Sequence[Outcome]) -> list[str]:
 
 
 def _totals(good: Sequence[Outcome], failed: Sequence[Outcome]) -> list[tuple[str, str]]:
-    found = [(number(len(good)), "analysed")]
+    found = [(number(len(good)), "analyzed")]
     if failed:
         found.append((number(len(failed)), "failed"))
     if good:

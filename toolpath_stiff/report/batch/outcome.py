@@ -135,7 +135,7 @@ def _cell(value: Any, digits: int | None) -> str:
 
 
 def terminal_summary(outcomes: Sequence[Outcome]) -> str:
-    """One line a program that was analysed, then the failures with their reasons; at most 100 columns but for these."""
+    """One line a program that was analyzed, then the failures with their reasons; at most 100 columns but for these."""
     good = [one for one in outcomes if one.figures is not None]
     failed = [one for one in outcomes if one.figures is None]
     lines = _table(good) if good else []

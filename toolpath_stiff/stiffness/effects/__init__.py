@@ -15,13 +15,12 @@ from functools import cache
 from pathlib import Path
 from types import ModuleType
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, LINKS, Conditions, Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import LINKS, Conditions, Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.effects.guard import check_declarations, line_in, line_of
 
 __all__ = [
-    "DEFAULT_FORCE",
     "LINKS",
     "Conditions",
     "Effect",
@@ -61,7 +60,7 @@ def installed_effects() -> tuple[dict[str, Effect], dict[str, str]]:
             effect = loaded() if isinstance(loaded, type) else loaded
             check_declarations(effect, point.name)
             if effect.name in packaged_effects() or effect.name in found:
-                raise InputError(f"effect {effect.name} exists already")
+                raise EffectError(f"effect {effect.name} exists already")
             found[effect.name] = effect
         except Exception as error:  # a broken plug-in is listed with its reason; the rest still works
             broken[point.name] = f"{type(error).__name__}: {error}"
@@ -81,7 +80,7 @@ def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
         for name, effect in effects_from_file(file).items():
             if name in known:
                 line = line_of(type(effect), "name")
-                raise InputError(
+                raise EffectError(
                     f"effect {name} exists already", hint="give it another name", file=str(file), line=line
                 )
             known[name] = effect
@@ -96,14 +95,14 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
         return known[name]
     broken = installed_effects()[1]
     if name in broken:
-        raise InputError(f"effect {name} does not load: {broken[name]}", hint="repair or uninstall its package")
+        raise EffectError(f"effect {name} does not load: {broken[name]}", hint="repair or uninstall its package")
     near = difflib.get_close_matches(name, known, n=1)
     hint = (
         f"did you mean {near[0]}?"
         if near
         else f"`{command_line('effects', 'list', *options(effects=list(files)))}` lists them"
     )
-    raise InputError(f"unknown effect {name!r}", expected=f"one of {', '.join(known)}", hint=hint)
+    raise EffectError(f"unknown effect {name!r}", expected=f"one of {', '.join(known)}", hint=hint)
 
 
 def effects_from_file(file: str | Path) -> dict[str, Effect]:
@@ -120,7 +119,7 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
     except OSError:
         state = None
     if state is None or not path.is_file():
-        raise InputError(
+        raise EffectError(
             f"effects file {str(file)!r} does not exist", hint=f"`{command_line('effects', 'new', path)}` writes one"
         )
     return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
@@ -132,7 +131,7 @@ def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]
     name = f"toolpath_stiff_user_effects_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise InputError("not a Python file", expected="a name that ends in .py", file=file)
+        raise EffectError("not a Python file", expected="a name that ends in .py", file=file)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
@@ -143,7 +142,7 @@ def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]
     except (Exception, SystemExit) as error:  # whatever a user's file does
         raise _failure(error, file) from None
     if not found:
-        raise InputError(
+        raise EffectError(
             "defines no effect", expected="a class derived from toolpath_stiff.stiffness.effects.Effect", file=file
         )
     return found
@@ -152,9 +151,9 @@ def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]
 def _failure(error: BaseException, file: str) -> InputError:
     """Where a file failed when it was run, and of what."""
     if isinstance(error, SyntaxError) and error.filename and Path(error.filename).resolve() == Path(file).resolve():
-        return InputError(f"{type(error).__name__}: {error.msg}", file=file, line=error.lineno, column=error.offset)
+        return EffectError(f"{type(error).__name__}: {error.msg}", file=file, line=error.lineno, column=error.offset)
     what = f"{type(error).__name__}: {error}".rstrip(": ")
-    return InputError(f"{what}, when the file is run", file=file, line=line_in(error, file))
+    return EffectError(f"{what}, when the file is run", file=file, line=line_in(error, file))
 
 
 def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
@@ -165,7 +164,7 @@ def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
             effect = value()
             check_declarations(effect, where)
             if effect.name in found and type(found[effect.name]) is not value:
-                raise InputError(
+                raise EffectError(
                     f"effect {effect.name} is defined twice",
                     hint="give one another name",
                     file=where,

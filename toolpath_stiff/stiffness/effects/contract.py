@@ -19,15 +19,12 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
 
-FloatArray = NDArray[np.float64]
-
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
-DEFAULT_FORCE = 1000.0  # N, assumed wherever neither the user nor the data say at which load
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
 SETUP = "setup"  # the condition, and the name of every parameter that names a set-up
@@ -127,14 +124,14 @@ class LoadPath:
     force: FloatArray
     strut_forces: FloatArray | None = None
     direction: FloatArray | None = None
-    setup: NDArray[np.str_] | None = None
+    setup: TextArray | None = None
     time: FloatArray | None = None
     temperature: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.position)
 
-    def take(self, rows: NDArray[np.int64]) -> LoadPath:
+    def take(self, rows: IntArray) -> LoadPath:
         """Some of the poses, by index; repeated as the index says."""
         struts = Struts(*(values[rows] for values in vars(self.struts).values()))
         arrays: dict[str, Any] = {
@@ -192,6 +189,22 @@ class Effect:
     unknown_to_control
         Of a geometry effect: whether the control computes with the geometry before it. The struts then get the
         lengths of the programmed pose on that geometry, and the platform goes where they put it.
+
+    Examples
+    --------
+    A screw that adds the same compliance to every strut:
+
+    >>> class Screws(Effect):
+    ...     name, title, link = "screws", "the screws give way", "struts"
+    ...     equation, source = "c_i += c", "an example"
+    ...     parameters = (Parameter("compliance", "nm/N", 1e-9, (0.0, 50.0), (1.0, 5.0), "an example"),)
+    ...
+    ...     def strut_compliance(self, path, p):
+    ...         return np.full((len(path), 6), p["compliance"])
+    >>> Screws().parameters[0].key
+    'compliance_nm_per_N'
+    >>> Screws().finding({"compliance": 2.5})
+    'the screws give way, compliance 2.5 nm/N'
     """
 
     name: ClassVar[str]

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import EffectError
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
-
-FloatArray = NDArray[np.float64]
 
 ALONG = 0.999  # |d_axis| from which a reading counts as taken along that axis: 2.6 degrees, no one aligns better
 
@@ -65,7 +63,7 @@ class GaugeScale(Effect):
         used = np.ones(len(stiffness), dtype=bool)
         if p["direction"]:
             if path.direction is None:
-                raise InputError("gauge_scale needs the direction of each reading")
+                raise EffectError("gauge_scale needs the direction of each reading")
             used &= np.abs(path.direction[:, int(p["direction"]) - 1]) >= ALONG
         if p["setup"]:
             used &= path.setup == p["setup"] if path.setup is not None else False

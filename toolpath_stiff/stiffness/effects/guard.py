@@ -19,14 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.errors import EffectFault, InputError
+from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.errors import EffectError, EffectFault, InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import LINKS, Effect, LoadPath, Parameter
 from toolpath_stiff.units import mm_from_m
-
-FloatArray = NDArray[np.float64]
 
 # What each hook returns for n poses: shape beyond n, and in words.
 SHAPES: dict[str, tuple[tuple[int, ...], str]] = {
@@ -180,7 +178,7 @@ def _refuse_not_finite(effect: Effect, hook: str, found: FloatArray, path: LoadP
         raise _fault(effect, hook, f"returns {found[first]:g}{_at(path, int(first[0]))}", "finite numbers")
 
 
-def _largest_gap(found: FloatArray, bad: NDArray[np.bool_]) -> int:
+def _largest_gap(found: FloatArray, bad: BoolArray) -> int:
     gap = np.abs(found - np.swapaxes(found, 1, 2))
     gap[~bad] = -1.0
     return int(np.argmax(gap))
@@ -226,12 +224,12 @@ def check_declarations(effect: object, where: str) -> None:
         Something is missing, of the wrong kind, or contradicts itself; with the line of the declaration.
     """
     if not isinstance(effect, Effect):
-        raise InputError(f"{effect!r} is not an effect", file=where)
+        raise EffectError(f"{effect!r} is not an effect", file=where)
     own = type(effect)
 
     def refuse(attribute: str, found: str, expected: str = "", index: int | None = None) -> InputError:
         line = line_of(own, attribute, index)
-        return InputError(f"effect {own.__name__}: {found}", expected=expected, file=where, line=line)
+        return EffectError(f"effect {own.__name__}: {found}", expected=expected, file=where, line=line)
 
     for attribute in (*TEXTS, "parameters"):
         if not hasattr(effect, attribute):

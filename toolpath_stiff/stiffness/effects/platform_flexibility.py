@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
 from toolpath_stiff.stiffness.truss import free_platform_flexibility
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.units import n_per_um_from_n_per_m
 
 
 class PlatformFlexibility(Effect):
@@ -50,7 +49,8 @@ class PlatformFlexibility(Effect):
 
     def finding(self, p: Mapping[str, Any]) -> str:
         """Which part gives way, by how much."""
-        return f"the platform is flexible: its bars have about {about(p['bar_stiffness'] / 1e6)} N/um each"
+        stiffness = n_per_um_from_n_per_m(p["bar_stiffness"])
+        return f"the platform is flexible: its bars have about {about(stiffness)} N/um each"
 
 
 def platform_loads(path: LoadPath) -> FloatArray:

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, sizes_in_words
-
-FloatArray = NDArray[np.float64]
 
 
 class SetupCompliance(Effect):

@@ -9,24 +9,25 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectFault, InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, Effect, LoadPath, Parameter
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path
-
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
 
 POSES, DRAWN, TIMED = 24, 600, 512
+LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
 SETUPS = ("riser", "table")
 SAME = 1e-9  # relative: of results that must agree
 # SI value of the units that parameters have, with the prefixes below.
-BASE = {"m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": np.pi / 180.0, "%": 1e-2, "1": 1.0}
+BASE = {"m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": RAD_PER_DEG, "%": 1e-2, "1": 1.0}
 BASE |= {"percent": 1e-2, "min": 60.0, "h": 3600.0}
 PREFIXED, PREFIXES = ("m", "N", "rad", "s"), {"n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 
@@ -95,7 +96,7 @@ def _poses(machine: Machine, seed: int) -> FloatArray:
     generator = np.random.default_rng(seed)
     drawn = np.empty((DRAWN, 6))
     drawn[:, :3] = generator.uniform(low, high, (DRAWN, 3))
-    drawn[:, 3:] = generator.uniform(-np.pi / 18.0, np.pi / 18.0, (DRAWN, 3))
+    drawn[:, 3:] = generator.uniform(-LEANING, LEANING, (DRAWN, 3))
     drawn[0] = origin
     turn = rotation_matrices(drawn[:, 3:])
     stand = reach(machine, drawn[:, :3], solve_struts(machine, drawn[:, :3], turn), turn)
@@ -137,7 +138,7 @@ def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
     setup = np.array([SETUPS[i % 2] for i in range(n)])
     direction = np.eye(3)[np.arange(n) % 3]
     return load_path(
-        model, poses[:, :3], rotation_matrices(poses[:, 3:]), force=DEFAULT_FORCE, setup=setup, time=3600.0 * ramp,
+        model, poses[:, :3], rotation_matrices(poses[:, 3:]), force=defaults.FORCE, setup=setup, time=3600.0 * ramp,
         temperature=20.0 + 5.0 * ramp, direction=direction,
     )  # fmt: skip
 

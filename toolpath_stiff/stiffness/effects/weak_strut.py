@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
-
-FloatArray = NDArray[np.float64]
 
 
 class WeakStrut(Effect):

@@ -333,7 +333,7 @@ def choice_on_path(
     Where the program is out of reach, or a model has no answer there, the reason instead. `given` is under what the
     program runs; unless it names a set-up, the one that an explanation belongs to: there the choice matters.
     """
-    from toolpath_stiff.analysis import analyse
+    from toolpath_stiff.analysis import analyze
     from toolpath_stiff.analysis.statistics import stiffness_figures
 
     names = [name for name in diagnosis.explanations if name == NONE or name in diagnosis.fits]
@@ -348,7 +348,7 @@ def choice_on_path(
         try:
             model = build_model(machine, diagnosis.predictor.effect_files, fit.effects, conditions)
             model = replace(model, instruments=())  # readings differ, the machine under the tool does not
-            analysis = analyse(model, program, origin=origin, step=PATH_STEP)
+            analysis = analyze(model, program, origin=origin, step=PATH_STEP)
         except TpsError as error:
             return {"program": program.name, "reason": str(error)}
         figures = stiffness_figures(analysis, analysis.headline)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from toolpath_stiff import defaults
 from toolpath_stiff.hints import Asked, command_line, hint, options
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE, joined
+from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
@@ -235,5 +236,5 @@ def assumptions(diagnosis: Diagnosis) -> list[str]:
         f"the plausible set holds {100 * HELD:g} %",
     ]
     if "force_N" in diagnosis.data.missing:
-        found.append(f"load of every reading: {DEFAULT_FORCE:g} N, assumed because force_N is missing")
+        found.append(f"load of every reading: {defaults.FORCE:g} N, assumed because force_N is missing")
     return found

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness.effects.contract import DEFAULT_FORCE
 from toolpath_stiff.units import RAD_PER_DEG
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -99,7 +99,7 @@ class Menu:
     labels: tuple[str, ...] = ()
     floors: Mapping[str, float] = field(default_factory=dict)
     timed: bool = True
-    usual_load: float = DEFAULT_FORCE
+    usual_load: float = defaults.FORCE
 
     def __post_init__(self) -> None:
         if self.rounds < 1:

@@ -1,0 +1,70 @@
+"""Errors of TOML files name the line of what is wrong: keys, tables in lists, keys in quotes, tables on one line."""
+
+from __future__ import annotations
+
+import pytest
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import read_controller
+from toolpath_stiff.toml_reader import TomlReader
+
+TEXT = """dialect = "haas"
+[[tools]]
+number = 1
+length_mm = 100.0
+[[tools]]
+number = 2
+[offsets]
+"G54.1 P1" = [1, 2, 3]
+G54 = [1.0]
+[kinematics]
+type = "table"
+head = { letter = "A" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("where", "line"),
+    [
+        ("dialect", 1),
+        ("tools[1].number", 3),
+        ("tools[2].number", 6),
+        ("tools[2].length_mm", 5),  # missing: the table's heading
+        ("tools[2]", 5),
+        ("offsets", 7),
+        ("offsets.G54.1 P1", 8),
+        ("offsets.G54", 9),
+        ("kinematics.type", 11),
+        ("kinematics.head.letter", 12),
+        ("kinematics.tcp", 10),
+        ("nothing", None),
+    ],
+)
+def test_the_line_of_a_dotted_name(where, line):
+    assert TomlReader(TEXT, "control.toml").line_at(where) == line
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"haas"', '"hass"', "1: dialect = 'hass'; expected generic or linuxcnc or fanuc or haas"),
+        ("[1, 2, 3]", '[1, "2"]', "8: offsets.G54.1 P1 = '2'; expected a number within"),
+        ("number = 2", "number = 1", "6: tools[2]: tool 1 appears twice"),
+        ("number = 2", "number = true", "6: tools[2].number = True; expected a whole number"),
+        ("head =", "hand =", "12: kinematics.hand is not known in the type 'table'; expected type, tcp"),
+        ("[1.0]", "[1.0", "10:1: the controller file is not TOML: "),
+    ],
+)
+def test_a_controller_file_names_the_line(tmp_path, old, new, message):
+    file = tmp_path / "control.toml"
+    file.write_text(TEXT.replace(old, new), "utf-8")
+    with pytest.raises(InputError) as caught:
+        read_controller(file)
+    assert str(caught.value).startswith(f"{file}:{message}")
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    file = tmp_path / "control.toml"
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="the controller file is not a text file"):
+        TomlReader.read(file, "the controller file")

@@ -1,0 +1,150 @@
+"""TOML files, checked: every error names file, line and key, what was found and what was expected.
+
+A reader of our own, because validators of types (msgspec, cattrs) know no lines, state types instead of what a key
+means ("6 rows of 3 numbers in mm"), and stop at what a type can say: a bound, a unit, a key that excludes another.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeGuard
+
+from toolpath_stiff.errors import InputError
+
+HEADING = re.compile(r"\s*\[\[?\s*([\w.]+)\s*\]")
+NTH = re.compile(r"(.*)\[(\d+)\]")
+
+
+class TomlReader:
+    """The tables of one file, and its lines, so that messages can name them.
+
+    Attributes
+    ----------
+    data
+        What the file holds.
+    file
+        Its name, for messages.
+    """
+
+    def __init__(self, text: str, file: str, what: str = "", kind: type[InputError] = InputError) -> None:
+        """`what` names the file in messages, `kind` is the class of its errors.
+
+        Raises `kind` with line and column if the text is not TOML.
+        """
+        import tomllib
+
+        self.file, self.lines, self.kind = file, text.splitlines(), kind
+        try:
+            self.data: dict[str, Any] = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
+            line, column = (int(place[1]), int(place[2])) if place else (None, None)
+            reason = str(error).split(" (at ")[0]
+            found = f"{what} is not TOML: {reason}" if what else f"not valid TOML: {reason}"
+            raise kind(found, file=file, line=line, column=column) from None
+
+    @classmethod
+    def read(cls, path: str | Path, what: str, kind: type[InputError] = InputError) -> TomlReader:
+        """Read a file, as the constructor. Raises `kind` if it cannot be read or is not TOML."""
+        try:
+            text = Path(path).read_text(encoding="utf-8-sig")
+        except OSError as error:
+            raise kind(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+        except UnicodeDecodeError:
+            raise kind(f"{what} is not a text file", file=str(path)) from None
+        return cls(text, str(path), what, kind)
+
+    def line_of(self, section: str, key: str = "", nth: int = 0) -> int | None:
+        """Line of a key of a section (the nth of its name), or of its heading; None if it is not found."""
+        inside, seen = section == "", -1
+        for number, line in enumerate(self.lines, 1):
+            heading = HEADING.match(line)
+            if heading:
+                seen += heading[1] == section
+                inside = heading[1] == section and seen == nth
+                if inside and not key:
+                    return number
+            elif inside and key and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
+                return number
+        return None
+
+    def line_at(self, where: str) -> int | None:
+        """Line of a dotted name such as `kinematics.head.letter` or `tools[2].number`; else of what it stands in."""
+        while where:
+            line = self._line_exactly(where)
+            if line is not None:
+                return line
+            where = where.rpartition(".")[0]
+        return None
+
+    def _line_exactly(self, where: str) -> int | None:
+        """The same of the name itself; a key in quotes may hold dots."""
+        parts = where.split(".")
+        for count in range(len(parts) - 1, -1, -1):
+            section, key = ".".join(parts[:count]), ".".join(parts[count:])
+            nth = NTH.fullmatch(section)
+            line = self.line_of(nth[1], key, int(nth[2]) - 1) if nth else self.line_of(section, key)
+            if line is not None:
+                return line
+        nth = NTH.fullmatch(where)
+        return self.line_of(nth[1], "", int(nth[2]) - 1) if nth else self.line_of(where)
+
+    def error(self, found: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
+        """An error at the line of the dotted name `where`."""
+        return self.kind(found, expected=expected, hint=hint, file=self.file, line=self.line_at(where))
+
+    def only(self, where: str, table: Mapping[str, Any], known: Iterable[str], of: str = "") -> None:
+        """Refuse a key of a table that is not known; `of` ends the sentence."""
+        known = list(known)
+        for key in table:
+            if key not in known:
+                name = f"{where}.{key}" if where else repr(key)
+                raise self.error(f"{name} is not known{of}", ", ".join(known), where=f"{where}.{key}".lstrip("."))
+
+    def needed(self, where: str, table: Mapping[str, Any], key: str, expected: str) -> Any:
+        """The value of a key that must be there."""
+        if key not in table:
+            raise self.error(f"{where}.{key} is missing", expected, where=where)
+        return table[key]
+
+    def number(self, where: str, value: object, largest: float) -> float:
+        """A number within +-`largest`."""
+        if not is_number(value) or not abs(value) <= largest:
+            raise self.error(f"{where} = {value!r}", f"a number within +-{largest:g}", where=where)
+        return float(value)
+
+    def flag(self, where: str, value: object) -> bool:
+        """True or false."""
+        if not isinstance(value, bool):
+            raise self.error(f"{where} = {value!r}", "true or false", where=where)
+        return value
+
+    def choice(self, where: str, value: object, choices: Iterable[str], expected: str) -> str:
+        """One of some texts."""
+        if not isinstance(value, str) or value not in choices:
+            raise self.error(f"{where} = {value!r}", expected, where=where)
+        return value
+
+    def table(self, where: str, value: object, expected: str) -> dict[str, Any]:
+        """A table."""
+        if not isinstance(value, dict):
+            raise self.error(f"{where} = {value!r}", expected, where=where)
+        return value
+
+
+def is_number(value: object) -> TypeGuard[int | float]:
+    """Whether a value is a TOML number; true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def is_text(value: object) -> TypeGuard[str]:
+    """Whether a value is a text that is not empty."""
+    return isinstance(value, str) and bool(value.strip())
+
+
+def shortened(value: object) -> str:
+    """A value as it stands, cut for a message."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
