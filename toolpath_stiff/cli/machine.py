@@ -1,4 +1,4 @@
-"""`tps machine`: list, show, check, make and import machine files; repeat the recovery of the NIST geometry."""
+"""The commands on a machine: pose, map, machine, effects."""
 
 from __future__ import annotations
 
@@ -6,12 +6,161 @@ import argparse
 import sys
 from pathlib import Path
 
-from toolpath_stiff.cli.arguments import pose_argument
-from toolpath_stiff.cli.outputs import add_replace_option, check_new, check_written, keep, written_text
+from toolpath_stiff.cli.arguments import (
+    add_json_option,
+    add_machine_options,
+    finite_number,
+    load_argument,
+    machine_for,
+    pose_argument,
+    range_argument,
+)
+from toolpath_stiff.cli.outputs import (
+    add_replace_option,
+    check_new,
+    check_written,
+    destination,
+    keep,
+    show,
+    written_text,
+)
+from toolpath_stiff.cli.progress import progress_line
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import command_line, hint
+from toolpath_stiff.hints import command_line, hint, options
 
-EPILOG = """\
+# -- tps pose ---------------------------------------------------------------------------------------------------------
+
+POSE_OUT_OF_REACH, MOST_NAMED = 1, 10
+
+POSE_EPILOG = """\
+examples:
+  tps pose -300 300 300 -30 0 0
+  tps pose --csv poses.csv > stiffness.csv
+
+Angles are roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); the position is the tool tip in mm, machine
+coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row a pose in the
+same order, with empty cells where a pose is out of reach (exit code 1).
+"""
+
+
+def pose_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = POSE_EPILOG
+    parser.add_argument(
+        "pose", nargs="*", type=finite_number, metavar="X Y Z [A B C]", help="tool tip in mm, angles in degrees"
+    )
+    parser.add_argument(
+        "--csv",
+        metavar="FILE",
+        help="read poses from a table (CSV, or FILE.xlsx[#SHEET]), write CSV to standard output",
+    )
+    add_machine_options(parser)
+    add_json_option(parser, "print JSON instead of a table")
+
+
+def pose(args: argparse.Namespace) -> int:
+    """Evaluate and print."""
+    from toolpath_stiff.api.machines import pose, read_poses
+
+    if (args.csv is None) == (not args.pose):
+        raise InputError(
+            "give either a pose or --csv FILE" if args.csv is None else "give a pose or --csv FILE, not both",
+            expected="tps pose X Y Z [A B C], or tps pose --csv FILE",
+        )
+    machine = machine_for(args)
+    if args.csv is None:
+        found = pose(machine, args.pose, force_N=args.force)
+        sys.stdout.write(found.to_json() if args.json else f"{found}\n")
+        return 0
+    poses, notes = read_poses(args.csv)
+    for note in notes:
+        print(f"tps: note: {note}", file=sys.stderr)
+    found = pose(machine, poses, force_N=args.force)
+    sys.stdout.write(found.to_json() if args.json else found.csv())
+    for warning in (*found.warnings, *found.out_of_reach(MOST_NAMED)):
+        print(f"tps: warning: {warning}", file=sys.stderr)
+    return 0 if found.reachable.all() else POSE_OUT_OF_REACH
+
+
+# -- tps map ----------------------------------------------------------------------------------------------------------
+
+MAP_EPILOG = """\
+examples:
+  tps map --z 1200 --x -150:150 --y -150:150 --load radial     the paper's Figure 8
+  tps map --z 1200 --load z                                    its Figure 9
+  tps map --slices 400,800,1200 --x -400:400 --y -400:400 --tilt 15,0,0
+
+files written to --out: map.csv (x_mm,y_mm,z_mm,stiffness_N_per_mm,reachable), map.json, map.png, map.html (3-D)
+"""
+
+
+def map_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = MAP_EPILOG
+    heights = parser.add_mutually_exclusive_group()
+    heights.add_argument("--z", type=finite_number, default=1200.0, metavar="MM", help="height (default: 1200)")
+    heights.add_argument("--slices", type=_heights, metavar="Z,Z,...", help="several heights, mm")
+    parser.add_argument(
+        "--x", type=range_argument, default=(-150.0, 150.0), metavar="LO:HI", help="mm (default: -150:150)"
+    )
+    parser.add_argument(
+        "--y", type=range_argument, default=(-150.0, 150.0), metavar="LO:HI", help="mm (default: -150:150)"
+    )
+    parser.add_argument("--points", type=int, default=61, metavar="N", help="grid points along a side (default: 61)")
+    parser.add_argument(
+        "--load", type=load_argument, default="radial", metavar="DIRECTION",
+        help="radial, axial, softest, x, y, z or DX,DY,DZ (default: radial)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--tilt", type=_angles, default=(0.0, 0.0, 0.0), metavar="A,B,C", help="roll, pitch, yaw, degrees"
+    )
+    parser.add_argument("--out", metavar="DIR", help="folder (default: reports/<machine>-map)")
+    add_replace_option(parser, force=False)
+    parser.add_argument("--no-plots", action="store_true", help="only map.csv and map.json")
+    add_machine_options(parser)
+    add_json_option(parser, "print map.json to standard output and nothing else")
+
+
+def _heights(text: str) -> list[float]:
+    values = [finite_number(part) for part in text.split(",")]
+    if len(set(values)) < len(values):
+        raise argparse.ArgumentTypeError(f"{text!r}: a height appears twice")
+    return sorted(values)
+
+
+def _angles(text: str) -> tuple[float, float, float]:
+    values = [finite_number(part) for part in text.split(",")]
+    if len(values) != 3 or max(abs(v) for v in values) > 180.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected A,B,C in degrees, within +-180")
+    return (values[0], values[1], values[2])
+
+
+def map(args: argparse.Namespace) -> int:
+    """Evaluate the grid and write the files."""
+    from toolpath_stiff.api.machines import map_stiffness
+    from toolpath_stiff.report.map import names
+
+    target = destination(args, "map", [args.machine], "-map").check(names(not args.no_plots))
+    with progress_line(quiet=args.json) as progress:
+        found = map_stiffness(
+            machine_for(args),
+            x_mm=args.x,
+            y_mm=args.y,
+            z_mm=args.slices or args.z,
+            load=args.load,
+            tilt_deg=args.tilt,
+            points=args.points,
+            force_N=args.force,
+            progress=progress,
+        )
+    return show(args, found, target)
+
+
+# -- tps machine ------------------------------------------------------------------------------------------------------
+
+MACHINE_EPILOG = """\
 examples:
   tps machine show nist --out hexapod.png           figures with their origin; the machine at the paper's pose
   tps machine new mine.toml                         a commented template to edit
@@ -19,13 +168,13 @@ examples:
   tps machine from-linuxcnc kinematics.hal -o mine.toml
   tps machine recover                               the NIST geometry from the paper's Table 1, fitted anew
 """
-OUT_OF_REACH = NOT_GOOD = 1
+MACHINE_OUT_OF_REACH = NOT_GOOD = 1
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def machine_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of every action."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.epilog = EPILOG
+    parser.epilog = MACHINE_EPILOG
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     listing = actions.add_parser("list", help="packaged machines")
     listing.add_argument("--json", action="store_true", help="print JSON")
@@ -60,20 +209,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     recover.add_argument("--json", action="store_true", help="print JSON")
 
 
-def run(args: argparse.Namespace) -> int:
+def machine(args: argparse.Namespace) -> int:
     """Do the chosen action."""
     action = {
-        "list": _list,
-        "show": _show,
-        "check": _check,
-        "new": _new,
+        "list": _machine_list,
+        "show": _machine_show,
+        "check": _machine_check,
+        "new": _machine_new,
         "from-linuxcnc": _from_linuxcnc,
         "recover": _recover,
     }[args.action]
     return action(args)
 
 
-def _list(args: argparse.Namespace) -> int:
+def _machine_list(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.inputs import Machine
     from toolpath_stiff.api.results import json_text
 
@@ -85,7 +234,7 @@ def _list(args: argparse.Namespace) -> int:
     return 0
 
 
-def _show(args: argparse.Namespace) -> int:
+def _machine_show(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.inputs import Machine
     from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
@@ -101,10 +250,10 @@ def _show(args: argparse.Namespace) -> int:
         written = write_atomically(target, machine.picture(args.pose))
         if not args.json:
             print(written_text([written]))
-    return 0 if machine.standing(args.pose)[2].reachable[0] else OUT_OF_REACH
+    return 0 if machine.standing(args.pose)[2].reachable[0] else MACHINE_OUT_OF_REACH
 
 
-def _check(args: argparse.Namespace) -> int:
+def _machine_check(args: argparse.Namespace) -> int:
     """Load the file, say what is wrong or doubtful, draw the machine at its neutral pose."""
     from toolpath_stiff.api.inputs import Machine
     from toolpath_stiff.files import write_atomically
@@ -120,7 +269,7 @@ def _check(args: argparse.Namespace) -> int:
     return 0 if found.good else NOT_GOOD
 
 
-def _new(args: argparse.Namespace) -> int:
+def _machine_new(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.machines import machine_template
 
     target, replaced = Path(args.file), check_new(args, args.file)
@@ -152,3 +301,97 @@ def _recover(args: argparse.Namespace) -> int:
     found = recover_geometry(starts=args.starts, seed=args.seed)
     sys.stdout.write(found.to_json() if args.json else f"{found}\n")
     return 0
+
+
+# -- tps effects ------------------------------------------------------------------------------------------------------
+
+CHECK_FAILED = 1
+EFFECTS_EPILOG = """\
+examples:
+  tps effects list
+  tps effects show platform_flexibility
+  tps effects new my_screw.py            a working effect to change into yours
+  tps effects check my_screw.py          shapes, symmetry, units, neutral value, speed; exit code 1 if it fails
+  tps effects list --effects my_screw.py
+
+Machine files carry effects as [[effect]], those that act on readings as [[instrument]].
+"""
+
+
+def effects_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EFFECTS_EPILOG
+    actions = parser.add_subparsers(dest="action", metavar="list|show|new|check", required=True)
+    listing = actions.add_parser("list", help="all effects, in the order of the load path")
+    showing = actions.add_parser("show", help="equation, parameters, units, bounds, typical values and their source")
+    showing.add_argument("name", metavar="NAME", help="name of the effect")
+    for sub in (listing, showing):
+        sub.add_argument(
+            "--effects", action="append", default=[], metavar="FILE.py", help="file with your own physical effects"
+        )
+        add_json_option(sub, "print JSON")
+    checking = actions.add_parser("check", help="try the effects of a file against the contract")
+    checking.add_argument("file", metavar="FILE.py", help="file with your own physical effects")
+    checking.add_argument("--machine", default="nist", metavar="NAME|FILE", help="to try them on (default: nist)")
+    add_json_option(checking, "print JSON")
+    writing = actions.add_parser("new", help="write a commented, working example of an effect")
+    writing.add_argument("file", metavar="FILE.py", help="file to write")
+    add_replace_option(writing)
+
+
+def effects(args: argparse.Namespace) -> int:
+    """List, show, check or write."""
+    return {"list": _effects_list, "show": _effects_show, "check": _effects_check, "new": _effects_new}[args.action](
+        args
+    )
+
+
+def _effects_list(args: argparse.Namespace) -> int:
+    from toolpath_stiff.api.effects import effects
+
+    found = effects(args.effects)
+    sys.stdout.write(found.to_json() if args.json else f"{found}\n")
+    return 0
+
+
+def _effects_show(args: argparse.Namespace) -> int:
+    from toolpath_stiff.api.results import json_text
+    from toolpath_stiff.report.effects import describe, details
+    from toolpath_stiff.stiffness.effects import find_effect
+
+    effect = find_effect(args.name, args.effects)
+    sys.stdout.write(json_text(describe(effect)) if args.json else f"{details(effect)}\n")
+    return 0
+
+
+def _effects_check(args: argparse.Namespace) -> int:
+    """Try every effect of a file; exit code 1 if one fails."""
+    from toolpath_stiff.api.effects import check_effects
+
+    found = check_effects(args.file, args.machine)
+    sys.stdout.write(found.to_json() if args.json else f"{found}\n")
+    return 0 if found.passed else CHECK_FAILED
+
+
+def _effects_new(args: argparse.Namespace) -> int:
+    """Write the example effect, named after its file."""
+    from toolpath_stiff.api.effects import effect_template
+
+    target = Path(args.file)
+    if target.suffix != ".py" or not target.stem.isidentifier():
+        raise InputError(f"{args.file!r} cannot hold an effect", expected="a name such as my_screw.py")
+    keep(check_new(args, args.file))
+    effect_template(target.stem).save(target)
+    line = command_line("effects", "show", target.stem, *options(effects=args.file))
+    print(f"wrote {args.file}\n{hint('read it back', line)}")
+    return 0
+
+
+# Command -> what declares its arguments, what runs it.
+COMMANDS = {
+    "pose": (pose_arguments, pose),
+    "map": (map_arguments, map),
+    "machine": (machine_arguments, machine),
+    "effects": (effects_arguments, effects),
+}

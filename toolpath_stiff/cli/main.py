@@ -11,7 +11,7 @@ import importlib
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from toolpath_stiff import __version__
@@ -22,16 +22,22 @@ from toolpath_stiff.hints import command_line, without_destination
 
 @dataclass(frozen=True)
 class Command:
-    """A command: its name, its line in the help, its group; the module `cli.<module>` does the work."""
+    """A command: its name, its line in the help, its group; the module of the group does the work."""
 
     name: str
     help: str
     group: str
 
     @property
-    def module(self) -> str:
-        """Module with `add_arguments(parser)` and `run(args) -> exit code`."""
-        return f"toolpath_stiff.cli.{self.name.replace('-', '_')}"
+    def parts(self) -> tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]:
+        """What declares its arguments, what runs it and gives the exit code."""
+        module = importlib.import_module(f"toolpath_stiff.cli.{MODULES[self.group]}")
+        found: tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]
+        found = module.COMMANDS[self.name]
+        return found
+
+
+MODULES = {"A program": "program", "A machine": "machine", "A placement": "placement", "Measurements": "measurements"}
 
 
 COMMANDS = (
@@ -93,7 +99,7 @@ def build_parser(chosen: str | None) -> argparse.ArgumentParser:
     for command in COMMANDS:
         sub = commands.add_parser(command.name, description=command.help)
         if command.name == chosen:
-            importlib.import_module(command.module).add_arguments(sub)
+            command.parts[0](sub)
     return parser
 
 
@@ -123,7 +129,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             parser.print_help()
             return 2
         command = next(c for c in COMMANDS if c.name == args.command)
-        code: int = importlib.import_module(command.module).run(args)
+        code = command.parts[1](args)
         sys.stdout.flush()
         return code
     except SystemExit as stop:  # argparse: --help, --version, wrong usage

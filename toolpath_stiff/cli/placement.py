@@ -1,4 +1,4 @@
-"""`tps place`: where the work should sit."""
+"""The commands on a placement: place, case-study."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ from toolpath_stiff.cli.arguments import (
 from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, show
 from toolpath_stiff.cli.progress import progress_line
 
-EPILOG = """\
+# -- tps place --------------------------------------------------------------------------------------------------------
+
+PLACE_EPILOG = """\
 examples:
   tps place programs/pocket.nc --x -300:300 --y -300:300 --z 400:1250
   tps place programs/pocket.nc --z-values 400,600,800 --rotate 0 --objective mean
@@ -36,10 +38,10 @@ report.html (click a placement of the front, see the path there).
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def place_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.epilog = EPILOG
+    parser.epilog = PLACE_EPILOG
     parser.add_argument("program", metavar="PROGRAM", help="NC program or cutter-location file")
     group = parser.add_argument_group(
         "what may vary (LO:HI, or one number to fix it; default: as far as the machine reaches)"
@@ -105,7 +107,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_write_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("the program itself, transformed to the recommended placement")
-    group.add_argument("--write", metavar="FILE", help="write it: run at the present origin it cuts as placed")
+    group.add_argument("--write", metavar="FILE", help="write it: place at the present origin it cuts as placed")
     group.add_argument(
         "--decimals", type=int, metavar="N", help="of its numbers (default: 4 in mm and degrees, 5 in inch)"
     )
@@ -145,7 +147,7 @@ def _keep_out(text: str) -> tuple[str, list[float]]:
     return name, values
 
 
-def run(args: argparse.Namespace) -> int:
+def place(args: argparse.Namespace) -> int:
     """Search, or take another point of an earlier search; write the files."""
     from toolpath_stiff.api.placements import KeepOut, place
     from toolpath_stiff.files import write_atomically
@@ -185,3 +187,38 @@ def run(args: argparse.Namespace) -> int:
     if args.write:
         write_atomically(args.write, found.program_bytes)
     return show(args, found, target)
+
+
+# -- tps case-study ---------------------------------------------------------------------------------------------------
+
+CASE_STUDY_EPILOG = """\
+Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
+displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
+"""
+
+
+def case_study_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = CASE_STUDY_EPILOG
+    parser.add_argument("--out", metavar="DIR", help="folder (default: reports/<machine>-case-study)")
+    add_replace_option(parser, force=False)
+    parser.add_argument("--no-plots", action="store_true", help="no pictures")
+    add_machine_options(parser)
+    add_json_option(parser, "print case_study.json to standard output and nothing else")
+
+
+def case_study(args: argparse.Namespace) -> int:
+    """Analyze the regions and write the files."""
+    from toolpath_stiff.api.placements import case_study
+    from toolpath_stiff.report.case_study import names
+
+    target = destination(args, "case-study", [args.machine], "-case-study").check(names(not args.no_plots))
+    return show(args, case_study(machine_for(args)), target)
+
+
+# Command -> what declares its arguments, what runs it.
+COMMANDS = {
+    "place": (place_arguments, place),
+    "case-study": (case_study_arguments, case_study),
+}

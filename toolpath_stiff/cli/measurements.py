@@ -1,0 +1,419 @@
+"""The commands on measurements: reduce, compare, diagnose, update, plan."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toolpath_stiff.cli.arguments import (
+    add_condition_options,
+    add_json_option,
+    add_program_options,
+    finite_number,
+    limit_threads,
+    positive_number,
+    program_for,
+)
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, show, written_text
+from toolpath_stiff.cli.progress import progress_line
+from toolpath_stiff.defaults import MACHINE, STRUT_SPREAD
+
+if TYPE_CHECKING:
+    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.measuring import Measurements
+
+
+def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherwise: str = "") -> None:
+    """DATA, --machine and --effects."""
+    parser.add_argument(
+        "data",
+        nargs=nargs,
+        metavar="DATA",
+        help="measurement files (CSV, or FILE.xlsx[#SHEET]), or nist-table1" + otherwise,
+    )
+    parser.add_argument(
+        "--machine", default=MACHINE, metavar="NAME|FILE", help=f"machine name or file (default: {MACHINE})"
+    )
+    parser.add_argument(
+        "--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects; they take part"
+    )
+
+
+def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and a high guess") -> None:
+    """--noise and --strut-spread; `guess` is made where nothing is known."""
+    group = parser.add_argument_group("noise")
+    group.add_argument(
+        "--noise", type=noise_argument, metavar="PERCENT[,PERCENT]",
+        help="sd of one reading, re-clamping included; or of the reading alone and of a clamping "
+        f"(default: from repeats, else from sd_N_per_mm, else {guess})",
+    )  # fmt: skip
+    group.add_argument(
+        "--strut-spread", type=spread_argument, default=100.0 * STRUT_SPREAD, metavar="PERCENT",
+        help="of the struts' stiffness (default: 1)",
+    )  # fmt: skip
+
+
+def add_output_arguments(
+    parser: argparse.ArgumentParser, command: str, kept: str, *, force: bool = True, of: str = "DATA"
+) -> None:
+    """--seed, --jobs, --out, --replace (--force), --no-plots, --json; `kept` is what --no-plots writes still.
+
+    `of` is what the folder is named after.
+    """
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
+    parser.add_argument("--out", metavar="DIR", help=f"folder (default: reports/<{of}>-{command})")
+    add_replace_option(parser, force=force)
+    parser.add_argument("--no-plots", action="store_true", help=f"only {kept}")
+    add_json_option(parser, f"print {command}.json to standard output and nothing else")
+
+
+def measured(args: argparse.Namespace) -> tuple[Machine, Measurements]:
+    """The machine with its effect files, and the measurements."""
+    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.measuring import Measurements
+
+    return Machine.load(args.machine, effects=args.effects), Measurements(args.data)
+
+
+def noise_options(args: argparse.Namespace) -> dict[str, Any]:
+    """--noise, --strut-spread and --seed, as every function on measurements takes them."""
+    return {"noise_percent": args.noise, "strut_spread_percent": args.strut_spread, "seed": args.seed}
+
+
+def noise_argument(text: str) -> float | tuple[float, float]:
+    """One or two percentages."""
+    parts = [finite_number(part) for part in text.split(",")]
+    if len(parts) > 2 or not all(0.0 <= part <= 50.0 for part in parts) or parts[0] <= 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected one or two percentages, more than 0 and at most 50")
+    return parts[0] if len(parts) == 1 else (parts[0], parts[1])
+
+
+def spread_argument(text: str) -> float:
+    """A percentage from 0 to 50."""
+    value = finite_number(text)
+    if not 0.0 <= value <= 50.0:
+        raise argparse.ArgumentTypeError(f"{text} %: expected 0 to 50 %")
+    return value
+
+
+# -- tps reduce -------------------------------------------------------------------------------------------------------
+
+REDUCE_EPILOG = """\
+columns of RAW:
+  x_mm,y_mm,z_mm,direction     where and along what (X, Y, Z; or dx,dy,dz), optionally a_deg,b_deg,c_deg
+  jog_um                       how far the machine was told to move from zero
+  force_N,displacement_um      gauge and indicator, positive the way the jog counts
+  point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
+
+Records in the order taken, jogging 0, +200, -200, 0 um as ASME B5.54 and the paper do; those of one point, direction,
+set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's equation 12).
+"""
+
+
+def reduce_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = REDUCE_EPILOG
+    parser.add_argument("raw", metavar="RAW", help="raw records: CSV, or FILE.xlsx[#SHEET]")
+    parser.add_argument(
+        "--out", metavar="FILE", help="measurement file to write (default: <name>_measurements.csv); loops go beside it"
+    )
+    add_replace_option(parser)
+    parser.add_argument("--no-plots", action="store_true", help="do not draw the loops")
+    add_json_option(parser, "print the figures as JSON")
+
+
+def reduce(args: argparse.Namespace) -> int:
+    """Reduce, write, print."""
+    from toolpath_stiff.api.measuring import reduce
+    from toolpath_stiff.api.results import json_text
+    from toolpath_stiff.files import write_atomically
+    from toolpath_stiff.tables import split_name
+
+    found = reduce(args.raw)
+    out = Path(args.out or f"{Path(split_name(args.raw)[0]).stem}_measurements.csv")
+    files = found.files(out, plots=not args.no_plots)
+    keep(check_written(args, files), quiet=args.json)
+    written = [str(write_atomically(name, content)) for name, content in files.items()]
+    for note in found.notes:
+        print(f"tps: note: {note}", file=sys.stderr)
+    if args.json:
+        sys.stdout.write(json_text({**found.to_dict(), "files": written}))
+    else:
+        print(f"{found}\n\nwrote {' and '.join(written)}")
+    return 0
+
+
+# -- tps compare ------------------------------------------------------------------------------------------------------
+
+COMPARE_EPILOG = """\
+examples:
+  tps compare nist-table1
+  tps compare measurements.csv --machine my_machine.toml
+  tps compare first.csv second.csv --noise 2,1 --out reports/again
+
+The machine file is compared as it stands; `tps diagnose` asks which effect it lacks. A finding is a pattern in the
+residuals that fewer than 5 % of campaigns of mere scatter would show anywhere among all patterns looked for.
+Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, strips.png, planes.png,
+machine.png, variables.png, load_path.png.
+"""
+
+
+def compare_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = COMPARE_EPILOG
+    add_data_arguments(parser)
+    add_noise_arguments(parser)
+    add_output_arguments(parser, "compare", kept="compare.json and residuals.csv")
+
+
+def compare(args: argparse.Namespace) -> int:
+    """Compare, write, say where the model fails."""
+    from toolpath_stiff.report.compare import names
+
+    target = destination(args, "compare", args.data, "-compare").check(names(not args.no_plots))
+    limit_threads(args.jobs)
+    from toolpath_stiff.api.measuring import compare
+
+    with progress_line(quiet=args.json) as progress:
+        found = compare(*measured(args), **noise_options(args), progress=progress)
+        return show(args, found, target)
+
+
+# -- tps diagnose -----------------------------------------------------------------------------------------------------
+
+DIAGNOSE_EPILOG = """\
+examples:
+  tps diagnose measurements.csv
+  tps diagnose nist-table1 --noise 5
+  tps diagnose first.csv second.csv --effects my_effect.py --out reports/again
+
+The verdict: adequate (nothing is missing that these data could show), identified, ambiguous (several explain the data
+equally well), unexplained (something is missing that no effect of the catalogue describes). Files written to --out:
+diagnose.json, residuals.csv, ladder.png, confounding.png, detectable.png, before_after.png, envelope.png,
+report.html.
+"""
+
+
+def diagnose_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = DIAGNOSE_EPILOG
+    add_data_arguments(parser)
+    add_noise_arguments(parser)
+    group = parser.add_argument_group("how much the choice matters")
+    group.add_argument(
+        "--program", metavar="PROGRAM", help="NC program to try it on (default: the packaged case study)"
+    )
+    add_condition_options(group)
+    add_program_options(parser, sampled=False)
+    add_output_arguments(parser, "diagnose", kept="diagnose.json and residuals.csv")
+
+
+def diagnose(args: argparse.Namespace) -> int:
+    """Diagnose, write, say what was found. Any verdict is success."""
+    from toolpath_stiff.report.diagnose import names
+
+    target = destination(args, "diagnose", args.data, "-diagnose").check(names(not args.no_plots))
+    limit_threads(args.jobs)
+    from toolpath_stiff.api.measuring import diagnose
+
+    machine, data = measured(args)
+    with progress_line(quiet=args.json) as progress:
+        found = diagnose(
+            machine.under(args.setup, args.temperature),
+            data,
+            **noise_options(args),
+            program=program_for(args, args.program) if args.program else None,
+            origin_mm_deg=args.origin,
+            progress=progress,
+        )
+        return show(args, found, target)
+
+
+# -- tps update -------------------------------------------------------------------------------------------------------
+
+UPDATE_EPILOG = """\
+examples:
+  tps update measurements.csv --add joint_compliance -o fitted.toml
+  tps update measurements.csv --add weak_strut:strut=3 --keep-strut-law
+  tps update measurements.csv --auto
+  tps update nist-table1 --strut-law --objective mean-error     the paper's own estimation
+
+An effect that the data do not support is refused, with the reason, unless --force is given; the exit code is 0 all the
+same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another place),
+ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
+"""
+
+def update_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = UPDATE_EPILOG
+    add_data_arguments(parser)
+    parser.add_argument(
+        "--add", action="append", default=[], metavar="EFFECT[:KEY=VALUE,..]",
+        help="effect to fit; what it acts on is searched unless it is said (weak_strut:strut=3)",
+    )  # fmt: skip
+    law = parser.add_mutually_exclusive_group()
+    law.add_argument("--strut-law", action="store_true", help="write the refitted strut law even without an effect")
+    law.add_argument(
+        "--keep-strut-law", action="store_true",
+        help="keep the strut law as given (default: its two stiffnesses are refitted along with every effect)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--auto",
+        action="store_true",
+        help="add effects as long as the error at left-out points falls and the data support it",
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="write what the data do not support as well; and as --replace"
+    )
+    parser.add_argument(
+        "--objective", choices=("likelihood", "mean-error"), default="likelihood",
+        help="mean-error: the strut law alone, as the paper fitted it (default: likelihood)",
+    )  # fmt: skip
+    parser.add_argument("-o", "--output", metavar="MACHINE.toml", help="the new machine file (default: in --out)")
+    add_noise_arguments(parser, guess="a high guess")
+    add_output_arguments(parser, "update", kept="update.json, residuals.csv and the machine file", force=False)
+
+
+def update(args: argparse.Namespace) -> int:
+    """Fit, judge, write. Refusal is success as well."""
+    from toolpath_stiff.report.update import MACHINE_FILE, names
+
+    args.replace |= args.force
+    replaced = check_written(args, [args.output])
+    target = destination(args, "update", args.data, "-update")
+    target.check(names(not args.no_plots, machine=args.output is None))
+    limit_threads(args.jobs)
+    from toolpath_stiff.api.measuring import update
+
+    with progress_line(quiet=args.json) as progress:
+        found = update(
+            *measured(args),
+            add=args.add,
+            strut_law=args.strut_law,
+            keep_strut_law=args.keep_strut_law,
+            auto=args.auto,
+            force=args.force,
+            objective=args.objective,
+            machine_file=args.output or target.folder / MACHINE_FILE,
+            **noise_options(args),
+            progress=progress,
+        )
+        files = found.files(plots=not args.no_plots, machine=args.output is None)
+    keep(replaced, quiet=args.json)
+    # The machine file first: update.json names it.
+    written = [found.save_machine(args.output)] if args.output and found.accepted else []
+    written += target.write(files)
+    if args.json:
+        sys.stdout.write(found.to_json())
+    else:
+        print("\n".join([str(found), written_text(written), *(["", *found.next] if found.next else [])]))
+    return 0
+
+
+# -- tps plan ---------------------------------------------------------------------------------------------------------
+
+PLAN_EPILOG = """\
+examples:
+  tps plan measurements.csv                       what would tell the plausible explanations apart
+  tps plan measurements.csv --between frame_compliance,joint_moment_stiffness --n 4
+  tps plan --machine nist                         a good first campaign
+  tps plan --machine nist --between spindle_compliance,table_compliance
+
+Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png.
+"""
+COSTS = ("reading", "pose", "tool", "setup")
+
+
+def plan_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = PLAN_EPILOG
+    add_data_arguments(parser, nargs="*", otherwise="; none: a first campaign")
+    parser.add_argument("--between", type=_names, metavar="A,B", help="tell these effects apart (or `none`)")
+    parser.add_argument("--n", type=int, metavar="N", help="poses (default: 6, or 24 of a first campaign)")
+    group = parser.add_argument_group("what may vary")
+    group.add_argument("--radius", type=positive_number("mm", 1e5), metavar="MM", help="about the axis (default: 300)")
+    group.add_argument("--heights", type=_numbers, metavar="Z,Z,...", help="of the tool tip, mm (default: five levels)")
+    group.add_argument("--max-tilt", type=_tilt, metavar="DEG", help="of the spindle (default: 25)")
+    group.add_argument("--loads", type=_numbers, metavar="N,N,...", help="default: 500,1000,4000 and those of the data")
+    group.add_argument(
+        "--tools", type=_numbers, metavar="MM,MM,...",
+        help="tools, longer than the reference tool by; the first is in the spindle (default: as last, and 150)",
+    )  # fmt: skip
+    group.add_argument(
+        "--setups", type=_names, metavar="NAME,...", help="the first is on the table (default: those of the data)"
+    )
+    group.add_argument(
+        "--cost", action="append", default=[], type=_cost, metavar="WHAT=MINUTES",
+        help="of a reading (default 1), a pose (15), another tool (10), another setup (45)",
+    )  # fmt: skip
+    add_noise_arguments(parser, guess="a high guess, or 2 %% without data")
+    add_output_arguments(parser, "plan", kept="plan.csv and plan.json", of="DATA, else machine")
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(dict.fromkeys(finite_number(part) for part in text.split(",")))
+
+
+def _tilt(text: str) -> float:
+    value = finite_number(text)
+    if not 0.0 <= value < 90.0:
+        raise argparse.ArgumentTypeError(f"{text} degrees: expected 0 or more and less than 90")
+    return value
+
+
+def _cost(text: str) -> tuple[str, float]:
+    name, _, minutes = text.partition("=")
+    if name not in COSTS:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected {', '.join(COSTS)} and =MINUTES")
+    value = finite_number(minutes)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected minutes, 0 or more")
+    return name, value
+
+
+def plan(args: argparse.Namespace) -> int:
+    """Plan, write the files, say what the plan promises."""
+    from toolpath_stiff.report.plan import names
+
+    target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
+    limit_threads(args.jobs)
+    from toolpath_stiff.api.measuring import plan
+
+    machine, data = measured(args)
+    found = plan(
+        machine,
+        data if args.data else None,
+        between=args.between or (),
+        n=args.n,
+        radius_mm=args.radius,
+        heights_mm=args.heights,
+        max_tilt_deg=args.max_tilt,
+        loads_N=args.loads,
+        tool_extensions_mm=args.tools,
+        setups=args.setups,
+        minutes=dict(args.cost),
+        **noise_options(args),
+    )
+    return show(args, found, target)
+
+
+# Command -> what declares its arguments, what runs it.
+COMMANDS = {
+    "reduce": (reduce_arguments, reduce),
+    "compare": (compare_arguments, compare),
+    "diagnose": (diagnose_arguments, diagnose),
+    "update": (update_arguments, update),
+    "plan": (plan_arguments, plan),
+}
