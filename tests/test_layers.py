@@ -21,6 +21,7 @@ RANK = {
     "hints": 0,
     "rotations": 0,
     "files": 1,
+    "processes": 1,
     "results_folder": 2,
     "column_files": 1,
     "workbook": 1,

@@ -14,7 +14,7 @@ from pathlib import PurePath
 
 PROGRAM = "tps"
 MACHINE, STRUT_SPREAD = "nist", 0.01  # what commands take unless told
-NO_MATTER = ("--out", "--jobs")  # each takes a value
+NO_MATTER = ("--out", "--jobs", "--cluster")  # each takes a value
 PRINTED = "--json"  # what is printed, not what is written
 NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
 

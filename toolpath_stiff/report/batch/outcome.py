@@ -14,7 +14,9 @@ from toolpath_stiff.report.words import duration, number, only_plunges, plain, s
 WIDTH = 100  # columns of the terminal
 MOST_NAME = 36  # of them for the name
 
-# Column of summary.csv -> key of the figures, decimals; the units are in the names.
+# First columns of summary.csv -> what of the outcome they show.
+TOLD = {"program": "name", "file": "file", "status": "status", "reason": "reason", "report": "opens"}
+# Its further columns, keys of the figures -> decimals; the units are in the names.
 COLUMNS: Mapping[str, int | None] = {
     "machine": None,
     "load": None,
@@ -123,12 +125,18 @@ def summary_csv(outcomes: Sequence[Outcome]) -> str:
     """`summary.csv`: one row a program, failures too; a figure that does not exist is an empty cell."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["program", "file", "status", "reason", "report", *COLUMNS])
+    writer.writerow([*TOLD, *COLUMNS])
     for one in outcomes:
         figures = one.figures or {}
-        told = [plain(word) for word in (one.name, one.file, one.status, one.reason, one.opens)]
+        told = [plain(getattr(one, of)) for of in TOLD.values()]
         writer.writerow([*told, *(_cell(figures.get(name), digits) for name, digits in COLUMNS.items())])
     return text.getvalue()
+
+
+def columns_of(outcomes: Sequence[Outcome]) -> dict[str, list[Any]]:
+    """The same as values, column by column; None for a figure that does not exist."""
+    told = {name: [getattr(one, of) for one in outcomes] for name, of in TOLD.items()}
+    return {**told, **{name: [_figure(one, name) for one in outcomes] for name in COLUMNS}}
 
 
 def _cell(value: Any, digits: int | None) -> str:
