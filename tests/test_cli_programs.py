@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toolpath_stiff.cli.analyze import EPILOG
-from toolpath_stiff.cli.programs import RESERVED, Found, endings, find_programs, report_folders
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.report.batch.programs import RESERVED, Found, endings, find_programs, report_folders
 
 
 @pytest.fixture

@@ -24,6 +24,7 @@ RANK = {
     "toml_reader": 1,
     "hints": 2,
     "files": 2,
+    "processes": 2,
     "results_folder": 3,
     "column_files": 2,
     "workbook": 2,

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.machines import pose as pose
     from toolpath_stiff.api.machines import read_poses as read_poses
     from toolpath_stiff.api.machines import recover_geometry as recover_geometry
+    from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
+    from toolpath_stiff.api.many import analyze_many as analyze_many
     from toolpath_stiff.api.measuring import Comparison as Comparison
     from toolpath_stiff.api.measuring import Diagnosis as Diagnosis
     from toolpath_stiff.api.measuring import Measurements as Measurements
@@ -87,6 +89,7 @@ _PUBLIC = {
         "MachineCheck", "MachineFile", "PoseStiffness", "StiffnessMap", "machine_from_linuxcnc", "machine_template",
         "map_stiffness", "pose", "read_poses", "recover_geometry",
     ),
+    "api.many": ("ManyAnalyses", "analyze_many"),
     "api.measuring": (
         "Comparison", "Diagnosis", "Measurements", "Plan", "Reduction", "Update", "compare", "diagnose", "plan",
         "reduce", "update",

@@ -15,7 +15,7 @@ from pathlib import PurePath
 from toolpath_stiff import defaults
 
 PROGRAM = "tps"
-NO_MATTER = ("--out", "--jobs")  # each takes a value
+NO_MATTER = ("--out", "--jobs", "--cluster")  # each takes a value
 PRINTED = "--json"  # what is printed, not what is written
 NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
 

@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolpath_stiff.api.machines import MachineCheck
+    from toolpath_stiff.machine import Machine as MachineData
     from toolpath_stiff.machine import Reach, Struts
     from toolpath_stiff.nc.controller import Controller
     from toolpath_stiff.nc.moves import Program as ReadProgram
+    from toolpath_stiff.stiffness.effects.contract import Conditions
     from toolpath_stiff.stiffness.model import StiffnessModel
 
     FloatArray = NDArray[np.float64]
@@ -148,6 +150,12 @@ class Machine:
         if temperature_C is not None and not low <= temperature_C <= high:
             raise InputError(f"{temperature_C:g} degrees C", expected=f"{low:g} to {high:g}")
         return replace(self, setup=setup, temperature_C=temperature_C)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For another process: effects of one's own travel as their files, a class of such a file cannot."""
+        files = tuple(str(Path(file).absolute()) for file in self.effect_files)
+        built_from = (self.model.given or self.model.machine, files, self.model.conditions)
+        return _machine_again, (*built_from, self.asked, self.setup, self.temperature_C)
 
     @staticmethod
     def names() -> list[str]:
@@ -297,6 +305,20 @@ class Machine:
         from toolpath_stiff.machine import machine_toml
 
         return write_atomically(Path(file), machine_toml(self.model.given or self.model.machine))
+
+
+def _machine_again(
+    given: MachineData,
+    files: tuple[str, ...],
+    conditions: Conditions,
+    asked: str,
+    setup: str | None,
+    temperature_C: float | None,
+) -> Machine:
+    """A machine in another process."""
+    from toolpath_stiff.stiffness.model import build_model
+
+    return Machine(build_model(given, files, conditions=conditions), asked, files, setup, temperature_C)
 
 
 def machine_from(machine: Machine | str | Path) -> Machine:

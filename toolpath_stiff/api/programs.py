@@ -219,16 +219,7 @@ def analyze(
     second = None
     if compare_with is not None:
         second = compare_with if isinstance(compare_with, Machine) else first.like(compare_with)
-    options: dict[str, Any] = {
-        "origin": None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
-        "load": load,
-        "step": m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
-        "force": positive("force", force_N, "N", STRONGEST_N),
-        "partial": partial,
-    }
-    required = None
-    if require_N_per_mm is not None:
-        required = n_per_m_from_n_per_mm(positive("required", require_N_per_mm, "N/mm", STIFFEST_N_PER_MM))
+    options, required = path_options(origin_mm_deg, load, step_mm, force_N, partial, require_N_per_mm)
 
     def on(one: Machine, other: Machine | None, told: Callable[[int, int], None] | None) -> PathAnalysis:
         model = one.running(part, [other] if other else [])
@@ -242,6 +233,31 @@ def analyze(
         required=required,
         inputs=(*part.inputs, *first.inputs, *(second.inputs if second else ())),
     )
+
+
+def path_options(
+    origin_mm_deg: Sequence[float] | None,
+    load: str,
+    step_mm: float,
+    force_N: float,
+    partial: bool,
+    require_N_per_mm: float | None,
+) -> tuple[dict[str, Any], float | None]:
+    """What an analysis is asked, checked and in SI, and the stiffness required; arguments and errors of `analyze`."""
+    from toolpath_stiff.analysis.loads import parse_load
+
+    parse_load(load)
+    options: dict[str, Any] = {
+        "origin": None if origin_mm_deg is None else pose_si("origin", origin_mm_deg),
+        "load": load,
+        "step": m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
+        "force": positive("force", force_N, "N", STRONGEST_N),
+        "partial": partial,
+    }
+    required = None
+    if require_N_per_mm is not None:
+        required = n_per_m_from_n_per_mm(positive("required", require_N_per_mm, "N/mm", STIFFEST_N_PER_MM))
+    return options, required
 
 
 class SampledPath(Result):

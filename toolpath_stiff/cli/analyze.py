@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.cli.arguments import (
     add_json_option,
@@ -13,15 +18,20 @@ from toolpath_stiff.cli.arguments import (
     machine_for,
     positive_number,
     program_for,
+    reading_options,
 )
-from toolpath_stiff.cli.outputs import add_replace_option, destination, show
-from toolpath_stiff.cli.progress import Progress, progress_line
+from toolpath_stiff.cli.outputs import add_replace_option, destination, show, written_text
+from toolpath_stiff.cli.progress import progress_line, say
+from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api.inputs import Machine
-    from toolpath_stiff.api.programs import Analysis
+    from concurrent.futures import Executor
 
-BELOW_REQUIRED, PARTIAL = 3, 1  # exit codes
+    from toolpath_stiff.report.batch.programs import FolderCount, Found
+
+BELOW_REQUIRED = 3  # exit code
+INCOMPLETE = 1  # exit code: samples were left out, or of several programs one failed
+CONNECT_SECONDS = 10  # for a scheduler to answer
 
 EPILOG = """\
 example:
@@ -79,6 +89,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: one a CPU that may be used)",
     )
     parser.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="hand the programs to the workers of a Dask cluster instead, one program a task; ADDRESS is its "
+        "scheduler's, as tcp://10.0.0.5:8786. Workers must see the programs and --out by the same paths "
+        "(pip install 'toolpath-stiff[cluster]')",
+    )
+    parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="format of the samples (default: csv)"
     )
     add_replace_option(parser, force=False)
@@ -104,47 +121,121 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Analyze one program, or hand several, or a folder, to `batch`."""
-    from toolpath_stiff.cli.programs import find_programs
-    from toolpath_stiff.cli.workers import job_count
+    """Analyze one program, or several, or those of a folder."""
+    from toolpath_stiff.processes import job_count, one_thread
+
+    one_thread()  # before numpy is loaded
+    from toolpath_stiff.report.batch.programs import find_programs
 
     found, counts = find_programs(args.programs)
-    jobs = job_count(args.jobs, len(found))
-    if counts or len(found) > 1:
-        from toolpath_stiff.cli.batch import run_batch
-
-        return run_batch(args, found, counts, jobs)
+    job_count(args.jobs, len(found))
+    if counts or len(found) > 1 or args.cluster:
+        return _run_many(args, found, counts)
     return _run_single(args, found[0].file)
 
 
-def analysis_of(
-    args: argparse.Namespace, file: str, machine: Machine | None = None, progress: Progress | None = None
-) -> Analysis:
-    """The analysis of a program as the options say; `machine` if it is loaded already."""
-    from toolpath_stiff.api.programs import analyze
-
-    return analyze(
-        machine or machine_for(args),
-        program_for(args, file),
-        origin_mm_deg=args.origin,
-        load=args.load,
-        step_mm=args.step,
-        force_N=args.force,
-        partial=args.partial,
-        require_N_per_mm=args.require,
-        compare_with=args.compare,
-        progress=progress,
-    )
+def _asked(args: argparse.Namespace) -> dict[str, Any]:
+    """The options of an analysis."""
+    return {
+        "origin_mm_deg": args.origin,
+        "load": args.load,
+        "step_mm": args.step,
+        "force_N": args.force,
+        "partial": args.partial,
+        "require_N_per_mm": args.require,
+        "compare_with": args.compare,
+    }
 
 
 def _run_single(args: argparse.Namespace, file: str) -> int:
     """Analyze, write, print; the exit code."""
+    from toolpath_stiff.api.programs import analyze
     from toolpath_stiff.report.analysis import names
 
     target = destination(args, "analyze", [file]).check(names(not args.no_plots, args.format))
     with progress_line(quiet=args.json) as progress:
-        found = analysis_of(args, file, progress=progress)
+        found = analyze(machine_for(args), program_for(args, file), progress=progress, **_asked(args))
     show(args, found, target, table=args.format, show_plunges=args.show_plunges)
     if found.below_required:
         return BELOW_REQUIRED
-    return 0 if found.complete else PARTIAL
+    return 0 if found.complete else INCOMPLETE
+
+
+def _run_many(args: argparse.Namespace, found: Sequence[Found], counts: Sequence[FolderCount]) -> int:
+    """The same of many; nothing is printed before the arguments have been found right."""
+    from toolpath_stiff.api.many import analyze_many
+    from toolpath_stiff.report.words import plain
+
+    def told(text: str, done: int, total: int) -> None:
+        if done == 0 and not args.json:
+            for count in counts:
+                print(plain(str(count)), flush=True)
+        say(f"{done}/{total} programs, {plain(text)}")
+
+    try:
+        with _stopped_by_sigterm(), _executor(args) as executor:
+            result = analyze_many(
+                machine_for(args),
+                found,
+                args.out or "reports",
+                executor=executor,
+                jobs=args.jobs,
+                plots=not args.no_plots,
+                table=args.format,
+                show_plunges=args.show_plunges,
+                replace=args.replace,
+                progress=told,
+                **_asked(args),
+                **reading_options(args),
+            )
+    finally:
+        say("")
+    if args.json:
+        sys.stdout.writelines(result.json_pieces())
+    else:
+        print(f"{result}\n{written_text(result.written)}")
+    if not result.complete:
+        return INCOMPLETE
+    return BELOW_REQUIRED if result.below_required else 0
+
+
+@contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """SIGTERM stops what runs as Ctrl-C does; it would leave processes and temporary files behind."""
+    from toolpath_stiff.processes import interrupt
+
+    if threading.current_thread() is not threading.main_thread():  # only the main thread may set handlers
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _executor(args: argparse.Namespace) -> Iterator[Executor | None]:
+    """The executor of --cluster; None without it. Raises `InputError` where there is no scheduler."""
+    if args.cluster is None:
+        yield None
+        return
+    if args.jobs is not None:
+        raise InputError("--jobs with --cluster", hint="the cluster's workers say how many programs run at a time")
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError(
+            "--cluster needs the package distributed", hint="run `pip install 'toolpath-stiff[cluster]'`"
+        ) from None
+    try:
+        client: Any = Client(args.cluster, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError, ImportError) as error:  # ImportError: a protocol that is not installed
+        told = " ".join(str(error).split())
+        raise InputError(
+            f"--cluster {args.cluster}: {told}", expected="the address of a Dask scheduler, as tcp://10.0.0.5:8786"
+        ) from None
+    with client:
+        if not client.scheduler_info()["workers"]:
+            print(f"tps: note: {args.cluster} has no worker yet, the programs wait for one", file=sys.stderr)
+        yield client.get_executor(pure=False)

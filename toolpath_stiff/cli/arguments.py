@@ -7,7 +7,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
@@ -232,17 +232,21 @@ def add_json_option(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--json", action="store_true", help=text)
 
 
+def reading_options(args: argparse.Namespace) -> dict[str, Any]:
+    """What the options of `add_program_options` say of the reading, as keywords of `Program.read`."""
+    return {
+        "dialect": args.dialect,
+        "controller": args.controller,
+        "offsets": args.offsets,
+        "tools": args.tools,
+        "block_delete": args.block_delete,
+        "interpreter": args.interpreter,
+        "rs274": args.rs274,
+    }
+
+
 def program_for(args: argparse.Namespace, file: str) -> Program:
     """A program with the options of `add_program_options`. Raises `InputError`."""
     from toolpath_stiff.api.inputs import Program
 
-    return Program.read(
-        file,
-        dialect=args.dialect,
-        controller=args.controller,
-        offsets=args.offsets,
-        tools=args.tools,
-        block_delete=args.block_delete,
-        interpreter=args.interpreter,
-        rs274=args.rs274,
-    )
+    return Program.read(file, **reading_options(args))

@@ -249,6 +249,7 @@ same. Files written to --out: update.json, residuals.csv, machine.toml (unless r
 ladder.png, before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
 """
 
+
 def update_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter

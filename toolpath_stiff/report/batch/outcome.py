@@ -13,7 +13,9 @@ from toolpath_stiff.report.words import duration, number, only_plunges, plain, s
 WIDTH = 100  # columns of the terminal
 MOST_NAME = 36  # of them for the name
 
-# Column of summary.csv -> key of the figures, decimals; the units are in the names.
+# First columns of summary.csv -> what of the outcome they show.
+TOLD = {"program": "name", "file": "file", "status": "status", "reason": "reason", "report": "opens"}
+# Its further columns, keys of the figures -> decimals; the units are in the names.
 COLUMNS: Mapping[str, int | None] = {
     "machine": None,
     "load": None,
@@ -123,9 +125,15 @@ def summary_csv(outcomes: Sequence[Outcome]) -> str:
     rows = []
     for one in outcomes:
         figures = one.figures or {}
-        told = [plain(word) for word in (one.name, one.file, one.status, one.reason, one.opens)]
+        told = [plain(getattr(one, of)) for of in TOLD.values()]
         rows.append([*told, *(_cell(figures.get(name), digits) for name, digits in COLUMNS.items())])
-    return csv_text(["program", "file", "status", "reason", "report", *COLUMNS], rows)
+    return csv_text([*TOLD, *COLUMNS], rows)
+
+
+def columns_of(outcomes: Sequence[Outcome]) -> dict[str, list[Any]]:
+    """The same as values, column by column; None for a figure that does not exist."""
+    told = {name: [getattr(one, of) for one in outcomes] for name, of in TOLD.items()}
+    return {**told, **{name: [_figure(one, name) for one in outcomes] for name in COLUMNS}}
 
 
 def _cell(value: Any, digits: int | None) -> str:

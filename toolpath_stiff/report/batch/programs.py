@@ -1,4 +1,4 @@
-"""Which programs the arguments of `tps analyze` name, and which report folder each one gets."""
+"""Which programs files and folders name, and which report folder each one gets."""
 
 from __future__ import annotations
 
@@ -50,8 +50,10 @@ class Listed:
     folder: Path
 
 
-def find_programs(arguments: Sequence[str]) -> tuple[list[Found], list[FolderCount]]:
+def find_programs(arguments: Sequence[str | Found]) -> tuple[list[Found], list[FolderCount]]:
     """The programs that files and folders name, each file once, in the order given; those of a folder by name.
+
+    What was found before stays as it is.
 
     Raises
     ------
@@ -61,7 +63,9 @@ def find_programs(arguments: Sequence[str]) -> tuple[list[Found], list[FolderCou
     found: dict[Path, Found] = {}
     counts = []
     for argument in arguments:
-        if Path(argument).is_dir():
+        if isinstance(argument, Found):
+            inside = [argument]
+        elif Path(argument).is_dir():
             inside, count = _in_folder(argument)
             counts.append(count)
         else:

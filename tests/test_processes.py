@@ -1,0 +1,104 @@
+"""Processes that answer for every call, also where one of them dies. The functions here run in those processes."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from concurrent.futures import CancelledError, as_completed
+
+import pytest
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.processes import THREADS, ProcessDied, ProcessPool, job_count
+
+
+def multiply(factor, item):
+    if item == "kill":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if item == "exit":
+        sys.exit(7)
+    if item == "threads":
+        return [os.environ[name] for name in THREADS]
+    if item == "fail":
+        raise InputError("not a number", expected="a number", file="x.csv", line=3)
+    if item == "odd":
+        raise Odd(1, 2)
+    return item * factor
+
+
+class Odd(Exception):
+    """An exception that cannot be unpickled: it wants two arguments and hands on one."""
+
+    def __init__(self, first, second):
+        super().__init__(first + second)
+
+
+def run(items, jobs):
+    """Answers, or what they failed with, in the order of the items."""
+    with ProcessPool(jobs) as pool:
+        futures = [pool.submit(multiply, 10, item=item) for item in items]
+        return [future.exception() or future.result() for future in futures]
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 5])
+def test_every_call_is_answered_once(jobs):
+    assert run([1, 2, 3], jobs) == [10, 20, 30]
+
+
+def test_a_process_that_is_killed_takes_its_own_call_alone():
+    found = run([1, "kill", 2, "kill", "exit", 3], 2)
+    assert [found[i] for i in (0, 2, 5)] == [10, 20, 30]
+    assert all(type(found[i]) is ProcessDied and found[i].process > 0 for i in (1, 3, 4))
+    assert str(found[1]) == "its process was ended by SIGKILL (out of memory?)" == str(found[3])
+    assert str(found[4]) == "its process ended by itself, exit code 7"
+
+
+def test_what_a_call_raises_comes_back():
+    wrong, odd, fine = run(["fail", "odd", 4], 1)
+    assert type(wrong) is InputError and str(wrong) == "x.csv:3: not a number; expected a number"
+    assert "test_processes.py" in wrong.__notes__[0]  # where it was raised, in the other process
+    assert type(odd) is RuntimeError and str(odd) == "Odd: 3"
+    assert fine == 40
+
+
+def test_what_cannot_be_sent_fails_alone():
+    with ProcessPool(1) as pool:
+        bad, good = pool.submit(lambda: 1), pool.submit(multiply, 2, 3)
+        assert good.result() == 6 and bad.exception() is not None
+
+
+def test_each_process_has_one_thread_for_linear_algebra():
+    before = {name: os.environ.get(name) for name in THREADS}
+    assert run(["threads", "threads"], 2) == [["1"] * 3] * 2
+    assert {name: os.environ.get(name) for name in THREADS} == before  # of the caller nothing is changed
+
+
+def test_map_and_shutdown_are_those_of_any_executor():
+    pool = ProcessPool(2)
+    assert list(pool.map(abs, [-1, 2, -3])) == [1, 2, 3]
+    left = pool.submit(abs, -4)
+    pool.shutdown(wait=False)
+    assert left.result() == 4
+    with pytest.raises(RuntimeError):
+        pool.submit(abs, 1)
+
+
+def test_whoever_leaves_early_stops_the_processes():
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), ProcessPool(2) as pool:
+        futures = [pool.submit(time.sleep, seconds) for seconds in (0.0, 600.0, 600.0, 600.0)]
+        assert next(as_completed(futures)).result() is None
+        raise KeyboardInterrupt  # as at Ctrl-C
+    assert time.monotonic() - start < 60  # they would sleep for ten minutes
+    assert all(future.done() for future in futures)
+    assert all(f.cancelled() or isinstance(f.exception(), ProcessDied | CancelledError) for f in futures[1:])
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("tps-process")]
+
+
+def test_jobs_are_as_asked_and_never_more_than_items():
+    assert job_count(7, 3) == 3 and job_count(2, 3) == 2 and 1 <= job_count(None, 3) <= 3
+    with pytest.raises(InputError):
+        job_count(0, 3)
