@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolpath_stiff.cli.analyze import EPILOG
+from toolpath_stiff.cli.program import ANALYZE_EPILOG as EPILOG
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.report.batch.programs import RESERVED, Found, endings, find_programs, report_folders
 

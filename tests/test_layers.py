@@ -217,7 +217,6 @@ def circles(graph: dict[str, set[str]]) -> list[list[str]]:
 # Rings that are left; a ring that goes leaves this list, and none is added.
 LEFT = [
     {"toolpath_stiff.api.inputs", "toolpath_stiff.api.machines"},
-    {"toolpath_stiff.cli.analyze", "toolpath_stiff.cli.batch"},
 ]
 
 

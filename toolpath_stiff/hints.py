@@ -15,23 +15,12 @@ from pathlib import PurePath
 from toolpath_stiff import defaults
 
 PROGRAM = "tps"
-NO_MATTER = ("--out", "--jobs", "--cluster")  # each takes a value
-PRINTED = "--json"  # what is printed, not what is written
 NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
 
 
 def command_line(*words: object) -> str:
     """A command line of `tps`, quoted for the shell."""
     return shlex.join([PROGRAM, *map(str, words)])
-
-
-def without_destination(words: Sequence[str]) -> list[str]:
-    """The words of a command line but for options that change no result: destination, threads, what is printed."""
-    return [
-        word
-        for word, before in zip(words, ["", *words], strict=False)
-        if word.partition("=")[0] not in NO_MATTER and before not in NO_MATTER and word != PRINTED
-    ]
 
 
 def hint(sentence: str, line: str) -> str:

@@ -21,10 +21,10 @@ from toolpath_stiff.cli.outputs import (
     check_written,
     destination,
     keep,
+    progress_line,
     show,
     written_text,
 )
-from toolpath_stiff.cli.progress import progress_line
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint, options
 

@@ -17,21 +17,21 @@ from dataclasses import dataclass
 from toolpath_stiff import __version__
 from toolpath_stiff.cli.arguments import whole_options
 from toolpath_stiff.errors import TpsError
-from toolpath_stiff.hints import command_line, without_destination
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command: its name, its line in the help, its group; the module of the group does the work."""
+    """A command: its name, its line in the help, its group, whose module does the work but where another is named."""
 
     name: str
     help: str
     group: str
+    module: str = ""
 
     @property
     def parts(self) -> tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]:
         """What declares its arguments, what runs it and gives the exit code."""
-        module = importlib.import_module(f"toolpath_stiff.cli.{MODULES[self.group]}")
+        module = importlib.import_module(f"toolpath_stiff.cli.{self.module or MODULES[self.group]}")
         found: tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]
         found = module.COMMANDS[self.name]
         return found
@@ -57,7 +57,7 @@ COMMANDS = (
     ),
     Command("update", "fit effects to measurements, watch the error fall, write the machine", "Measurements"),
     Command("plan", "what to measure next to tell explanations apart, or a first campaign", "Measurements"),
-    Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements"),
+    Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements", "rig"),
 )
 
 DESCRIPTION = "Stiffness of a hexapod (Stewart-platform) mill along a real NC program."
@@ -124,7 +124,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = build_parser(chosen)
     try:
         args = parser.parse_args(whole_options(arguments))
-        args.command_line = command_line(*without_destination(arguments))
         if args.command is None:
             parser.print_help()
             return 2

@@ -16,8 +16,15 @@ from toolpath_stiff.cli.arguments import (
     positive_number,
     program_for,
 )
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, show, written_text
-from toolpath_stiff.cli.progress import progress_line
+from toolpath_stiff.cli.outputs import (
+    add_replace_option,
+    check_written,
+    destination,
+    keep,
+    progress_line,
+    show,
+    written_text,
+)
 from toolpath_stiff.defaults import MACHINE, STRUT_SPREAD
 
 if TYPE_CHECKING:

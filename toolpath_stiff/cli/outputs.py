@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,10 +20,10 @@ from toolpath_stiff.files import Content, check_outputs, keep_old
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api.results import FolderResult
+    from toolpath_stiff.api.results import FolderResult, Progress
 
 LONGEST = 60  # letters of a default folder's name; of more files, the first and how many there are
-DESTINATIONS = ("out", "output", "write", "command_line")
+DESTINATIONS = ("out", "output", "write")
 
 
 def add_replace_option(parser: argparse.ArgumentParser, *, force: bool = True) -> None:
@@ -131,3 +133,50 @@ def joined_names(sources: Sequence[str]) -> str:
     names = [Path(split_name(source)[0]).stem for source in sources]
     joined = "+".join(names)
     return joined if len(joined) <= LONGEST or len(names) == 1 else f"{names[0]}+{len(names) - 1}"
+
+
+# -- progress ----------------------------------------------------------------------------------------------------------
+
+QUIET_SECONDS = 0.5  # work shorter than this shows no bar
+REDRAW_SECONDS = 0.1
+WIDTH = 30
+
+
+def say(text: str) -> None:
+    """Replace the line of progress, where someone watches; "" takes it away."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\x1b[K{text}")
+        sys.stderr.flush()
+
+
+@contextmanager
+def progress_line(quiet: bool = False) -> Iterator[Progress | None]:
+    """Yield what functions of the library call with (text, done, in all), or None where nobody watches.
+
+    What has a number is drawn as a bar, once it takes longer than a moment; the line is taken away at the end.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    started: dict[str, float] = {}
+    last = 0.0
+
+    def draw(text: str, done: int, total: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        start = started.setdefault(text, now)
+        if not total:
+            say(text)
+            return
+        if now - start < QUIET_SECONDS or now - last < REDRAW_SECONDS:
+            return
+        last = now
+        filled = WIDTH * done // total
+        bar = "#" * filled + "." * (WIDTH - filled)
+        left = (now - start) * (total - done) / max(done, 1)
+        say(f"{text} [{bar}] {done}/{total}, {left:.0f} s left ")
+
+    try:
+        yield draw
+    finally:
+        say("")

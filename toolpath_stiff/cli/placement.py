@@ -17,8 +17,7 @@ from toolpath_stiff.cli.arguments import (
     program_for,
     range_argument,
 )
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, show
-from toolpath_stiff.cli.progress import progress_line
+from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, progress_line, show
 
 # -- tps place --------------------------------------------------------------------------------------------------------
 

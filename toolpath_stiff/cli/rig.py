@@ -25,7 +25,7 @@ The rig shares no stiffness code with the model that it tests. The seal is a bli
 FILES = ("measurements.csv", "machine.toml", "sealed.bin")  # of an exercise
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def rig_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
@@ -63,13 +63,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json_option(revealing, "print JSON")
 
 
-def run(args: argparse.Namespace) -> int:
+def rig(args: argparse.Namespace) -> int:
     """Make, measure or reveal."""
-    from toolpath_stiff import rig
+    from toolpath_stiff import rig as exercises
 
     if args.action == "new":
         rules = Rules(inputs=tuple(inputs_of(args)), fresh=True, replace=args.replace, kept=tell_kept)
-        count = rig.new_exercise(
+        count = exercises.new_exercise(
             args.out, args.seed, args.layout, args.hidden, args.noise / 100.0, args.machine, args.at, rules
         )
         print(f"{args.out}: {count} measurements, the nominal machine and the sealed truth")
@@ -78,11 +78,11 @@ def run(args: argparse.Namespace) -> int:
     if args.action == "measure":
         replaced = check_written(args, [args.out], (Path(args.folder) / name for name in FILES))
         keep(replaced)
-        count = rig.measure_again(args.folder, args.at, args.out, args.visit)
+        count = exercises.measure_again(args.folder, args.at, args.out, args.visit)
         print(f"{args.out}: {count} measurements")
         print(hint("next", _diagnose(args.folder, args.out)))
         return 0
-    found = rig.reveal(args.folder, args.claim)
+    found = exercises.reveal(args.folder, args.claim)
     print(json.dumps(found, indent=2, ensure_ascii=False) if args.json else _wording(found))
     return 0
 
@@ -108,3 +108,6 @@ def _wording(found: dict[str, Any]) -> str:
             f"hidden: {effect['effect']} ({values}); changes the readings by {100 * effect['size']:.1f} % (rms)"
         )
     return "\n".join(lines)
+
+
+COMMANDS = {"rig": (rig_arguments, rig)}

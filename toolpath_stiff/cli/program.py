@@ -1,4 +1,4 @@
-"""`tps analyze`: the stiffness along the path of NC programs."""
+"""The commands on a program: analyze, path, check."""
 
 from __future__ import annotations
 
@@ -20,8 +20,16 @@ from toolpath_stiff.cli.arguments import (
     program_for,
     reading_options,
 )
-from toolpath_stiff.cli.outputs import add_replace_option, destination, show, written_text
-from toolpath_stiff.cli.progress import progress_line, say
+from toolpath_stiff.cli.outputs import (
+    add_replace_option,
+    check_written,
+    destination,
+    keep,
+    progress_line,
+    say,
+    show,
+    written_text,
+)
 from toolpath_stiff.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,11 +37,13 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.report.batch.programs import FolderCount, Found
 
+# -- tps analyze ------------------------------------------------------------------------------------------------------
+
 BELOW_REQUIRED = 3  # exit code
 INCOMPLETE = 1  # exit code: samples were left out, or of several programs one failed
 CONNECT_SECONDS = 10  # for a scheduler to answer
 
-EPILOG = """\
+ANALYZE_EPILOG = """\
 example:
   tps analyze programs/pocket.nc --origin 100,-50,800 --load normal --require 40000
   tps analyze programs more/part.nc --jobs 4    all programs of a folder and one more, four at a time
@@ -66,10 +76,10 @@ exit code
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def analyze_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.epilog = EPILOG
+    parser.epilog = ANALYZE_EPILOG
     parser.add_argument(
         "programs", nargs="+", metavar="PROGRAM", help="NC program or cutter-location file, or a folder of them"
     )
@@ -120,7 +130,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compare", metavar="MACHINE", help="also analyze on this machine (name or file) and compare")
 
 
-def run(args: argparse.Namespace) -> int:
+def analyze(args: argparse.Namespace) -> int:
     """Analyze one program, or several, or those of a folder."""
     from toolpath_stiff.processes import job_count, one_thread
 
@@ -221,7 +231,7 @@ def _executor(args: argparse.Namespace) -> Iterator[Executor | None]:
         yield None
         return
     if args.jobs is not None:
-        raise InputError("--jobs with --cluster", hint="the cluster's workers say how many programs run at a time")
+        raise InputError("--jobs with --cluster", hint="the cluster's workers say how many programs analyze at a time")
     try:
         from distributed import Client
     except ImportError:
@@ -239,3 +249,107 @@ def _executor(args: argparse.Namespace) -> Iterator[Executor | None]:
         if not client.scheduler_info()["workers"]:
             print(f"tps: note: {args.cluster} has no worker yet, the programs wait for one", file=sys.stderr)
         yield client.get_executor(pure=False)
+
+
+# -- tps path ---------------------------------------------------------------------------------------------------------
+
+PATH_EPILOG = """\
+example:
+  tps path programs/pocket.nc --step 0.5 --csv | head
+
+Columns: line, motion (rapid, feed, arc, cycle), tool, s_mm and t_s along the path, the tool tip x_mm,y_mm,z_mm and
+the rotary axes a_deg,b_deg,c_deg in machine coordinates, feed_mm_per_min (empty for rapids). Program zero lies at
+0,0,0 unless --origin or the program's own G10 says otherwise. Every move has samples at both of its ends.
+"""
+
+
+def path_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = PATH_EPILOG
+    parser.add_argument("program", metavar="PROGRAM", help="NC program or cutter-location file")
+    add_program_options(parser)
+    target = parser.add_mutually_exclusive_group()
+    target.add_argument("--csv", action="store_true", help="write CSV to standard output (the default)")
+    target.add_argument("--out", metavar="FILE", help="write CSV to a file")
+    add_replace_option(parser)
+
+
+def path(args: argparse.Namespace) -> int:
+    """Sample, write."""
+    from toolpath_stiff.api.programs import sample_path
+
+    replaced = check_written(args, [args.out])
+    found = sample_path(program_for(args, args.program), origin_mm_deg=args.origin, step_mm=args.step)
+    if args.out:
+        keep(replaced)
+        found.save(args.out)
+    else:
+        for piece in found.csv():
+            sys.stdout.write(piece.decode())
+    for warning in found.warnings:
+        print(f"tps: warning: {found.name}: {warning}", file=sys.stderr)
+    for note in found.unsupported:
+        print(f"tps: note: {note}", file=sys.stderr)
+    return 0
+
+
+# -- tps check --------------------------------------------------------------------------------------------------------
+
+CHECK_EPILOG = """\
+examples:
+  tps check part.nc
+  tps check part.nc --dialect fanuc --json
+  tps check part.nc --strut-speed 5000         warn of cuts in which a strut is faster, mm/min
+  tps check part.nc --machine none             the program alone, no reach and no strut speeds
+  tps check part.ngc --interpreter auto        by LinuxCNC's interpreter where ours does not read it to its end
+
+Where the reader would refuse the program, the check says so and goes on with the next block; what it says of extents,
+lengths and times is then that of the blocks that could be read. Extents are those of the tool tip in program
+coordinates of G54, mm and degrees. Exit code 1 if there is any error.
+"""
+NO_MACHINE = "none"
+
+
+def check_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = CHECK_EPILOG
+    parser.add_argument("program", metavar="PROGRAM", help="NC program or cutter-location file")
+    add_program_options(parser)
+    parser.add_argument(
+        "--machine",
+        default="nist",
+        metavar="NAME|FILE",
+        help="machine whose reach and strut speeds are checked; none: no machine (default: nist)",
+    )
+    parser.add_argument(
+        "--strut-speed", type=positive_number("mm/min", 1e6), metavar="MM/MIN", help="largest speed of a strut"
+    )
+    add_json_option(
+        parser,
+        "print JSON: used, unsupported, findings, extents_mm, lengths_mm, times_s, tools, operations, modal state",
+    )
+
+
+def check(args: argparse.Namespace) -> int:
+    """Check and print; 1 if there is any error."""
+    from toolpath_stiff.api.programs import check
+
+    found = check(
+        program_for(args, args.program),
+        None if args.machine == NO_MACHINE else args.machine,
+        origin_mm_deg=args.origin,
+        step_mm=args.step,
+        strut_speed_mm_per_min=args.strut_speed,
+    )
+    sys.stdout.write(found.to_json() if args.json else str(found))
+    return 1 if found.errors else 0
+
+
+# Command -> what declares its arguments, what runs it.
+COMMANDS = {
+    "analyze": (analyze_arguments, analyze),
+    "path": (path_arguments, path),
+    "check": (check_arguments, check),
+}
