@@ -343,8 +343,8 @@ def map_stiffness(
     >>> from toolpath_stiff.analysis.loads import parse_load
     >>> from toolpath_stiff.machine import load_machine
     >>> from toolpath_stiff.stiffness.model import build_model
-    >>> found = map_stiffness(build_model(load_machine("nist")), (-0.1, 0.1), (-0.1, 0.1), [0.8], parse_load("x"), points=3)
-    >>> found.stiffness.shape, round(float(found.stiffness[0, 1, 1]) / 1e3)  # N/mm in the middle
+    >>> found = map_stiffness(build_model(load_machine("nist")), (-0.1, 0), (-0.1, 0), [0.8], parse_load("x"), points=3)
+    >>> found.stiffness.shape, round(float(found.stiffness[0, 2, 2]) / 1e3)  # N/mm in the middle
     ((1, 3, 3), 54823)
     """
     _check_map(x, y, load)
