@@ -30,7 +30,6 @@ PLACEMENT_SEED = 1
 # Measurements.
 STRUT_SPREAD = 0.01  # relative sd of the struts' stiffnesses, assumed
 CLAMPING = 0.01  # relative sd of clamping anew, assumed where the data cannot tell
-SEED = 0  # of random numbers in comparisons, diagnoses, updates and plans
 
 # Mean of |x| over its standard deviation for a normal x: scatter alone leaves so large a mean error.
 MEAN_OVER_SD = math.sqrt(2.0 / math.pi)

@@ -343,17 +343,11 @@ def map_stiffness(
     >>> from toolpath_stiff.analysis.loads import parse_load
     >>> from toolpath_stiff.machine import load_machine
     >>> from toolpath_stiff.stiffness.model import build_model
-    >>> model = build_model(load_machine("nist"))
-    >>> found = map_stiffness(model, (-0.1, 0.1), (-0.1, 0.1), [0.8], parse_load("x"), points=3)
-    >>> found.stiffness.shape, round(float(found.stiffness[0, 1, 1]) / 1e3)  # N/mm in the middle
+    >>> found = map_stiffness(build_model(load_machine("nist")), (-0.1, 0), (-0.1, 0), [0.8], parse_load("x"), points=3)
+    >>> found.stiffness.shape, round(float(found.stiffness[0, 2, 2]) / 1e3)  # N/mm in the middle
     ((1, 3, 3), 54823)
     """
-    if load.kind in ("tangential", "normal"):
-        raise InputError(
-            f"load {load} needs a path, and a map has none", expected="radial, axial, softest, x, y, z or DX,DY,DZ"
-        )
-    if not (x[0] < x[1] and y[0] < y[1]):
-        raise InputError("the area of the map has no extent", expected="LO:HI with LO below HI in x and in y")
+    _check_map(x, y, load)
     spacing = max(x[1] - x[0], y[1] - y[0]) / (points - 1)
     nx, ny = (int(np.ceil((hi - lo) / spacing - 1e-9)) + 1 for lo, hi in (x, y))
     if nx * ny * len(heights) > MOST_POINTS:
@@ -369,6 +363,15 @@ def map_stiffness(
         )
     shape = (len(zs), ny, nx)
     return StiffnessMap(xs, ys, zs, found.stiffness.reshape(shape), found.reachable.reshape(shape), load, abc)
+
+
+def _check_map(x: tuple[float, float], y: tuple[float, float], load: Load) -> None:
+    if load.kind in ("tangential", "normal"):
+        raise InputError(
+            f"load {load} needs a path, and a map has none", expected="radial, axial, softest, x, y, z or DX,DY,DZ"
+        )
+    if not (x[0] < x[1] and y[0] < y[1]):
+        raise InputError("the area of the map has no extent", expected="LO:HI with LO below HI in x and in y")
 
 
 def around_axis(model: StiffnessModel, radius: float, height: float, load: Load, angles: FloatArray) -> FloatArray:

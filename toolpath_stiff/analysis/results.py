@@ -134,18 +134,16 @@ def analyze(
     >>> from toolpath_stiff.machine import load_machine
     >>> from toolpath_stiff.nc import parse_program
     >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc")
-    >>> found = analyze(load_machine("nist"), slot, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
-    >>> summary = found.summary()
-    >>> round(summary["mean_N_per_mm"]), round(summary["min_N_per_mm"]), summary["headline"]
-    (54353, 53875, 'across the tool axis')
+    >>> round(analyze(load_machine("nist"), slot, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0)).summary()["mean_N_per_mm"])
+    54353
     """
     model = machine if isinstance(machine, StiffnessModel) else build_model(machine)
     direction = parse_load(load) if isinstance(load, str) else load
     place_at, source = _effective_origin(model.machine, program, origin)
-    moves = place(program.moves, place_at)
-    samples = sample_moves(moves, step=step, rapid_feed=model.machine.rapid_feed, origin=place_at)
-    path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
-    at = evaluate(model, *path, direction, force, progress)
+    samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at)
+    at = evaluate(
+        model, samples.position, samples.abc, samples.tangent, samples.tool_length, direction, force, progress
+    )
     tool_given = not np.isnan(samples.tool_length[samples.cutting]).any()
     warnings = (*program.warnings, *condition_warnings(model, tool_given), *_warnings(samples, at))
     analysis = Analysis(

@@ -16,7 +16,6 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 # What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
 STRUT, FRAME, PLATFORM, SINGULARITY = "strut", "frame", "platform", "singularity"
 AXES = ("x", "y", "z")
-QUANTITIES = (STRUT, FRAME, PLATFORM, *AXES, SINGULARITY)
 
 
 @dataclass(frozen=True)
@@ -24,7 +23,7 @@ class Limit:
     """One bound: its name, the bound, whether it is a lower one, the span that margins are counted in.
 
     `span` is max - min where there are two bounds, else the distance of the bound from the value's natural
-    end (0 for angles, 1 for the singularity index). `quantity` is what it bounds, one of `QUANTITIES`; the limits of
+    end (0 for angles, 1 for the singularity index). `quantity` is what it bounds (`STRUT` and so on); the limits of
     one quantity on one side differ by the joint or strut alone.
     """
 

@@ -150,7 +150,7 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
     if not line.words and not aborts:
         return ""
     if line.words.startswith(BARE_NUMBER):
-        raise InputError(
+        raise ProgramError(
             f"a block that begins with a number: {line.words[:20]!r}",
             expected="a letter before each number",
             file=name,
