@@ -38,13 +38,15 @@ def run_in(page: str, script: str, folder: Path) -> subprocess.CompletedProcess[
     """The page opened with a script at its end; without its policy, which forbids this script as any other."""
     file = folder / "report.html"
     text = re.sub("<meta http-equiv[^>]*>", "", page).replace("</body>", f"<script>{script}</script></body>")
+    # Drawn at once instead of with the next frame, which may be late on a busy machine.
+    text = text.replace("<head>", "<head><script>window.requestAnimationFrame = (draw) => draw();</script>")
     file.write_text(text, encoding="utf-8")
     return opened(file.as_uri(), folder)
 
 
 def painted(page: str, folder: Path, script: str = "") -> dict[str, dict[str, int]]:
     """Drawing -> the lowest row of pixels, counted from above, of each opaque colour; after a script has run."""
-    done = run_in(page, f"{script}; setTimeout(() => {{{PAINTED}}}, 500)", folder)
+    done = run_in(page, f"{script};{PAINTED}", folder)
     assert "CONSOLE" not in done.stderr
     found = re.findall(r'id="(\w+)" data-painted="([^"]*)"', done.stdout)
     return {name: {c: int(row) for c, row in (pair.split(":") for pair in text.split())} for name, text in found}
