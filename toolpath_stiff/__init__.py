@@ -24,17 +24,12 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.effects import check_effects as check_effects
     from toolpath_stiff.api.effects import effect_template as effect_template
     from toolpath_stiff.api.effects import effects as effects
-    from toolpath_stiff.api.inputs import Machine as Machine
     from toolpath_stiff.api.inputs import Program as Program
+    from toolpath_stiff.api.machines import Machine as Machine
     from toolpath_stiff.api.machines import MachineCheck as MachineCheck
     from toolpath_stiff.api.machines import MachineFile as MachineFile
-    from toolpath_stiff.api.machines import PoseStiffness as PoseStiffness
-    from toolpath_stiff.api.machines import StiffnessMap as StiffnessMap
     from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
     from toolpath_stiff.api.machines import machine_template as machine_template
-    from toolpath_stiff.api.machines import map_stiffness as map_stiffness
-    from toolpath_stiff.api.machines import pose as pose
-    from toolpath_stiff.api.machines import read_poses as read_poses
     from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
@@ -56,6 +51,11 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.placements import case_study as case_study
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
+    from toolpath_stiff.api.poses import PoseStiffness as PoseStiffness
+    from toolpath_stiff.api.poses import StiffnessMap as StiffnessMap
+    from toolpath_stiff.api.poses import map_stiffness as map_stiffness
+    from toolpath_stiff.api.poses import pose as pose
+    from toolpath_stiff.api.poses import read_poses as read_poses
     from toolpath_stiff.api.programs import Analysis as Analysis
     from toolpath_stiff.api.programs import ProgramCheck as ProgramCheck
     from toolpath_stiff.api.programs import SampledPath as SampledPath
@@ -84,10 +84,9 @@ _PUBLIC = {
     "api.effects": (
         "EffectCatalogue", "EffectCheck", "EffectFile", "check_effects", "effect_template", "effects",
     ),
-    "api.inputs": ("Machine", "Program"),
+    "api.inputs": ("Program",),
     "api.machines": (
-        "MachineCheck", "MachineFile", "PoseStiffness", "StiffnessMap", "machine_from_linuxcnc", "machine_template",
-        "map_stiffness", "pose", "read_poses", "recover_geometry",
+        "Machine", "MachineCheck", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry",
     ),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.measuring": (
@@ -95,6 +94,7 @@ _PUBLIC = {
         "reduce", "update",
     ),
     "api.placements": ("CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite"),
+    "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
     "errors": (
         "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.inputs import Machine, machine_from
+from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import Result
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.effects.contract import Effect

@@ -1,4 +1,4 @@
-"""What goes in: a machine, a program; lengths in mm, angles in degrees, forces in N, as their names say."""
+"""A program, and the checks of what arguments say: mm, degrees and N, as their names tell."""
 
 from __future__ import annotations
 
@@ -9,21 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import options
-from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
+from toolpath_stiff.units import Pose, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from toolpath_stiff.api.machines import MachineCheck
-    from toolpath_stiff.machine import Machine as MachineData
-    from toolpath_stiff.machine import Reach, Struts
     from toolpath_stiff.nc.controller import Controller
     from toolpath_stiff.nc.moves import Program as ReadProgram
-    from toolpath_stiff.stiffness.effects.contract import Conditions
-    from toolpath_stiff.stiffness.model import StiffnessModel
 
     FloatArray = NDArray[np.float64]
 
@@ -31,8 +25,6 @@ FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0
 STRONGEST_N = 1e6
 LONGEST_STEP_MM = 1000.0
-TEMPERATURES_C = (-50.0, 200.0)
-FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
 
 
 def positive(name: str, value: float, unit: str, highest: float) -> float:
@@ -70,260 +62,6 @@ def origin_word(origin: Pose) -> str:
     """A placement in SI as --origin takes it; angles that are all 0 go without saying."""
     words = [f"{value:.10g}" for value in pose_in_mm(origin)]
     return ",".join(words if any(origin[3:]) else words[:3])
-
-
-@dataclass(frozen=True)
-class Machine:
-    """A machine with the physical effects that act on it, and what it runs under.
-
-    `Machine.load` makes one from a packaged machine or a machine file.
-
-    Attributes
-    ----------
-    model
-        The machine and its effects as the stiffness is computed from them; SI.
-    asked
-        The name or file that it was loaded by.
-    effect_files
-        Python files with effects of one's own.
-    setup, temperature_C
-        As `load` was told; None: as the controller file or the machine file says.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> machine = tps.Machine.load("nist")
-    >>> machine
-    <Machine nist: 6 struts, no effects>
-    >>> machine.strut_lengths_mm((0, 0, 800)).round(1).tolist()
-    [2884.7, 2869.9, 2884.7, 2869.9, 2884.7, 2869.9]
-    """
-
-    model: StiffnessModel
-    asked: str
-    effect_files: tuple[str, ...] = ()
-    setup: str | None = None
-    temperature_C: float | None = None  # noqa: N815  (degrees Celsius)
-
-    @classmethod
-    def load(
-        cls,
-        machine: str | Path = "nist",
-        *,
-        effects: Iterable[str | Path] = (),
-        setup: str | None = None,
-        temperature_C: float | None = None,
-    ) -> Machine:
-        """Load a packaged machine by name, or a machine file.
-
-        Parameters
-        ----------
-        machine
-            Name (`Machine.names()` lists them) or TOML file.
-        effects
-            Python files with physical effects of one's own, which the machine file may name.
-        setup
-            The set-up that is on the machine, for effects that belong to one; "none": none that has a name.
-        temperature_C
-            Degrees Celsius, for effects that need it.
-
-        Raises
-        ------
-        InputError
-            There is no such machine, the file is wrong, an effect is unknown, or no effect knows the set-up.
-        """
-        from toolpath_stiff.machine import load_machine
-        from toolpath_stiff.stiffness.model import build_model
-
-        files = tuple(map(str, effects))
-        model = build_model(load_machine(machine), files)
-        found = cls(model, str(machine), files).under(setup, temperature_C)
-        found.running()
-        return found
-
-    def under(self, setup: str | None = None, temperature_C: float | None = None) -> Machine:
-        """The same machine under a set-up and a temperature, as of `load`; None: as the files say.
-
-        Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
-        """
-        low, high = TEMPERATURES_C
-        if temperature_C is not None and not low <= temperature_C <= high:
-            raise InputError(f"{temperature_C:g} degrees C", expected=f"{low:g} to {high:g}")
-        return replace(self, setup=setup, temperature_C=temperature_C)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """For another process: effects of one's own travel as their files, a class of such a file cannot."""
-        files = tuple(str(Path(file).absolute()) for file in self.effect_files)
-        built_from = (self.model.given or self.model.machine, files, self.model.conditions)
-        return _machine_again, (*built_from, self.asked, self.setup, self.temperature_C)
-
-    @staticmethod
-    def names() -> list[str]:
-        """The packaged machines.
-
-        Examples
-        --------
-        >>> import toolpath_stiff as tps
-        >>> tps.Machine.names()
-        ['genhexkins', 'nategh_agheli', 'nist']
-        """
-        from toolpath_stiff.machine import packaged_machines
-
-        return list(packaged_machines())
-
-    def __repr__(self) -> str:
-        acting = ", ".join(self.effects) or "no effects"
-        return f"<Machine {self.name}: 6 struts, {acting}>"
-
-    @property
-    def name(self) -> str:
-        """Its short name."""
-        return self.model.machine.name
-
-    @property
-    def title(self) -> str:
-        """Its name for headings."""
-        return self.model.machine.title
-
-    @property
-    def source(self) -> str:
-        """Where its figures come from."""
-        return self.model.machine.source
-
-    @property
-    def effects(self) -> list[str]:
-        """Names of the effects that it carries, those that act on readings too."""
-        return [active.effect.name for active in (*self.model.effects, *self.model.instruments)]
-
-    @property
-    def setups(self) -> list[str]:
-        """The set-ups that its file lists and its effects name."""
-        from toolpath_stiff.stiffness.model import known_setups
-
-        return known_setups([self.model])
-
-    @property
-    def origin_mm_deg(self) -> tuple[float, ...]:
-        """Where program zero sits unless a program or an argument says: X, Y, Z, A, B, C in machine coordinates."""
-        return pose_in_mm(self.model.machine.default_origin)
-
-    def running(self, program: Program | None = None, beside: Sequence[Machine] = ()) -> StiffnessModel:
-        """The model under what it runs under: what `load` was told, then a program's controller file, then its own.
-
-        `beside` are machines that the same is said of. Raises `InputError` for a set-up that none of them knows.
-        """
-        from toolpath_stiff.stiffness.effects.contract import Conditions
-        from toolpath_stiff.stiffness.model import NO_SETUP, check_setup
-
-        model, setup, said_by = self.model, self.setup, f"--setup {self.setup}"
-        if setup is None and program is not None:
-            setup, said_by = program.controller.setup, str(program.said.get("controller"))
-        check_setup(model.conditions.setup or "", f"machine {self.name}, [setup] name", model)
-        check_setup(setup or "", said_by, model, *(other.model for other in beside))
-        asked = "" if setup == NO_SETUP else setup
-        conditions = Conditions(
-            model.conditions.setup if asked is None else asked,
-            model.conditions.temperature if self.temperature_C is None else self.temperature_C,
-        )
-        return replace(model, conditions=conditions)
-
-    def like(self, machine: str | Path) -> Machine:
-        """Another machine with the same effect files, set-up and temperature."""
-        from toolpath_stiff.machine import load_machine
-        from toolpath_stiff.stiffness.model import build_model
-
-        model = build_model(load_machine(str(machine)), self.effect_files)
-        return replace(self, model=model, asked=str(machine))
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The files that it was read from."""
-        return (self.asked, *self.effect_files)
-
-    def strut_lengths_mm(self, pose_mm_deg: Sequence[float]) -> FloatArray:
-        """(6,) lengths of the struts between their joint centres at a pose (inverse kinematics).
-
-        `pose_mm_deg` is X, Y, Z or X, Y, Z, A, B, C of the tool tip; the reference tool is in the spindle.
-        """
-        return mm_from_m(self.standing(pose_mm_deg)[1].lengths[0])
-
-    def to_frame(self) -> pd.DataFrame:
-        """Its figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark."""
-        import pandas as pd
-
-        from toolpath_stiff.report.machine import figure_entries
-
-        return pd.DataFrame(figure_entries(self.model.machine))
-
-    def plot(self, pose_mm_deg: Sequence[float] | None = None) -> Figure:
-        """The machine at a pose, from three sides."""
-        from toolpath_stiff.report.machine import machine_picture
-
-        return machine_picture.figure(self.model.machine, *self.standing(pose_mm_deg)[:2])
-
-    def standing(self, pose_mm_deg: Sequence[float] | None = None) -> tuple[FloatArray, Struts, Reach]:
-        """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), struts and reach there."""
-        import numpy as np
-
-        from toolpath_stiff.machine import reach, solve_struts
-        from toolpath_stiff.rotations import rotation_matrices
-
-        machine = self.model.machine
-        given = self._shown_pose() if pose_mm_deg is None else pose_si("pose", pose_mm_deg)
-        pose = np.array(given)
-        turn = rotation_matrices(pose[3:])
-        struts = solve_struts(machine, pose[:3], turn)
-        return pose, struts, reach(machine, pose[:3], struts, turn[None])
-
-    def _shown_pose(self) -> Pose:
-        return pose_in_si(FIGURE_2_MM_DEG) if self.name == "nist" else self.model.machine.default_origin
-
-    def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
-        """What `plot` draws as a PNG."""
-        from toolpath_stiff.report.machine import machine_picture
-
-        return machine_picture(self.model.machine, *self.standing(pose_mm_deg)[:2])
-
-    def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
-        """Its figures with their origin, and how far the limits are at a pose."""
-        from toolpath_stiff.report.machine import text
-
-        return text(self.model.machine, self.standing(pose_mm_deg)[2])
-
-    def __str__(self) -> str:
-        return self.text()
-
-    def check(self) -> MachineCheck:
-        """Look for slips in the figures: units, signs, mirrored joints; what its effects lack."""
-        from toolpath_stiff.api.machines import check_machine
-
-        return check_machine(self)
-
-    def save(self, file: str | Path) -> Path:
-        """Write the machine file, effects included, whole or not at all."""
-        from toolpath_stiff.files import write_atomically
-        from toolpath_stiff.machine import machine_toml
-
-        return write_atomically(Path(file), machine_toml(self.model.given or self.model.machine))
-
-
-def _machine_again(
-    given: MachineData,
-    files: tuple[str, ...],
-    conditions: Conditions,
-    asked: str,
-    setup: str | None,
-    temperature_C: float | None,
-) -> Machine:
-    """A machine in another process."""
-    from toolpath_stiff.stiffness.model import build_model
-
-    return Machine(build_model(given, files, conditions=conditions), asked, files, setup, temperature_C)
-
-
-def machine_from(machine: Machine | str | Path) -> Machine:
-    """A machine, loaded if it is a name or a file."""
-    return machine if isinstance(machine, Machine) else Machine.load(machine)
 
 
 @dataclass(frozen=True)

@@ -1,339 +1,282 @@
-"""A machine by itself: stiffness at single poses and over planes of the workspace; slips in its file."""
+"""A machine with the effects that act on it, slips in its file, the file itself."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.inputs import FARTHEST_MM, STRONGEST_N, Machine, machine_from, positive, whole
-from toolpath_stiff.api.results import FolderResult, Progress, Result, TextResult, counter, one_of
-from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
-from toolpath_stiff.files import Content
-from toolpath_stiff.hints import command_line
-from toolpath_stiff.units import m_from_mm, rad_from_deg
+from toolpath_stiff.api.inputs import Program, pose_si, whole
+from toolpath_stiff.api.results import Result, TextResult, one_of
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike, NDArray
 
     from toolpath_stiff.analysis.checks import MachineCheck as Findings
-    from toolpath_stiff.analysis.poses import PoseReport
-    from toolpath_stiff.analysis.poses import StiffnessMap as StiffnessGrid
+    from toolpath_stiff.arrays import FloatArray
+    from toolpath_stiff.machine import Machine as MachineData
+    from toolpath_stiff.machine import Reach, Struts
+    from toolpath_stiff.stiffness.effects.contract import Conditions
     from toolpath_stiff.stiffness.model import StiffnessModel
 
-    FloatArray = NDArray[np.float64]
-
-FARTHEST = FARTHEST_MM  # mm and degrees of a pose
-MOST_POINTS = 2001  # along a side of a map
+TEMPERATURES_C = (-50.0, 200.0)
+FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
 
 
-class PoseStiffness(Result):
-    """Stiffness at poses: along X, Y, Z, in the softest and the stiffest direction, with strut lengths and margins."""
+@dataclass(frozen=True)
+class Machine:
+    """A machine with the physical effects that act on it, and what it runs under.
 
-    command: ClassVar[str] = "pose"
-
-    def __init__(self, model: StiffnessModel, poses: Any, found: PoseReport, *, single: bool) -> None:
-        from toolpath_stiff.report.machine import pose_columns
-
-        self.model, self.poses, self.found, self._single = model, poses, found, single
-        self.columns = pose_columns(poses, found)
-
-    @property
-    def reachable(self) -> Any:
-        """(n,) whether the machine can take the pose."""
-        return self.found.reach.reachable
-
-    @property
-    def warnings(self) -> list[str]:
-        """Effects that do not act here, for want of a set-up, a temperature or a tool."""
-        from toolpath_stiff.stiffness.model import condition_warnings
-
-        return condition_warnings(self.model)
-
-    def out_of_reach(self, most: int) -> list[str]:
-        """Which poses the machine cannot take and why: so many by name, how many more."""
-        rows = (~self.reachable).nonzero()[0]
-        said = [f"row {i + 1}: out of reach: {self.found.reach.describe(i)}" for i in rows[:most]]
-        return said + ([f"{len(rows) - most} more rows are out of reach"] if len(rows) > most else [])
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a pose, the columns of `tps pose --csv`."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Of a single pose its figures; of several, a list of them under "poses", null where out of reach."""
-        from toolpath_stiff.stiffness.model import effects_stated
-
-        about = {"machine": self.model.machine.name, **effects_stated(self.model), "warnings": self.warnings}
-        rows = [_plain(row) for row in self.to_frame().to_dict("records")]
-        return {**about, **rows[0]} if self._single else {**about, "poses": rows}
-
-    def csv(self) -> str:
-        """The table as the command writes it."""
-        from toolpath_stiff.report.machine import pose_csv
-
-        return pose_csv(self.poses, self.found)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.machine import pose_text
-
-        if not self._single:
-            return self.csv().rstrip("\n")
-        return pose_text(self.model, {name: column[0] for name, column in self.columns.items()}, self.found)
-
-    def _short(self) -> str:
-        name = self.model.machine.name
-        if not self._single:
-            return f"{len(self.reachable)} poses of {name}, {int(self.reachable.sum())} within reach"
-        soft, stiff = (f"{self.columns[f'{which}_N_per_mm'][0]:.0f}" for which in ("softest", "stiffest"))
-        return f"{name}, {soft} N/mm along the softest direction, {stiff} along the stiffest"
-
-
-def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
-    """Poses (n, 6) in mm and degrees from a table (CSV, or FILE.xlsx[#SHEET]), and what is to be said of the reading.
-
-    Columns x_mm, y_mm, z_mm and, if there, a_deg, b_deg, c_deg.
-
-    Raises
-    ------
-    InputError, InputErrors
-        A column is missing, there is no row; every cell that is no number within reason.
-    """
-    import numpy as np
-
-    from toolpath_stiff.report.machine import POSE_COLUMNS
-    from toolpath_stiff.tables import Columns, read_table
-
-    name = str(file)
-    table = read_table(name, "poses", Columns(POSE_COLUMNS))
-    missing = [column for column in POSE_COLUMNS[:3] if column not in table.heading]
-    if missing:
-        raise InputError(
-            f"column {missing[0]} is missing (found {', '.join(table.heading)})",
-            expected=", ".join(POSE_COLUMNS[:3]),
-            file=name,
-            line=table.heading_line,
-        )
-    if not table.rows:
-        raise InputError("no poses", expected=f"rows below the heading ({','.join(POSE_COLUMNS)})", file=name)
-    columns = [(i, table.heading.index(c), c) for i, c in enumerate(POSE_COLUMNS) if c in table.heading]
-    poses, errors = np.zeros((len(table.rows), 6)), []
-    for row, (line, cells) in enumerate(table.rows):
-        for i, at, column in columns:
-            text = cells[at] if at < len(cells) else ""
-            try:
-                poses[row, i] = _coordinate(text)
-            except ValueError:
-                expected = f"a number within +-{FARTHEST:g}"
-                errors.append(InputError(f"row {row + 1}, {column}: {text!r}", expected=expected, file=name, line=line))
-    if errors:
-        raise InputErrors(errors)
-    return poses, tuple(table.notes)
-
-
-def _coordinate(text: str) -> float:
-    """A finite number within reason. Raises `ValueError`."""
-    value = float(text)
-    if not abs(value) <= FARTHEST:
-        raise ValueError(text)
-    return value
-
-
-def _plain(row: dict[Any, Any]) -> dict[str, Any]:
-    """A row for JSON: None for nan, Python's own numbers."""
-    plain = {name: value.item() if hasattr(value, "item") else value for name, value in row.items()}
-    found = {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in plain.items()}
-    return {**found, "extrapolated": bool(found["extrapolated"])}
-
-
-def pose(
-    machine: Machine | str | Path,
-    pose_mm_deg: ArrayLike,
-    *,
-    force_N: float = 1000.0,
-) -> PoseStiffness:
-    """Stiffness at a pose, or at many.
-
-    Parameters
-    ----------
-    machine
-        A machine, its name or its file.
-    pose_mm_deg
-        (3,) or (6,): X, Y, Z of the tool tip in mm, roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); or
-        (n, 3) or (n, 6) of these.
-    force_N
-        Size of the load, for effects that depend on it.
-
-    Raises
-    ------
-    UnreachableError
-        A single pose that the machine cannot take; of several, these have nan.
-    InputError
-        A pose of another shape or beyond reason.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.pose("nist", (-300, 300, 300, -30, 0, 0))
-    >>> round(found.to_dict()["kz_N_per_mm"])
-    18919
-    >>> tps.pose("nist", [(0, 0, 800), (0, 0, 5000)]).reachable.tolist()
-    [True, False]
-    """
-    import numpy as np
-
-    from toolpath_stiff.analysis.poses import evaluate_poses
-
-    on = machine_from(machine)
-    given = np.asarray(pose_mm_deg, dtype=float)
-    if given.ndim not in (1, 2) or given.shape[-1] not in (3, 6):
-        count = f"of {given.shape[0]} numbers" if given.ndim == 1 else f"of shape {given.shape}"
-        raise InputError(f"a pose {count}", expected="X Y Z or X Y Z A B C")
-    single = given.ndim == 1
-    rows = np.atleast_2d(given)
-    poses = np.concatenate([rows, np.zeros((len(rows), 6 - rows.shape[1]))], axis=1)
-    if not np.abs(poses).max(initial=0.0) <= FARTHEST:
-        raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected=f"numbers within +-{FARTHEST:g}")
-    model = on.running()
-    force = positive("force", force_N, "N", STRONGEST_N)
-    found = evaluate_poses(model, m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force)
-    if single and not found.reach.reachable[0]:
-        raise UnreachableError(
-            f"the pose is out of reach on machine {on.name}: {found.reach.describe(0)}",
-            hint=f"`{command_line('machine', 'show', on.asked)}` lists the limits",
-        )
-    return PoseStiffness(model, poses, found, single=single)
-
-
-class StiffnessMap(FolderResult):
-    """Stiffness over planes of the workspace.
+    `Machine.load` makes one from a packaged machine or a machine file.
 
     Attributes
     ----------
-    grid
-        The grid and the stiffness on it, arrays in SI.
-    """
-
-    command: ClassVar[str] = "map"
-
-    def __init__(self, machine: Machine, model: StiffnessModel, grid: StiffnessGrid) -> None:
-        from toolpath_stiff.report.map import map_summary
-
-        self.model, self.grid, self.inputs = model, grid, machine.inputs
-        self._document = map_summary(model, grid)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command."""
-        return self._document
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
-        import pandas as pd
-
-        from toolpath_stiff.report.map import map_columns
-
-        return pd.concat([pd.DataFrame(columns) for columns in map_columns(self.grid)], ignore_index=True)
-
-    def plot(self) -> Figure:
-        """Contours over each plane."""
-        from toolpath_stiff.report.map import map_picture
-
-        return map_picture.figure(self.model.machine, self.grid)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.map import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        return f"{self.model.machine.name}, load {self.grid.load}, {self.grid.stiffness.size} points"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content of each file that `save` writes."""
-        from toolpath_stiff.report.map import files
-
-        return files(self.model, self.grid, self._document, plots=plots)
-
-
-def map_stiffness(
-    machine: Machine | str | Path,
-    *,
-    x_mm: tuple[float, float] = (-150.0, 150.0),
-    y_mm: tuple[float, float] = (-150.0, 150.0),
-    z_mm: float | Sequence[float] = 1200.0,
-    load: str = "radial",
-    tilt_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    points: int = 61,
-    force_N: float = 1000.0,
-    progress: Progress | None = None,
-) -> StiffnessMap:
-    """Stiffness over one or several horizontal planes.
-
-    Parameters
-    ----------
-    machine
-        A machine, its name or its file.
-    x_mm, y_mm
-        (low, high) of the planes.
-    z_mm
-        Height, or heights.
-    load
-        Direction of the load: radial, axial, softest, x, y, z or "DX,DY,DZ".
-    tilt_deg
-        Roll, pitch, yaw of the platform.
-    points
-        Grid points along the longer side.
-    force_N
-        Size of the load, for effects that depend on it.
-    progress
-        Called with what is being done, poses done, poses in all.
-
-    Raises
-    ------
-    InputError
-        The load needs a path, or a plane has no extent.
-    UnreachableError
-        Nothing of the planes can be reached.
+    model
+        The machine and its effects as the stiffness is computed from them; SI.
+    asked
+        The name or file that it was loaded by.
+    effect_files
+        Python files with effects of one's own.
+    setup, temperature_C
+        As `load` was told; None: as the controller file or the machine file says.
 
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.map_stiffness("nist", z_mm=1200, points=21)
-    >>> found
-    <StiffnessMap: nist, load radial, 441 points>
-    >>> found.to_dict()["slices"][0]["circle"]["maxima_deg"]
-    [60.27, 180.27, 300.27]
+    >>> machine = tps.Machine.load("nist")
+    >>> machine
+    <Machine nist: 6 struts, no effects>
+    >>> machine.strut_lengths_mm((0, 0, 800)).round(1).tolist()
+    [2884.7, 2869.9, 2884.7, 2869.9, 2884.7, 2869.9]
     """
-    from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.analysis.poses import map_stiffness as evaluate_grid
 
-    on = machine_from(machine)
-    heights = sorted([float(z_mm)] if isinstance(z_mm, int | float) else [float(z) for z in z_mm])
-    if len(set(heights)) < len(heights):
-        raise InputError(f"heights {heights}: one appears twice", expected="each height once")
-    if not max(abs(v) for v in (*x_mm, *y_mm, *heights)) <= FARTHEST_MM:
-        raise InputError("a map beyond 100 m", expected="mm")
-    model = on.running()
-    a, b, c = (rad_from_deg(float(v)) for v in tilt_deg)
-    x, y = ((m_from_mm(float(low)), m_from_mm(float(high))) for low, high in (x_mm, y_mm))
-    grid = evaluate_grid(
-        model,
-        x,
-        y,
-        [m_from_mm(z) for z in heights],
-        parse_load(load),
-        whole("points", points, 2, MOST_POINTS),
-        (a, b, c),
-        positive("force", force_N, "N", STRONGEST_N),
-        counter(progress, "map: poses"),
-    )
-    return StiffnessMap(on, model, grid)
+    model: StiffnessModel
+    asked: str
+    effect_files: tuple[str, ...] = ()
+    setup: str | None = None
+    temperature_C: float | None = None  # noqa: N815  (degrees Celsius)
+
+    @classmethod
+    def load(
+        cls,
+        machine: str | Path = "nist",
+        *,
+        effects: Iterable[str | Path] = (),
+        setup: str | None = None,
+        temperature_C: float | None = None,
+    ) -> Machine:
+        """Load a packaged machine by name, or a machine file.
+
+        Parameters
+        ----------
+        machine
+            Name (`Machine.names()` lists them) or TOML file.
+        effects
+            Python files with physical effects of one's own, which the machine file may name.
+        setup
+            The set-up that is on the machine, for effects that belong to one; "none": none that has a name.
+        temperature_C
+            Degrees Celsius, for effects that need it.
+
+        Raises
+        ------
+        InputError
+            There is no such machine, the file is wrong, an effect is unknown, or no effect knows the set-up.
+        """
+        from toolpath_stiff.machine import load_machine
+        from toolpath_stiff.stiffness.model import build_model
+
+        files = tuple(map(str, effects))
+        model = build_model(load_machine(machine), files)
+        found = cls(model, str(machine), files).under(setup, temperature_C)
+        found.running()
+        return found
+
+    def under(self, setup: str | None = None, temperature_C: float | None = None) -> Machine:
+        """The same machine under a set-up and a temperature, as of `load`; None: as the files say.
+
+        Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
+        """
+        low, high = TEMPERATURES_C
+        if temperature_C is not None and not low <= temperature_C <= high:
+            raise InputError(f"{temperature_C:g} degrees C", expected=f"{low:g} to {high:g}")
+        return replace(self, setup=setup, temperature_C=temperature_C)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For another process: effects of one's own travel as their files, a class of such a file cannot."""
+        files = tuple(str(Path(file).absolute()) for file in self.effect_files)
+        built_from = (self.model.given or self.model.machine, files, self.model.conditions)
+        return _machine_again, (*built_from, self.asked, self.setup, self.temperature_C)
+
+    @staticmethod
+    def names() -> list[str]:
+        """The packaged machines.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.Machine.names()
+        ['genhexkins', 'nategh_agheli', 'nist']
+        """
+        from toolpath_stiff.machine import packaged_machines
+
+        return list(packaged_machines())
+
+    def __repr__(self) -> str:
+        acting = ", ".join(self.effects) or "no effects"
+        return f"<Machine {self.name}: 6 struts, {acting}>"
+
+    @property
+    def name(self) -> str:
+        """Its short name."""
+        return self.model.machine.name
+
+    @property
+    def title(self) -> str:
+        """Its name for headings."""
+        return self.model.machine.title
+
+    @property
+    def source(self) -> str:
+        """Where its figures come from."""
+        return self.model.machine.source
+
+    @property
+    def effects(self) -> list[str]:
+        """Names of the effects that it carries, those that act on readings too."""
+        return [active.effect.name for active in (*self.model.effects, *self.model.instruments)]
+
+    @property
+    def setups(self) -> list[str]:
+        """The set-ups that its file lists and its effects name."""
+        from toolpath_stiff.stiffness.model import known_setups
+
+        return known_setups([self.model])
+
+    @property
+    def origin_mm_deg(self) -> tuple[float, ...]:
+        """Where program zero sits unless a program or an argument says: X, Y, Z, A, B, C in machine coordinates."""
+        return pose_in_mm(self.model.machine.default_origin)
+
+    def running(self, program: Program | None = None, beside: Sequence[Machine] = ()) -> StiffnessModel:
+        """The model under what it runs under: what `load` was told, then a program's controller file, then its own.
+
+        `beside` are machines that the same is said of. Raises `InputError` for a set-up that none of them knows.
+        """
+        from toolpath_stiff.stiffness.effects.contract import Conditions
+        from toolpath_stiff.stiffness.model import NO_SETUP, check_setup
+
+        model, setup, said_by = self.model, self.setup, f"--setup {self.setup}"
+        if setup is None and program is not None:
+            setup, said_by = program.controller.setup, str(program.said.get("controller"))
+        check_setup(model.conditions.setup or "", f"machine {self.name}, [setup] name", model)
+        check_setup(setup or "", said_by, model, *(other.model for other in beside))
+        asked = "" if setup == NO_SETUP else setup
+        conditions = Conditions(
+            model.conditions.setup if asked is None else asked,
+            model.conditions.temperature if self.temperature_C is None else self.temperature_C,
+        )
+        return replace(model, conditions=conditions)
+
+    def like(self, machine: str | Path) -> Machine:
+        """Another machine with the same effect files, set-up and temperature."""
+        from toolpath_stiff.machine import load_machine
+        from toolpath_stiff.stiffness.model import build_model
+
+        model = build_model(load_machine(str(machine)), self.effect_files)
+        return replace(self, model=model, asked=str(machine))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The files that it was read from."""
+        return (self.asked, *self.effect_files)
+
+    def strut_lengths_mm(self, pose_mm_deg: Sequence[float]) -> FloatArray:
+        """(6,) lengths of the struts between their joint centres at a pose (inverse kinematics).
+
+        `pose_mm_deg` is X, Y, Z or X, Y, Z, A, B, C of the tool tip; the reference tool is in the spindle.
+        """
+        return mm_from_m(self.standing(pose_mm_deg)[1].lengths[0])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Its figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark."""
+        import pandas as pd
+
+        from toolpath_stiff.report.machine import figure_entries
+
+        return pd.DataFrame(figure_entries(self.model.machine))
+
+    def plot(self, pose_mm_deg: Sequence[float] | None = None) -> Figure:
+        """The machine at a pose, from three sides."""
+        from toolpath_stiff.report.machine import machine_picture
+
+        return machine_picture.figure(self.model.machine, *self.standing(pose_mm_deg)[:2])
+
+    def standing(self, pose_mm_deg: Sequence[float] | None = None) -> tuple[FloatArray, Struts, Reach]:
+        """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), struts and reach there."""
+        import numpy as np
+
+        from toolpath_stiff.machine import reach, solve_struts
+        from toolpath_stiff.rotations import rotation_matrices
+
+        machine = self.model.machine
+        given = self._shown_pose() if pose_mm_deg is None else pose_si("pose", pose_mm_deg)
+        pose = np.array(given)
+        turn = rotation_matrices(pose[3:])
+        struts = solve_struts(machine, pose[:3], turn)
+        return pose, struts, reach(machine, pose[:3], struts, turn[None])
+
+    def _shown_pose(self) -> Pose:
+        return pose_in_si(FIGURE_2_MM_DEG) if self.name == "nist" else self.model.machine.default_origin
+
+    def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
+        """What `plot` draws as a PNG."""
+        from toolpath_stiff.report.machine import machine_picture
+
+        return machine_picture(self.model.machine, *self.standing(pose_mm_deg)[:2])
+
+    def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
+        """Its figures with their origin, and how far the limits are at a pose."""
+        from toolpath_stiff.report.machine import text
+
+        return text(self.model.machine, self.standing(pose_mm_deg)[2])
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def check(self) -> MachineCheck:
+        """Look for slips in the figures: units, signs, mirrored joints; what its effects lack."""
+        return check_machine(self)
+
+    def save(self, file: str | Path) -> Path:
+        """Write the machine file, effects included, whole or not at all."""
+        from toolpath_stiff.files import write_atomically
+        from toolpath_stiff.machine import machine_toml
+
+        return write_atomically(Path(file), machine_toml(self.model.given or self.model.machine))
+
+
+def _machine_again(
+    given: MachineData,
+    files: tuple[str, ...],
+    conditions: Conditions,
+    asked: str,
+    setup: str | None,
+    temperature_C: float | None,
+) -> Machine:
+    """A machine in another process."""
+    from toolpath_stiff.stiffness.model import build_model
+
+    return Machine(build_model(given, files, conditions=conditions), asked, files, setup, temperature_C)
+
+
+def machine_from(machine: Machine | str | Path) -> Machine:
+    """A machine, loaded if it is a name or a file."""
+    return machine if isinstance(machine, Machine) else Machine.load(machine)
 
 
 class MachineCheck(Result):
@@ -397,6 +340,7 @@ class MachineCheck(Result):
         return machine_views(*self._views())
 
     def _views(self) -> tuple[Any, ...]:
+
         import numpy as np
 
         from toolpath_stiff.machine.kinematics import solve_struts_at

@@ -17,14 +17,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff import __version__
-from toolpath_stiff.api.inputs import Machine, Program, machine_from
+from toolpath_stiff.api.inputs import Program
+from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import TABLES, analyze, path_options
 from toolpath_stiff.api.results import Progress, Result, one_of
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessDied, ProcessPool, job_count
 from toolpath_stiff.report.batch import files, names, text
-from toolpath_stiff.report.batch.outcome import Outcome, columns_of, figures_of
-from toolpath_stiff.report.batch.programs import Found, Listed, find_programs, report_folders
+from toolpath_stiff.report.batch.programs import (
+    Found,
+    Listed,
+    Outcome,
+    columns_of,
+    figures_of,
+    find_programs,
+    report_folders,
+)
 from toolpath_stiff.results_folder import STAGE, Rules, check_folder, write_folder
 
 if TYPE_CHECKING:

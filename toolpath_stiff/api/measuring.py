@@ -6,16 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.inputs import (
-    Machine,
-    Program,
-    machine_from,
-    origin_word,
-    pose_si,
-    positive,
-    program_from,
-    whole,
-)
+from toolpath_stiff.api.inputs import Program, origin_word, pose_si, positive, program_from, whole
+from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import FolderResult, Progress, Result, one_of, teller
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError

@@ -12,14 +12,13 @@ from toolpath_stiff.api.inputs import (
     FARTHEST_MM,
     LONGEST_STEP_MM,
     STRONGEST_N,
-    Machine,
     Program,
-    machine_from,
     pose_si,
     positive,
     program_from,
     whole,
 )
+from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content

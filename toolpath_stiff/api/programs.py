@@ -7,16 +7,8 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.inputs import (
-    LONGEST_STEP_MM,
-    STRONGEST_N,
-    Machine,
-    Program,
-    machine_from,
-    pose_si,
-    positive,
-    program_from,
-)
+from toolpath_stiff.api.inputs import LONGEST_STEP_MM, STRONGEST_N, Program, pose_si, positive, program_from
+from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content

@@ -14,7 +14,8 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api.inputs import Machine, Program
+    from toolpath_stiff.api.inputs import Program
+    from toolpath_stiff.api.machines import Machine
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
@@ -211,7 +212,7 @@ def _temperature(text: str) -> float:
 
 def machine_for(args: argparse.Namespace) -> Machine:
     """The machine that the options of `add_machine_options` describe. Raises `InputError`."""
-    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.machines import Machine
 
     return Machine.load(args.machine, effects=args.effects).under(args.setup, args.temperature)
 

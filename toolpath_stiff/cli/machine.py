@@ -61,7 +61,7 @@ def pose_arguments(parser: argparse.ArgumentParser) -> None:
 
 def pose(args: argparse.Namespace) -> int:
     """Evaluate and print."""
-    from toolpath_stiff.api.machines import pose, read_poses
+    from toolpath_stiff.api.poses import pose, read_poses
 
     if (args.csv is None) == (not args.pose):
         raise InputError(
@@ -139,7 +139,7 @@ def _angles(text: str) -> tuple[float, float, float]:
 
 def map(args: argparse.Namespace) -> int:
     """Evaluate the grid and write the files."""
-    from toolpath_stiff.api.machines import map_stiffness
+    from toolpath_stiff.api.poses import map_stiffness
     from toolpath_stiff.report.map import names
 
     target = destination(args, "map", [args.machine], "-map").check(names(not args.no_plots))
@@ -223,7 +223,7 @@ def machine(args: argparse.Namespace) -> int:
 
 
 def _machine_list(args: argparse.Namespace) -> int:
-    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.machines import Machine
     from toolpath_stiff.api.results import json_text
 
     machines = [Machine.load(name) for name in Machine.names()]
@@ -235,7 +235,7 @@ def _machine_list(args: argparse.Namespace) -> int:
 
 
 def _machine_show(args: argparse.Namespace) -> int:
-    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.machines import Machine
     from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
 
@@ -255,7 +255,7 @@ def _machine_show(args: argparse.Namespace) -> int:
 
 def _machine_check(args: argparse.Namespace) -> int:
     """Load the file, say what is wrong or doubtful, draw the machine at its neutral pose."""
-    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.machines import Machine
     from toolpath_stiff.files import write_atomically
 
     if not Path(args.file).is_file():

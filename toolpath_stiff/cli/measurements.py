@@ -28,7 +28,7 @@ from toolpath_stiff.cli.outputs import (
 from toolpath_stiff.defaults import MACHINE, STRUT_SPREAD
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.machines import Machine
     from toolpath_stiff.api.measuring import Measurements
 
 
@@ -79,7 +79,7 @@ def add_output_arguments(
 
 def measured(args: argparse.Namespace) -> tuple[Machine, Measurements]:
     """The machine with its effect files, and the measurements."""
-    from toolpath_stiff.api.inputs import Machine
+    from toolpath_stiff.api.machines import Machine
     from toolpath_stiff.api.measuring import Measurements
 
     return Machine.load(args.machine, effects=args.effects), Measurements(args.data)

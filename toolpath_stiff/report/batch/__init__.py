@@ -16,11 +16,11 @@ from markupsafe import Markup
 
 from toolpath_stiff import __version__
 from toolpath_stiff.files import Content
-from toolpath_stiff.report.batch.outcome import Outcome, summary_csv, terminal_summary
+from toolpath_stiff.report.batch.programs import RESERVED, Outcome, summary_csv, terminal_summary
 from toolpath_stiff.report.pages import markup, render
 from toolpath_stiff.report.words import ONLY_PLUNGES, duration, number, only_plunges, plain, shortened
 
-INDEX, SUMMARY = "index.html", "summary.csv"
+INDEX, SUMMARY = RESERVED
 TEXT = 40  # characters of a program's line that are shown
 TICKS = 5  # of the scale, about
 MOST_LABELS = 4  # on the scale, or they would touch on a narrow page
