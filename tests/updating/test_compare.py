@@ -13,9 +13,10 @@ from tests.updating.cases import active, campaign, read_text, readings_by_hand, 
 from toolpath_stiff import rig
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.updating.comparison import Comparison, compare, error_figures
+from toolpath_stiff.updating.comparison import Comparison, compare
 from toolpath_stiff.updating.comparison.principles import load_path_shares
 from toolpath_stiff.updating.comparison.residuals import directions, planes, radius, zones
+from toolpath_stiff.updating.inference.fits import error_figures
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements, read_measurements
 

@@ -35,7 +35,7 @@ from toolpath_stiff.updating.correction.document import residuals_csv
 from toolpath_stiff.updating.correction.ladder import _Work, build_ladder, parse_addition
 from toolpath_stiff.updating.diagnosis import words as verdict_words
 from toolpath_stiff.updating.diagnosis.document import document as diagnosis_document
-from toolpath_stiff.updating.diagnosis.document import words
+from toolpath_stiff.updating.diagnosis.words import words
 from toolpath_stiff.updating.inference import NONE
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning.rivals import errors_so_far, rivals_of

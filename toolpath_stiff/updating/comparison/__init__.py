@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.machine.model import Machine
@@ -32,7 +33,7 @@ from toolpath_stiff.updating.comparison.structure import (
 )
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import Baseline
-from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, Noise, Scatter, covariance, noise_models
+from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 

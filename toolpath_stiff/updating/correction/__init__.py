@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.machine.model import Machine
@@ -14,7 +15,6 @@ from toolpath_stiff.stiffness.model import build_model, setup_of
 from toolpath_stiff.updating.correction.ladder import Update, build_ladder, parse_addition
 from toolpath_stiff.updating.correction.machines import data_hash
 from toolpath_stiff.updating.correction.strut_law import BarCurve, StrutLawSearch, bar_curve, update_by_mean_error
-from toolpath_stiff.updating.inference.noise import STRUT_SPREAD
 from toolpath_stiff.updating.measurements import Measurements
 
 LIKELIHOOD, MEAN_ERROR = OBJECTIVES = ("likelihood", "mean-error")

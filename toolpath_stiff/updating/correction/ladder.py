@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects import find_effect
@@ -45,7 +46,7 @@ from toolpath_stiff.updating.inference.fits import (
 )
 from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures
-from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, Noise, noise_models
+from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 

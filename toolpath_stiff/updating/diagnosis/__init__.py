@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.machine.model import Machine
@@ -24,7 +25,7 @@ from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, refine
 from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
-from toolpath_stiff.updating.inference.noise import JOINT_ERROR, STRUT_SPREAD, Noise, noise_models
+from toolpath_stiff.updating.inference.noise import JOINT_ERROR, Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning import plan_measurements

@@ -7,6 +7,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import mm_from_m
@@ -15,7 +16,7 @@ from toolpath_stiff.updating.diagnosis.words import assumptions, next_steps, row
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
 from toolpath_stiff.updating.inference.candidates import Component
 from toolpath_stiff.updating.inference.evidence import Fit
-from toolpath_stiff.updating.inference.fits import NORMAL_95, error_figures, gain_in_standard_errors
+from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
 
 FloatArray = NDArray[np.float64]

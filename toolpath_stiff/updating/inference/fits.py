@@ -21,7 +21,6 @@ FloatArray = NDArray[np.float64]
 
 STEPS = 8
 TOLERANCE = 1e-3  # of a standard deviation
-NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 
 
 def refine(problem: Problem, found: Fit, law_free: bool = True) -> Fit:

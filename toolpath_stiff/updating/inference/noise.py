@@ -24,6 +24,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.defaults import CLAMPING, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
@@ -31,9 +32,7 @@ from toolpath_stiff.updating.measurements import Measurements
 FloatArray = NDArray[np.float64]
 At = TypeVar("At")  # where a fit stands
 
-STRUT_SPREAD = 0.01  # relative sd; assumed, the user may say otherwise
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
-CLAMPING = 0.01  # relative sd; assumed where the data cannot tell
 OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0  # share of wild readings, and how much wider they scatter; assumed
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects import known_effects
@@ -26,7 +27,7 @@ from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.inference import Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.noise import STRUT_SPREAD, Noise, noise_models
+from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning.campaign import RISER, TABLE, Campaign, first_campaign

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.updating.inference.noise import CLAMPING
 from toolpath_stiff.updating.planning.rivals import Forecast
 from toolpath_stiff.updating.planning.visits import Costs, Menu, Visits
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness import exact
@@ -25,7 +26,7 @@ from toolpath_stiff.updating.inference.candidates import Component
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, error_figures, fit_effects, refine
 from toolpath_stiff.updating.inference.hypotheses import score_family
-from toolpath_stiff.updating.inference.noise import JOINT_ERROR, STRUT_SPREAD
+from toolpath_stiff.updating.inference.noise import JOINT_ERROR
 from toolpath_stiff.updating.inference.prediction import JOINT_STEP, Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
