@@ -39,9 +39,9 @@ class EffectCatalogue(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """What each effect declares, in its own units."""
-        from toolpath_stiff.report.effects import describe
+        from toolpath_stiff.report.machine import describe_effect
 
-        return {"effects": [describe(effect) for effect in self.effects], "broken": self.broken}
+        return {"effects": [describe_effect(effect) for effect in self.effects], "broken": self.broken}
 
     def to_frame(self) -> pd.DataFrame:
         """One row an effect: link of the load path, name, title, equation, source."""
@@ -51,9 +51,9 @@ class EffectCatalogue(Result):
         return pd.DataFrame(self.to_dict()["effects"])[columns]
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.effects import table
+        from toolpath_stiff.report.machine import effects_table
 
-        return table(self.effects, self.broken)
+        return effects_table(self.effects, self.broken)
 
     def _short(self) -> str:
         return f"{len(self.effects)} effects"
@@ -107,7 +107,7 @@ class EffectCheck(Result):
         return pd.DataFrame(rows)
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.effects import trials_text
+        from toolpath_stiff.report.machine import trials_text
 
         return trials_text(self.trials, self.machine)
 

@@ -357,11 +357,11 @@ def _effects_list(args: argparse.Namespace) -> int:
 
 def _effects_show(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.results import json_text
-    from toolpath_stiff.report.effects import describe, details
+    from toolpath_stiff.report.machine import describe_effect, effect_details
     from toolpath_stiff.stiffness.effects import find_effect
 
     effect = find_effect(args.name, args.effects)
-    sys.stdout.write(json_text(describe(effect)) if args.json else f"{details(effect)}\n")
+    sys.stdout.write(json_text(describe_effect(effect)) if args.json else f"{effect_details(effect)}\n")
     return 0
 
 
