@@ -307,7 +307,7 @@ class Scatter:
 
     def with_wild(self, residual: FloatArray) -> Scatter:
         """With those readings taken for wild whose widening pays its price at these residuals (n,)."""
-        inverse, determinant, wild = self.inverse.copy(), self.log_determinant, list(self.wild)
+        inverse, determinant, wild = self.inverse, self.log_determinant, list(self.wild)
         pull = inverse @ residual
         for _ in range(int(MOST_WILD * len(residual)) + 1):
             own = 1.0 + self.widening * np.diag(inverse)
@@ -316,8 +316,8 @@ class Scatter:
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            column = inverse[:, row].copy()
-            inverse -= np.outer(column, column) * (self.widening[row] / own[row])
+            column = inverse[:, row]
+            inverse = inverse - np.outer(column, column) * (self.widening[row] / own[row])
             pull = pull - column * (self.widening[row] * pull[row] / own[row])
             determinant += float(np.log(own[row]))
             wild.append(row)
