@@ -146,10 +146,7 @@ def simple_noise(
 
 
 PREDICTORS: dict[tuple[Any, ...], Predictor] = {}
-DESIGN = (
-    "position", "angles", "direction", "force", "tool_extension", "time", "temperature", "setup", "loop", "repeat",
-    "point", "clamp",
-)  # fmt: skip
+DESIGN = ("position", "angles", "direction", "force", "tool_extension", "time", "temperature", "setup")
 
 
 def predictor_for(data: Measurements) -> Predictor:
