@@ -13,6 +13,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from toolpath_stiff.errors import InputError, InputErrors, TableError
 from toolpath_stiff.files import decoded, read_bytes
@@ -214,10 +215,16 @@ def _known(columns: Columns) -> dict[str, str]:
 def _meant(key: str, known: Mapping[str, str]) -> str | None:
     """The known column that a heading with no unit, or with another one, means."""
     for own, name in known.items():
-        base = next((own[: -len(unit) - 1] for unit in sorted(UNITS, key=len, reverse=True) if _ends(own, unit)), None)
+        base = _without_unit(own)
         if base and (key == base or (key.startswith(f"{base}_") and key[len(base) + 1 :] in UNITS)):
             return name
     return None
+
+
+@cache
+def _without_unit(key: str) -> str | None:
+    """The key of a known column without the longest unit that it ends in; None if it has none."""
+    return next((key[: -len(unit) - 1] for unit in sorted(UNITS, key=len, reverse=True) if _ends(key, unit)), None)
 
 
 def _ends(key: str, unit: str) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,8 @@ from toolpath_stiff.placement.paths import thinned_rows
 
 ROOT = Path(__file__).parent.parent.parent
 NIST = load_machine("nist")
-STEP = 5e-3  # m
-BOUNDS = ["--x", "-150:150", "--y", "-150:150", "--z", "700:1000", "--step", "5", "--points", "12"]
+STEP = 10e-3  # m
+BOUNDS = ["--x", "-150:150", "--y", "-150:150", "--z", "700:1000", "--step", "10", "--points", "12"]
 TILTS = ("--tilt-a", "-8:8", "--tilt-b", "-8:8")
 
 
@@ -48,14 +49,20 @@ def turned(row: dict, points: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
+def pocket(tmp_path_factory):
+    """The page's data of a program cut in one plane, with plunges."""
+    return placed(tmp_path_factory.mktemp("pocket"), "pocket")[1]
+
+
+@pytest.fixture(scope="module")
 def tilted(tmp_path_factory):
     """A tilted program in tilted set-ups, searched once: the folder and the page's data."""
     folder = tmp_path_factory.mktemp("tilted")
     return folder, placed(folder, "tilted_five_axis", *TILTS)[1]
 
 
-def test_plunges_set_neither_the_axis_nor_the_colours(tmp_path, capsys):
-    data = placed(tmp_path, "pocket")[1]
+def test_plunges_set_neither_the_axis_nor_the_colours(pocket):
+    data = pocket
     values, plunge = np.array(data["stiffness"]), np.array(data["plunge"])
     assert plunge.any() and values[:, plunge].min() > 1.5 * values[:, ~plunge].max()
     assert data["scale"][1] <= values[:, ~plunge].max()
@@ -63,8 +70,8 @@ def test_plunges_set_neither_the_axis_nor_the_colours(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["pocket", "tilted_five_axis"])
-def test_page_tells_what_analysis_finds(tmp_path, capsys, name, request):
-    data = request.getfixturevalue("tilted")[1] if name == "tilted_five_axis" else placed(tmp_path, name)[1]
+def test_page_tells_what_analysis_finds(name, request):
+    data = request.getfixturevalue("tilted")[1] if name == "tilted_five_axis" else request.getfixturevalue(name)
     program = read_program(ROOT / "programs" / f"{name}.nc")
     assert len(data["stiffness"]) == len(data["front"]) + 1  # and the original
     for i in (0, len(data["front"]) // 2, data["recommended"]):
@@ -105,11 +112,16 @@ def test_same_bytes_twice_and_nothing_from_the_network(tmp_path, capsys):
     assert not re.findall(r"""(?:src|href)=|url\(["']?https?:|@import|fetch\(|XMLHttp""", page)
 
 
+@cache
+def finely_sampled(name: str):
+    program = read_program(ROOT / "programs" / f"{name}.nc", tool_table=ROOT / "programs" / "tools.tbl")
+    return sample_moves(program.moves, 2e-3)
+
+
 @pytest.mark.parametrize("points", [50, 150, 800])
 @pytest.mark.parametrize("name", ["pocket", "drilling", "three_tools", "incremental_slots", "surface_50000"])
 def test_thinned_paths_keep_their_ends_and_are_no_longer_than_asked(name, points):
-    program = read_program(ROOT / "programs" / f"{name}.nc", tool_table=ROOT / "programs" / "tools.tbl")
-    samples = sample_moves(program.moves, 2e-3)
+    samples = finely_sampled(name)
     rows = np.flatnonzero(samples.cutting)
     cut = np.unique(np.cumsum(~samples.cutting)[rows], return_inverse=True)[1]
     kept = thinned_rows(samples.take(rows), cut, points)

@@ -11,6 +11,7 @@ J dx = dL, strut elongation per twist of the tip.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,7 +47,7 @@ class Struts:
     directions: FloatArray
     arms: FloatArray
 
-    @property
+    @cached_property
     def jacobian(self) -> FloatArray:
         """(n, 6, 6) rows [u_i, r_i x u_i]: strut elongation rates per twist of the tip."""
         return np.concatenate([self.directions, np.cross(self.arms, self.directions)], axis=-1)

@@ -20,7 +20,7 @@ from numpy.random import Generator
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rig.effects import CATALOGUE, Scale, with_effect
+from toolpath_stiff.rig.effects import CATALOGUE, scale_of, with_effect
 from toolpath_stiff.rig.hidden import (
     ODDITIES,
     OUTSIDE,
@@ -284,7 +284,7 @@ def draw_case(
     rows = rows_of(table)
     true, effects = HiddenMachine(), []
     if names:
-        scale = Scale(nominal, rows, clamp_of(table), nuisances)
+        scale = scale_of(nominal, rows, clamp_of(table), nuisances)
         for name in names:
             # A stream of its own for each effect: sizes of different effects of one seed have nothing in common.
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])

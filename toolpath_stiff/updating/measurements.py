@@ -344,21 +344,25 @@ def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:
 
 
 def measured_path(model: StiffnessModel, data: Measurements) -> LoadPath:
-    """What the model's effects see of the measurements; a column that is missing is None there."""
+    """What the model's effects see of the measurements; a column that is missing is None there.
+
+    A pose is solved once, however often it was measured.
+    """
+    poses = np.concatenate([data.position, data.angles, data.tool_extension[:, None]], axis=1)
+    _, first, which = np.unique(poses, axis=0, return_index=True, return_inverse=True)
+    length = data.tool_extension + model.machine.reference_tool_length
+    path = load_path(model, data.position[first], data.rotation[first], length[first]).take(which.reshape(-1))
 
     def unless_missing(name: str, values: Any) -> Any:
         return None if name in data.missing else values
 
-    return load_path(
-        model,
-        data.position,
-        data.rotation,
-        data.tool_extension + model.machine.reference_tool_length,
-        data.force,
+    return replace(
+        path,
+        force=data.force,
+        direction=data.direction,
         setup=unless_missing("setup", data.setup),
         time=unless_missing("time_min", data.time),
         temperature=unless_missing("temperature_C", data.temperature),
-        direction=data.direction,
     )
 
 

@@ -15,7 +15,7 @@ Everything is SI and batched over n poses. A method that an effect does not impl
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -133,7 +133,7 @@ class LoadPath:
 
     def take(self, rows: IntArray) -> LoadPath:
         """Some of the poses, by index; repeated as the index says."""
-        struts = Struts(*(values[rows] for values in vars(self.struts).values()))
+        struts = Struts(*(getattr(self.struts, one.name)[rows] for one in fields(self.struts)))
         arrays: dict[str, Any] = {
             name: value[rows] for name, value in vars(self).items() if isinstance(value, np.ndarray)
         }

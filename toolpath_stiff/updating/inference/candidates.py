@@ -226,6 +226,15 @@ class Table:
         return np.asarray((ends[0] - ends[1])[:, None] / (2.0 * step))
 
 
+def table_of(candidate: Candidate, predictor: Predictor) -> Table | None:
+    """`tabulate` at the machine file's own strut law, once for a set of readings."""
+    key = (candidate.name, candidate.choice)
+    if key not in predictor.tables:
+        predictor.tables[key] = tabulate(candidate, predictor, np.zeros(2))
+    found: Table | None = predictor.tables[key]
+    return found
+
+
 def tabulate(
     candidate: Candidate, predictor: Predictor, law: FloatArray, beside: Sequence[ActiveEffect] = ()
 ) -> Table | None:

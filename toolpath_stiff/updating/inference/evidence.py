@@ -260,8 +260,8 @@ class Problem:
             scan = self._refined(table, self._scan(table, sizes, scatter.inverse, law), scatter.inverse)
             peak = int(np.argmax(scan.profile))
             residual, law = scan.residuals[peak], scan.laws[peak]
-            again = self.scatter.with_wild(residual)
-            if not last or set(again.wild) == set(scatter.wild):
+            again = self.scatter.with_wild(residual, scatter)
+            if not last or again is scatter:
                 break
             scatter = again
         log_integral = prior.integrate(scan.sizes, scan.profile)
@@ -318,8 +318,8 @@ class Problem:
             if converged is None:
                 return None
             law, residual, information, jacobian = converged
-            again = self.scatter.with_wild(residual)
-            if not last or set(again.wild) == set(scatter.wild):
+            again = self.scatter.with_wild(residual, scatter)
+            if not last or again is scatter:
                 break
             scatter = again
         covariance = np.asarray(scaled_inverse(information), dtype=float)

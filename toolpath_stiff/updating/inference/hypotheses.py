@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
-from toolpath_stiff.updating.inference.candidates import Table, candidates_of, tabulate
+from toolpath_stiff.updating.inference.candidates import Table, candidates_of, table_of, tabulate
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import Structure, set_wild_aside
 
@@ -55,7 +55,7 @@ def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
     best: Fit | None = None
     subsets: tuple[tuple[Fit, float], ...] = ()
     for candidate in candidates_of(effect, data):
-        table = tabulate(candidate, problem.predictor, np.zeros(2))
+        table = table_of(candidate, problem.predictor)
         if table is None:
             continue
         tables.append(table)

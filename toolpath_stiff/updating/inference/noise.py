@@ -244,8 +244,9 @@ def _maximum_likelihood(left: FloatArray, contrasts: FloatArray, same: NDArray[n
     clamped = contrasts.T @ same @ contrasts
     values, vectors = np.linalg.eigh(clamped)
     rotated = vectors.T @ left
+    rank = int((np.abs(values) > np.abs(values).max() * len(values) * np.finfo(float).eps).sum())
     values = np.maximum(values, 0.0)
-    tells = float(np.ptp(values)) > 1e-6 and np.linalg.matrix_rank(clamped) >= 3
+    tells = float(np.ptp(values)) > 1e-6 and rank >= 3
 
     def repeat_at(ratio: float) -> float:
         return float(np.sqrt(np.mean(rotated**2 / (1.0 + ratio * values))))
@@ -304,22 +305,34 @@ class Scatter:
         price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
         return cls(0.5 * (inverse + inverse.T), float(2.0 * np.log(np.diag(factor[0])).sum()), widening, float(price))
 
-    def with_wild(self, residual: FloatArray) -> Scatter:
-        """With those readings taken for wild whose widening pays its price at these residuals (n,)."""
-        inverse, determinant, wild = self.inverse.copy(), self.log_determinant, list(self.wild)
-        pull = inverse @ residual
+    def with_wild(self, residual: FloatArray, known: Scatter | None = None) -> Scatter:
+        """With those readings taken for wild whose widening pays its price at these residuals (n,).
+
+        Where these are the wild readings of `known`, that is the answer: the matrix is not worked out again.
+        """
+        diagonal, determinant, wild = np.diag(self.inverse).copy(), self.log_determinant, list(self.wild)
+        pull = self.inverse @ residual
+        taken: list[tuple[FloatArray, float]] = []  # the inverse falls by column column^T times a factor
         for _ in range(int(MOST_WILD * len(residual)) + 1):
-            own = 1.0 + self.widening * np.diag(inverse)
+            own = 1.0 + self.widening * diagonal
             gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
             gain[wild] = -np.inf
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            column = inverse[:, row].copy()
-            inverse -= np.outer(column, column) * (self.widening[row] / own[row])
+            column = self.inverse[:, row].copy()
+            for earlier, factor in taken:
+                column -= earlier * earlier[row] * factor
+            taken.append((column, self.widening[row] / own[row]))
+            diagonal -= column * column * taken[-1][1]
             pull = pull - column * (self.widening[row] * pull[row] / own[row])
             determinant += float(np.log(own[row]))
             wild.append(row)
+        if known is not None and set(known.wild) == set(wild):
+            return known
+        inverse = self.inverse.copy()
+        for column, factor in taken:
+            inverse -= np.outer(column, column) * factor
         return Scatter(inverse, determinant, self.widening, self.price, tuple(wild))
 
     def log_likelihood(self, residual: FloatArray) -> FloatArray:

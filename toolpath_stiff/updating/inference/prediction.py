@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,6 +66,8 @@ class Predictor:
     ----------
     data
         The readings, with a warning for each effect of the machine file that adds nothing to them.
+    tables
+        What `candidates.table_of` has worked out for these readings: every noise model asks for the same.
     """
 
     def __init__(self, machine: Machine, data: Measurements, effect_files: Sequence[str | Path] = ()) -> None:
@@ -73,6 +77,7 @@ class Predictor:
         self.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle_on(self.base, data).values()))))
         self._timeless = _prepare(self.base, data, timed=False)
         self._timed = _prepare(self.base, data, timed=True)
+        self.tables: dict[tuple[Any, ...], Any] = {}
 
     def __len__(self) -> int:
         return len(self.data)
@@ -157,33 +162,45 @@ class Predictor:
 
     def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
-        prepared = self._timeless
-        logs = np.asarray(law, dtype=float)
-        rule = self.machine.strut_law
-        second = (prepared.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
-        first_term = rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * (1.0 - second)
-        stiffness = first_term + rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second
-        return np.asarray((prepared.forces**2 / stiffness).sum(axis=-1)[..., prepared.which])
+        first_term, second_term = self._law_terms(law)
+        return np.asarray((self._squared_forces / (first_term + second_term)).sum(axis=-1)[..., self._timeless.which])
 
     def strut_slopes(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(..., n, 2) derivatives of `strut_part` to the law's logarithms."""
-        prepared = self._timeless
-        logs = np.asarray(law, dtype=float)
-        rule = self.machine.strut_law
-        second = (prepared.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
-        terms = [
-            rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * (1.0 - second),
-            rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second,
-        ]
-        energy = prepared.forces**2 / (terms[0] + terms[1]) ** 2
-        slopes = [-(energy * term).sum(axis=-1)[..., prepared.which] for term in terms]
+        terms = self._law_terms(law)
+        energy = self._squared_forces / (terms[0] + terms[1]) ** 2
+        slopes = [-(energy * term).sum(axis=-1)[..., self._timeless.which] for term in terms]
         return np.stack(slopes, axis=-1)
+
+    def _law_terms(self, law: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """(..., m, 6) N/m each: what the law's two constants, scaled by laws (..., 2), give each strut."""
+        logs = np.asarray(law, dtype=float)
+        rule, (first, second) = self.machine.strut_law, self._law_shares
+        return (
+            rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * first,
+            rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second,
+        )
+
+    @cached_property
+    def _law_shares(self) -> tuple[FloatArray, FloatArray]:
+        """(m, 6) shares of the law's two constants in each strut's stiffness, by its length."""
+        rule = self.machine.strut_law
+        second = (self._timeless.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        return 1.0 - second, second
+
+    @cached_property
+    def _squared_forces(self) -> FloatArray:
+        return np.asarray(self._timeless.forces**2)
 
     def joint_columns(self) -> FloatArray:
         """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
 
-        The platform stands where struts of the commanded lengths put the true joints.
+        The platform stands where struts of the commanded lengths put the true joints. Worked out once.
         """
+        return self._joint_columns
+
+    @cached_property
+    def _joint_columns(self) -> FloatArray:
         base, columns = self._base_log(), []
         for name in ("frame_joints", "platform_joints"):
             for strut in range(6):
