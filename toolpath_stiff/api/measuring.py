@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.inputs import Program, origin_word, pose_si, positive, program_from, whole
+from toolpath_stiff.api.inputs import FARTHEST_MM, Program, origin_word, pose_si, positive, program_from, whole
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import FolderResult, Progress, Result, one_of, teller
 from toolpath_stiff.defaults import MACHINE
@@ -723,26 +723,18 @@ def plan(
     from toolpath_stiff.updating.planning.visits import Costs
 
     asked = _Question(machine, data, noise_percent, strut_spread_percent, seed)
-    for name, value in (minutes or {}).items():
-        one_of("minutes", name, COSTS)
-        if not value >= 0.0:
-            raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
+    costs = _costs(minutes or {})
     if max_tilt_deg is not None and not 0.0 <= max_tilt_deg < STEEPEST_TILT_DEG:
         raise InputError(f"{max_tilt_deg:g} degrees", expected="0 or more and less than 90")
-    lists: dict[str, Sequence[object] | None] = {
-        "between": between or None, "heights": heights_mm, "loads": loads_N, "tools": tool_extensions_mm,
-        "setups": setups,
-    }  # fmt: skip
-    joined = {name: None if given is None else ",".join(map(_word, given)) for name, given in lists.items()}
-    own = options(
-        **{key: joined[key] for key in ("between",)},
+    own = _own_words(
+        between=between or None,
         n=n,
-        radius=None if radius_mm is None else _word(radius_mm),
-        heights=joined["heights"],
-        max_tilt=None if max_tilt_deg is None else _word(max_tilt_deg),
-        loads=joined["loads"],
-        tools=joined["tools"],
-        setups=joined["setups"],
+        radius=radius_mm,
+        heights=heights_mm,
+        max_tilt=max_tilt_deg,
+        loads=loads_N,
+        tools=tool_extensions_mm,
+        setups=setups,
         cost=[f"{name}={_word(value)}" for name, value in (minutes or {}).items()],
         seed=seed or None,
     )
@@ -751,18 +743,42 @@ def plan(
         None if asked.data is None else asked.readings,
         between=tuple(between),
         n=n,
-        radius=None if radius_mm is None else m_from_mm(positive("radius", radius_mm, "mm", 1e5)),
-        heights=None if heights_mm is None else tuple(m_from_mm(float(z)) for z in heights_mm),
+        radius=None if radius_mm is None else m_from_mm(positive("radius", radius_mm, "mm", FARTHEST_MM)),
+        heights=_in_metres(heights_mm),
         max_tilt=None if max_tilt_deg is None else rad_from_deg(max_tilt_deg),
         loads=loads_N,
-        tool_extensions=None if tool_extensions_mm is None else tuple(m_from_mm(float(t)) for t in tool_extensions_mm),
+        tool_extensions=_in_metres(tool_extensions_mm),
         setups=setups,
-        costs=Costs(**{name: float(value) for name, value in (minutes or {}).items()}),
+        costs=Costs(**costs),
         judgement=None if diagnosis is None else diagnosis.diagnosed.main,
         files=asked.files,
         **asked.common,
     )
     return Plan(found, asked, asked.asked.command("plan", *own))
+
+
+def _costs(minutes: Mapping[str, float]) -> dict[str, float]:
+    """Minutes of each kind of work, checked."""
+    for name, value in minutes.items():
+        one_of("minutes", name, COSTS)
+        if not value >= 0.0:
+            raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
+    return {name: float(value) for name, value in minutes.items()}
+
+
+def _in_metres(values_mm: Sequence[float] | None) -> tuple[float, ...] | None:
+    return None if values_mm is None else tuple(m_from_mm(float(value)) for value in values_mm)
+
+
+def _own_words(**given: object) -> list[str]:
+    """Options of a command: numbers as they are typed, lists with commas, --cost once an entry."""
+    words: dict[str, object] = {}
+    for name, value in given.items():
+        if isinstance(value, list | tuple) and name != "cost":
+            words[name] = ",".join(map(_word, value))
+        else:
+            words[name] = value if isinstance(value, list) or value is None else _word(value)
+    return options(**words)
 
 
 def _word(value: object) -> str:
