@@ -189,6 +189,19 @@ def test_a_wild_reading_is_found_and_its_own_scatter_widened():
     assert float(wild.log_likelihood(residual)) > float(scatter.log_likelihood(residual)) + price
 
 
+def test_several_wild_readings_and_an_answer_that_is_known_already():
+    scatter, matrix, residual = correlated(n=40)
+    residual[20] += 0.6
+    wild = scatter.with_wild(residual)
+    assert set(wild.wild) >= {7, 20}
+    for row in wild.wild:
+        matrix[row, row] += (4.0**2 - 1.0) * 0.02**2
+    assert wild.inverse == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
+    assert wild.log_determinant == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-10)
+    assert scatter.with_wild(residual, wild) is wild
+    assert scatter.with_wild(residual, scatter) is not scatter
+
+
 def test_nothing_is_called_wild_without_need():
     scatter, matrix, _ = correlated()
     calm = np.random.default_rng(2).multivariate_normal(np.zeros(len(matrix)), matrix, 200)

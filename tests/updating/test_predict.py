@@ -159,3 +159,16 @@ def test_effects_come_on_top_of_those_of_the_machine_file():
         with_file.log_stiffness(effects=[active("joint_compliance", compliance=4e-9)])
     # Beside a compliance that the law does not move, the law moves less than everything.
     assert (with_file.law_columns(with_file.log_stiffness()).sum(axis=1) < 0.95).all()
+
+
+def test_a_pose_measured_many_times_is_what_it_is_measured_once():
+    """With a control that knows nothing of the true joints, so that poses have to be searched; in any order."""
+    data = campaign(5)[0]
+    order = np.random.default_rng(3).permutation(len(data))
+    wrong = active("platform_radius_error", error=0.5e-3)
+    whole = Predictor(nist(), data).log_stiffness(effects=[wrong])
+    shuffled = Predictor(nist(), data.select(order)).log_stiffness(effects=[wrong])
+    np.testing.assert_array_equal(shuffled, whole[order])
+    for row in (0, 17, 250):
+        alone = Predictor(nist(), data.select(np.array([row]))).log_stiffness(effects=[wrong])
+        assert alone[0] == pytest.approx(whole[row], rel=1e-13)
