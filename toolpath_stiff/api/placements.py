@@ -20,6 +20,7 @@ from toolpath_stiff.api.inputs import (
 )
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
+from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.placement.case_study import CaseStudy as Study
     from toolpath_stiff.placement.climb import Bounds
     from toolpath_stiff.placement.placing import Placed, Rewriting
+    from toolpath_stiff.placement.search import SearchRules
 
 FARTHEST_TURN_DEG = 720.0
 LONGEST_CHORD_MM = 10.0
@@ -202,18 +204,13 @@ def place(
     []
     """
     from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.placement.evaluator import Keepout
     from toolpath_stiff.placement.placing import Task, place_again, place_program
-    from toolpath_stiff.placement.search import SearchRules
 
     on, part = machine_from(machine), program_from(program)
     if write is None and (decimals is not None or linearise_mm is not None):
         option = "decimals" if decimals is not None else "linearise"
         raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
-    if not 0.0 <= margin_percent < LARGEST_MARGIN_PERCENT:
-        raise InputError(f"margin {margin_percent:g} %", expected=f"0 to less than {LARGEST_MARGIN_PERCENT:g} per cent")
-    whole("points", points, 2, MOST_FRONT_POINTS)
-    whole("seed", seed, 0)
+    rules = _rules(objective, margin_percent, allow_extrapolation, keep_out, seed, points)
     model = on.running(part)
     default = model.machine.default_origin
     asked: Pose | None = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
@@ -224,16 +221,7 @@ def place(
         present=asked or (read.origin if read.origin_source == "program" else default),
         read=lambda origin: part.moves(origin, default),
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
-        rules=SearchRules(
-            objective=one_of("objective", objective, OBJECTIVES),
-            margin=margin_percent / 100.0,
-            allow_extrapolation=allow_extrapolation,
-            keepouts=tuple(
-                Keepout(box.name, _corner(box.low_mm), _corner(box.high_mm)) for box in map(_checked_box, keep_out)
-            ),
-            seed=seed,
-            points=points,
-        ),
+        rules=rules,
         load=parse_load(load),
         step=m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM)),
         force=positive("force", force_N, "N", STRONGEST_N),
@@ -246,7 +234,30 @@ def place(
     return Placement(placed, (*part.inputs, *on.inputs))
 
 
-OBJECTIVES = ("balanced", "mean", "range", "weakest")
+def _rules(
+    objective: str,
+    margin_percent: float,
+    allow_extrapolation: bool,
+    keep_out: Iterable[KeepOut],
+    seed: int,
+    points: int,
+) -> SearchRules:
+    """What a placement must keep and be good at, in SI."""
+    from toolpath_stiff.placement.evaluator import Keepout
+    from toolpath_stiff.placement.search import SearchRules
+
+    if not 0.0 <= margin_percent < LARGEST_MARGIN_PERCENT:
+        raise InputError(f"margin {margin_percent:g} %", expected=f"0 to less than {LARGEST_MARGIN_PERCENT:g} per cent")
+    return SearchRules(
+        objective=one_of("objective", objective, tuple(OBJECTIVES)),
+        margin=margin_percent / 100.0,
+        allow_extrapolation=allow_extrapolation,
+        keepouts=tuple(
+            Keepout(box.name, _corner(box.low_mm), _corner(box.high_mm)) for box in map(_checked_box, keep_out)
+        ),
+        seed=whole("seed", seed, 0),
+        points=whole("points", points, 2, MOST_FRONT_POINTS),
+    )
 
 
 def _corner(corner_mm: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from toolpath_stiff.api.placements import OBJECTIVES
 from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_load_options,
@@ -18,6 +17,7 @@ from toolpath_stiff.cli.arguments import (
     range_argument,
 )
 from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, progress_line, show
+from toolpath_stiff.defaults import OBJECTIVES
 
 # -- tps place --------------------------------------------------------------------------------------------------------
 
