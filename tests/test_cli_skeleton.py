@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toolpath_stiff.cli import path as path_command
+from toolpath_stiff.cli import program as program_commands
 from toolpath_stiff.cli.arguments import pose_argument, range_argument
 from toolpath_stiff.cli.main import COMMANDS, main
 from toolpath_stiff.errors import InputError
@@ -128,7 +128,7 @@ def test_interruption_is_130_and_a_bug_shows(part, monkeypatch, capsys, error):
     def fail(_args):
         raise error
 
-    monkeypatch.setattr(path_command, "run", fail)
+    monkeypatch.setitem(program_commands.COMMANDS, "path", (program_commands.path_arguments, fail))
     if isinstance(error, KeyboardInterrupt):
         assert main(["path", "part.nc"]) == 130
         assert "Traceback" not in capsys.readouterr().err
