@@ -46,7 +46,7 @@ def test_without_a_command_the_help_is_shown(capsys):
     assert "usage: tps" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("typed", "meant"), [("anlyze", "analyze"), ("analyze", "analyze"), ("pth", "path")])
+@pytest.mark.parametrize(("typed", "meant"), [("anlyze", "analyze"), ("analyse", "analyze"), ("pth", "path")])
 def test_a_mistyped_command_suggests_the_nearest(typed, meant, capsys):
     assert main([typed, "part.nc"]) == 2
     assert f"did you mean `tps {meant}`?" in capsys.readouterr().err
