@@ -388,13 +388,26 @@ def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[
     # The largest first, so that no process is left alone with one at the end.
     order = sorted(range(len(tasks)), key=lambda i: -_size(tasks[i].program))
     futures = {_submit(executor, tasks[i]): i for i in order}
+    suspects = []
     try:
         for future in as_completed(futures):
             place = futures[future]
-            yield place, _answer(tasks[place], future)
+            if _worker_died(future):
+                suspects.append(place)
+            else:
+                yield place, _answer(tasks[place], future)
+        # Dask gives a worker its next tasks early and, when it dies, cannot tell which of them it died of: each alone.
+        for place in suspects:
+            futures = {_submit(executor, tasks[place]): place}
+            yield place, _answer(tasks[place], next(as_completed(futures)))
     finally:
         for future in futures:
             future.cancel()
+
+
+def _worker_died(future: Future[Outcome]) -> bool:
+    """Whether a Dask cluster gave a call up because its workers died; by name, as Dask need not be installed."""
+    return not future.cancelled() and type(future.exception()).__name__ == "KilledWorker"
 
 
 def _submit(executor: Executor, task: Task) -> Future[Outcome]:
@@ -425,7 +438,7 @@ def _answer(task: Task, future: Future[Outcome]) -> Outcome:
     if isinstance(error, ProcessDied):
         _remove(_left_over([task], error.process))
         return _failed(task, str(error))
-    if type(error).__name__ == "KilledWorker":  # of Dask, which need not be installed
+    if _worker_died(future):
         tried, last = error.args[2] + 1, error.args[1].address
         return _failed(task, f"{tried} workers died of it, the last at {last} (out of memory? their logs may say)")
     return _failed(task, f"no process could do it: {_named(error)}")
