@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: the table of the stiffness routes and of start-up, with the bars that they must clear.
+"""`python -m benchmarks`: the table of the stiffness routes, of start-up and of many programs, with the bars that they must clear.
 
 One core: the thread pools are limited before numpy loads. Rounds interleave the methods, each ratio is taken within
 its round, the medians are printed. Absolute times depend on the machine; the ratios hardly do.
@@ -18,6 +18,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+from benchmarks.many import measure_many
 from benchmarks.routes import measure_routes
 from benchmarks.startup import measure_startup
 
@@ -56,11 +57,14 @@ def main() -> int:
         )
     route_lines, routes_pass = measure_routes(rounds)
     startup_lines, startup_pass = measure_startup(rounds)
-    text = "\n".join(["# Benchmark", "", describe_machine(), "", *route_lines, "", *startup_lines, "", BARS, ""])
+    many_lines, many_pass = measure_many(1)
+    text = "\n".join(
+        ["# Benchmark", "", describe_machine(), "", *route_lines, "", *startup_lines, "", *many_lines, "", BARS, ""]
+    )
     print(text)
     if args.out:
         Path(args.out).write_text(f"{text}\nMade by `python -m benchmarks --out {args.out}`.\n", encoding="utf-8")
-    return 0 if routes_pass and startup_pass else 1
+    return 0 if routes_pass and startup_pass and many_pass else 1
 
 
 if __name__ == "__main__":

@@ -10,10 +10,13 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
 
+import toolpath_stiff as tps
 from tests.test_cli_analyze import PART, _nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.results_folder import MANIFEST
@@ -253,4 +256,103 @@ def test_ctrl_c_leaves_whole_reports_and_nothing_else(shop):
     assert process.returncode == 130
     assert error == "tps: interrupted; no file is half-written\n"
     assert set(files_of(shop / "reports")) == {"a/part/samples.csv", "a/part/summary.json"}
+    assert {path.name for path in (shop / "reports").rglob(".*")} <= {MANIFEST}
+
+
+def test_the_command_shows_what_the_function_returns(shop, capsys):
+    seen = []
+    found = tps.analyze_many(
+        "nist", ["jobs"], "out", plots=False, step_mm=20, jobs=1, progress=lambda *told: seen.append(told)
+    )
+    before = files_of(shop / "out")
+    assert main(["analyze", "jobs", "--out", "out", *SHORT]) == 1
+    assert capsys.readouterr().out == f"jobs: 3 programs\n{found}\nwritten:\n  out/index.html\n  out/summary.csv\n"
+    assert files_of(shop / "out") == before
+    assert main(["analyze", "jobs", "--out", "out", "--json", *SHORT]) == 1
+    printed = capsys.readouterr().out
+    assert printed == found.to_json() and json.loads(printed) == found.to_dict()
+    assert seen[0] == ("1 at a time", 0, 3) and sorted(seen[1:], key=lambda one: one[1])[-1][1:] == (3, 3)
+    assert {text for text, _, _ in seen[1:]} == {"a/part.nc", "b/part.nc", "bad.nc: failed"}
+
+
+def test_the_table_of_the_function_is_the_summary(shop):
+    found = tps.analyze_many("nist", ["jobs"], "out", plots=False, step_mm=20, jobs=1, compare_with="genhexkins")
+    frame = found.to_frame()
+    with (shop / "out/summary.csv").open(encoding="utf-8") as stream:
+        heading, *rows = csv.reader(stream)
+    assert list(frame.columns) == heading and repr(found) == "<ManyAnalyses: 3 programs, 1 failed>"
+    assert frame["reason"].tolist() == [row[heading.index("reason")] for row in rows]
+    found = tps.analyze_many("nist", ["jobs"], "out", plots=False, step_mm=20, jobs=1)
+    rows = rows_of(shop / "out")
+    for _, one in found.to_frame().iterrows():
+        row = rows[one["file"]]
+        assert (one["program"], one["status"], one["report"]) == (row["program"], row["status"], row["report"])
+        if one["status"] == "done":
+            assert one["mean_N_per_mm"] == pytest.approx(float(row["mean_N_per_mm"]), abs=1e-4)
+    assert [one.file for one in found.failed] == ["jobs/bad.nc"] and not found.complete and not found.below_required
+
+
+def test_programs_may_be_given_as_objects_and_read_their_own_way(shop):
+    inch = tps.Program.from_text("G20 F40.\nG1 X1.\nX0\nM2", name="inch.nc", dialect="fanuc")
+    read = tps.Program.read("jobs/a/part.nc")
+    found = tps.analyze_many("nist", [inch, read, Path("jobs/b")], "out", plots=False, jobs=2, step_mm=20)
+    assert [(one.name, one.status) for one in found.outcomes] == [
+        ("inch.nc", "done"), ("a/part.nc", "done"), ("b/part.nc", "done"),
+    ]  # fmt: skip
+    alone = tps.analyze("nist", inch, step_mm=20)
+    assert found.to_dict()[0] == {**alone.to_dict(), "file": "inch.nc", "report": "out/inch/summary.json"}
+
+
+@pytest.mark.parametrize(
+    ("programs", "options", "words"),
+    [
+        ([], {}, "no programs"),
+        (["jobs"], {"step_mm": -1.0}, "step -1 mm"),
+        (["jobs"], {"load": "sideways"}, "sideways"),
+        (["jobs"], {"table": "xls"}, "xls"),
+        (["jobs"], {"jobs": 0}, "--jobs 0"),
+        (["jobs"], {"dialect": "klingon"}, "klingon"),
+        (["jobs"], {"compare_with": "none"}, "neither a packaged machine nor a file"),
+        ([tps.Program.from_text("G1 X1 F1", "a.nc"), tps.Program.from_text("G1 X2 F1", "a.nc")], {}, "named 'a.nc'"),
+        (["jobs", tps.Program.from_text("G1 X1 F1", "jobs/bad.nc")], {}, "'jobs/bad.nc'"),
+    ],
+)
+def test_a_wrong_argument_of_the_function_starts_nothing(shop, programs, options, words):
+    with pytest.raises(tps.InputError, match=re.escape(words)):
+        tps.analyze_many("nist", programs, "out", **options)
+    assert not (shop / "out").exists()
+
+
+def test_any_executor_will_do_and_a_broken_one_fails_what_it_was_given(shop):
+    with ThreadPoolExecutor(3) as threads:
+        found = tps.analyze_many("nist", ["jobs"], "out", executor=threads, plots=False, step_mm=20)
+    tps.analyze_many("nist", ["jobs"], "alone", jobs=1, plots=False, step_mm=20)
+    assert files_of(shop / "out") == files_of(shop / "alone")
+    again = tps.analyze_many("nist", ["jobs"], "out", executor=threads, plots=False)  # it is shut down
+    assert [one.status for one in again.outcomes] == ["failed"] * 3
+    assert again.outcomes[0].reason.startswith("jobs/a/part.nc: no process could do it: RuntimeError: ")
+    assert [one.status for one in found.outcomes] == ["done", "done", "failed"]
+
+
+def test_an_input_of_one_program_is_not_written_over_by_another_ones_report(shop):
+    """`summary.json` in the report folder of `part` is a program too, by a hard link."""
+    assert main(["analyze", "jobs/a/part.nc", "jobs/bad.nc", *SHORT]) == 1
+    (shop / "side.nc").hardlink_to(shop / "reports/part/summary.json")
+    assert main(["analyze", "jobs/a/part.nc", "side.nc", *SHORT]) == 1
+    assert "is read here and would be written over" in rows_of(shop / "reports")["jobs/a/part.nc"]["reason"]
+
+
+def test_sigterm_stops_all_as_ctrl_c_does(shop):
+    arguments = ["analyze", "jobs", "--jobs", "2", *trap(shop, 600.0), *SHORT]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "toolpath_stiff", *arguments], cwd=shop, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        while process.poll() is None and not (shop / "reached").exists():
+            time.sleep(0.05)
+        process.terminate()
+        _, error = process.communicate(timeout=120)  # the pipe is open as long as any process lives
+    finally:
+        process.kill()
+    assert process.returncode == 130 and error == "tps: interrupted; no file is half-written\n"
     assert {path.name for path in (shop / "reports").rglob(".*")} <= {MANIFEST}

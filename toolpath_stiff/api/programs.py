@@ -148,6 +148,7 @@ class Analysis(FolderResult):
             required=self._required,
             other=self.on_other,
             show_plunges=show_plunges,
+            summary=self._document,
         )
 
 

@@ -45,6 +45,7 @@ def files(
     required: float | None = None,
     other: Analysis | None = None,
     show_plunges: bool = False,
+    summary: Mapping[str, Any] | None = None,
 ) -> dict[str, Callable[[], Content]]:
     """Name of each file -> what makes it: samples, summary, pictures and page.
 
@@ -62,13 +63,15 @@ def files(
         The same program on another machine, for comparison.
     show_plunges
         The axes and colour scales of pictures and page hold the plunges beside the headline figures too.
+    summary
+        `summary_with_options` of the same, where it has been made already.
     """
     from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
 
-    summary = summary_with_options(analysis, required, other)
+    document = summary_with_options(analysis, required, other) if summary is None else summary
     contents: dict[str, Callable[[], Content]] = {
         f"samples.{table}": lambda: samples_parquet(analysis) if table == "parquet" else samples_csv(analysis),
-        "summary.json": lambda: json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        "summary.json": lambda: json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
     }
     if plots:
         from toolpath_stiff.report.analysis.page import page
@@ -80,7 +83,7 @@ def files(
             analysis, other=other, required=required, show_plunges=show_plunges
         )
         contents["report.html"] = lambda: page(
-            analysis, summary, required=required, other=other, show_plunges=show_plunges
+            analysis, document, required=required, other=other, show_plunges=show_plunges
         )
     return contents
 

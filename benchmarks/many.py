@@ -1,0 +1,63 @@
+"""CPU time of many small programs in one command, against the analyses themselves in one process."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.startup import cpu_seconds
+
+PROGRAMS = 2000
+BAR = 1.2  # times the CPU of the analyses
+THEMSELVES = """
+import sys
+from pathlib import Path
+import toolpath_stiff as tps
+machine = tps.Machine.load("nist")
+for file in sorted(Path("programs").iterdir()):
+    tps.analyze(machine, tps.Program.read(file)).save(Path("alone", file.stem), plots=False)
+"""
+
+
+def write_programs(folder: Path, count: int) -> None:
+    """Small plain programs, no two alike: a frame in two depths, about 400 mm of cuts."""
+    folder.mkdir()
+    for i in range(count):
+        x, y = 40 + i % 30, 40 + i % 23
+        frame = f"X{x}\nY{y}\nX0\nY0\n"
+        text = f"G21 G90 F1000\nG0 X0 Y0 Z5\nG1 Z-1\n{frame}G1 Z-2\n{frame}G0 Z50\nM2\n"
+        (folder / f"part{i:04}.nc").write_text(text)
+
+
+def measure_many(rounds: int, programs: int = PROGRAMS) -> tuple[list[str], bool]:
+    """Lines of the table, and whether the bar is cleared."""
+    alone = [sys.executable, "-c", THEMSELVES]
+    command = [sys.executable, "-m", "toolpath_stiff", "analyze", "programs", "--jobs", "1", "--no-plots"]
+    ratios, seconds = [], []
+    for _ in range(rounds):
+        with tempfile.TemporaryDirectory() as folder:
+            write_programs(Path(folder) / "programs", programs)
+            seconds.append(cpu_seconds(alone, folder))
+            ratios.append(cpu_seconds(command, folder) / seconds[-1])
+    ratio, clears = statistics.median(ratios), statistics.median(ratios) <= BAR
+    name = f"`tps analyze FOLDER --jobs 1 --no-plots`, {programs:,} small programs"
+    return [
+        "| command | CPU seconds of the analyses and their reports, median | times these | bar |",
+        "| --- | ---: | ---: | --- |",
+        f"| {name} | {statistics.median(seconds):.1f} | {ratio:.2f} "
+        f"| at most {BAR:g}{'' if clears else ': NOT CLEARED'} |",
+    ], clears
+
+
+def main() -> int:
+    """`python -m benchmarks.many [PROGRAMS [ROUNDS]]`."""
+    programs, rounds = (int(word) for word in [*sys.argv[1:], *("2000", "1")[len(sys.argv) - 1 :]])
+    lines, passed = measure_many(rounds, programs)
+    print("\n".join(lines))
+    return 0 if passed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
