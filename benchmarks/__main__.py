@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: the table of the stiffness routes, of start-up and of many programs, with the bars that they must clear.
+"""`python -m benchmarks`: the stiffness routes, start-up and many programs, with the bars that they must clear.
 
 One core: the thread pools are limited before numpy loads. Rounds interleave the methods, each ratio is taken within
 its round, the medians are printed. Absolute times depend on the machine; the ratios hardly do.

@@ -145,7 +145,8 @@ def analyze_many(
     machine
         What they run on; a name or a file is loaded.
     programs
-        Files, folders (every program in them and below), `Program` objects. A file that is named twice is read once.
+        Files, folders (every program in them and below), `Program` objects. A file that is named twice is read once,
+        as its `Program` object says if there is one of the same path.
     folder
         Where the reports go: a folder for each program, `index.html` and `summary.csv` beside them.
     executor
