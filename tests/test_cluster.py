@@ -100,7 +100,7 @@ def test_the_function_takes_the_executor_of_a_client(cluster, shop):
 
 
 def test_a_scheduler_that_does_not_answer_is_one_message(shop, capsys, monkeypatch):
-    monkeypatch.setattr("toolpath_stiff.cli.analyze.CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("toolpath_stiff.cli.program.CONNECT_SECONDS", 0.5)
     for address in ("tcp://127.0.0.1:1", "127.0.0.1:1", "nowhere://x", "tcp://"):
         assert main(["analyze", "jobs", "--cluster", address, *SHORT]) == 2
         captured = capsys.readouterr()

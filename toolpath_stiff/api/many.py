@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Machines = tuple[Machine, Machine | None]  # the machine, and the one to compare with
-_ALONE = threading.Lock()  # a process analyses one program at a time, however many threads an executor has
+_ALONE = threading.Lock()  # a process analyzes one program at a time, however many threads an executor has
 
 
 class ManyAnalyses(Result):
@@ -379,7 +379,7 @@ def _answers(tasks: Sequence[Task], run: Run, executor: Executor | None, jobs: i
             _remove(set(_left_over(tasks)) - before)
     elif jobs == 1:
         for place, task in enumerate(tasks):
-            yield place, analyse_task(task, run.machines)
+            yield place, analyze_task(task, run.machines)
     else:
         with ProcessPool(jobs) as pool:
             yield from _from_executor(tasks, pool)
@@ -413,7 +413,7 @@ def _worker_died(future: Future[Outcome]) -> bool:
 
 def _submit(executor: Executor, task: Task) -> Future[Outcome]:
     try:
-        return executor.submit(analyse_task, task)
+        return executor.submit(analyze_task, task)
     except RuntimeError as error:  # it has been shut down, or it broke
         failed: Future[Outcome] = Future()
         failed.set_exception(error)
@@ -472,7 +472,7 @@ def _named(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())
 
 
-def analyse_task(task: Task, machines: Machines | None = None) -> Outcome:
+def analyze_task(task: Task, machines: Machines | None = None) -> Outcome:
     """Analyse a program and write its report: what an executor is handed, in whatever process."""
     if task.version != __version__:
         return _failed(task, f"its process runs toolpath_stiff {__version__}, the caller {task.version}")
@@ -490,7 +490,7 @@ def analyse_task(task: Task, machines: Machines | None = None) -> Outcome:
     except MemoryError:
         return _failed(task, "out of memory; try fewer --jobs")
     except Exception as error:  # a defect of ours: it must not stop the other programs
-        return _failed(task, f"{_named(error)} (a defect; analyse it alone to see where)")
+        return _failed(task, f"{_named(error)} (a defect; analyze it alone to see where)")
     opens = "report.html" if task.saving["plots"] else "summary.json"
     report = (task.listed.folder / opens).as_posix()
     return Outcome(task.listed.name, task.listed.file, "", report, figures_of(found.to_dict()))
