@@ -151,8 +151,8 @@ def test_every_public_name_is_there_and_listed():
         assert getattr(tps, name) is not None
     wanted = "analyze check sample_path pose place map_stiffness case_study reduce compare diagnose update plan rewrite"
     assert {*wanted.split(), "Machine", "Program", "Measurements", "Effect"} <= set(tps.__all__)
-    with pytest.raises(AttributeError, match="analyze"):
-        tps.analyze  # noqa: B018
+    with pytest.raises(AttributeError, match="analyse"):
+        tps.analyse  # noqa: B018
 
 
 def test_a_name_that_is_imported_for_type_checkers_is_public_and_the_other_way_round():
