@@ -214,10 +214,5 @@ def adequate() -> dict[str, Any]:
     return document
 
 
-def bare() -> dict[str, Any]:
-    """As little as there can be."""
-    return {"verdict": "unexplained", "baseline": None, "candidates": [{"effect": "weak_strut"}], "pairs": None,
-            "plausible": [], "confounding": None, "detectable": None}  # fmt: skip
-
-
-ALL = {f.__name__: f for f in (identified, ambiguous, unexplained, adequate, bare)}
+# A document with parts left out is none: `DiagnosisDocument` says what each holds, and pages may rely on it.
+ALL = {f.__name__: f for f in (identified, ambiguous, unexplained, adequate)}

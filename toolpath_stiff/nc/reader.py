@@ -169,7 +169,7 @@ def parse_program(
     >>> parse_program("G21 G90\nG1 X10\n", "slot.nc")
     Traceback (most recent call last):
         ...
-    toolpath_stiff.errors.InputError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0
+    toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0
     """
     lines, place = split_lines(text, name), None if origin is None else _six(origin)
     offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools

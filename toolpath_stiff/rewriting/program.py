@@ -159,7 +159,7 @@ def check_decimals(decimals: int | None) -> None:
     >>> check_decimals(12)
     Traceback (most recent call last):
         ...
-    toolpath_stiff.errors.InputError: 12 decimals; expected 2 to 9
+    toolpath_stiff.errors.ProgramError: 12 decimals; expected 2 to 9
     """
     if decimals is not None and not FEWEST_DECIMALS <= decimals <= MOST_DECIMALS:
         raise ProgramError(f"{decimals} decimals", expected=f"{FEWEST_DECIMALS} to {MOST_DECIMALS}")
