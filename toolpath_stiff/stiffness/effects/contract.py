@@ -89,6 +89,17 @@ class Parameter:
         return f"{self.name}_{unit}" if unit else self.name
 
 
+def setup_parameter(meaning: str) -> Parameter:
+    """The parameter that names the set-up to which an effect belongs."""
+    source = "column setup of the measurements"
+    return Parameter(SETUP, "", 1.0, (0, 0), (0, 0), source=source, meaning=meaning, kind="text")
+
+
+def length_error(typical: tuple[float, float], source: str, meaning: str) -> Parameter:
+    """The parameter of an effect by which a length of the geometry is off, mm: the true one less the stated one."""
+    return Parameter("error", "mm", 1e-3, (-60.0, 60.0), typical, source=source, meaning=meaning)
+
+
 @dataclass(frozen=True)
 class LoadPath:
     """What an effect sees of n poses under load. SI, base axes.

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectError
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, about, setup_parameter
 
 ALONG = 0.999  # |d_axis| from which a reading counts as taken along that axis: 2.6 degrees, no one aligns better
 
@@ -36,16 +36,7 @@ class GaugeScale(Effect):
             meaning="1, 2, 3: readings along X, Y, Z; 0: every direction",
             kind="integer",
         ),
-        Parameter(
-            name="setup",
-            unit="",
-            si=1.0,
-            bounds=(0, 0),
-            typical=(0, 0),
-            source="column setup of the measurements",
-            meaning='name of the set-up; "": every one',
-            kind="text",
-        ),
+        setup_parameter('name of the set-up; "": every one'),
         Parameter(
             name="scale",
             unit="%",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.effects.contract import Effect, Parameter, about
+from toolpath_stiff.stiffness.effects.contract import Effect, about, length_error
 
 
 class PlatformRadiusError(Effect):
@@ -25,11 +25,7 @@ class PlatformRadiusError(Effect):
     source = "geometry"
     unknown_to_control = True
     parameters = (
-        Parameter(
-            name="error",
-            unit="mm",
-            si=1e-3,
-            bounds=(-60.0, 60.0),
+        length_error(
             typical=(-3.0, 3.0),
             source="engineering experience, no source",
             meaning="true radius less that of the machine file",

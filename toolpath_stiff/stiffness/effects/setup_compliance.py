@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, sizes_in_words
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter, setup_parameter, sizes_in_words
 
 
 class SetupCompliance(Effect):
@@ -21,16 +21,7 @@ class SetupCompliance(Effect):
     source = "springs in series, base axes; the paper measured its upper plane on a riser (Figure 6)"
     needs = ("setup",)
     parameters = (
-        Parameter(
-            name="setup",
-            unit="",
-            si=1.0,
-            bounds=(0, 0),
-            typical=(0, 0),
-            source="column setup of the measurements",
-            meaning="name of the set-up",
-            kind="text",
-        ),
+        setup_parameter("name of the set-up"),
         *(
             Parameter(
                 name=axis,

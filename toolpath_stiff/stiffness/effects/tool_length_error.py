@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.effects.contract import Effect, Parameter, about
+from toolpath_stiff.stiffness.effects.contract import Effect, about, length_error
 
 
 class ToolLengthError(Effect):
@@ -21,11 +21,7 @@ class ToolLengthError(Effect):
     source = "geometry"
     unknown_to_control = True
     parameters = (
-        Parameter(
-            name="error",
-            unit="mm",
-            si=1e-3,
-            bounds=(-60.0, 60.0),
+        length_error(
             typical=(-10.0, 10.0),
             source="engineering experience, no source: the tool of the neighbouring pocket",
             meaning="true tool length less the entered one",
