@@ -263,3 +263,12 @@ def test_a_diagnosis_is_not_made_again_for_the_plan(monkeypatch):
     plain = tps.plan("nist", data, noise_percent=10)
     monkeypatch.setattr(planning, "judge", None, raising=True)
     assert tps.plan("nist", data, noise_percent=10, diagnosis=found).to_dict() == plain.to_dict()
+
+
+def test_place_names_the_program_that_it_wrote_among_the_files(here, capsys):
+    options = "--x -60:60 --y 0 --z 700:800 --rotate 0 --step 10 --points 5 --no-plots --out out"
+    assert main(["place", "slot.nc", *options.split(), "--write", "placed.nc"]) == 0
+    written = capsys.readouterr().out.split("written:\n")[1].split()
+    assert written == ["out/placements.csv", "out/placement.json", "placed.nc"]
+    again = tps.place("nist", "slot.nc", **PLACE, write="placed.nc")
+    assert Path("placed.nc").read_bytes() == again.program_bytes

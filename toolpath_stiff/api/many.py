@@ -21,6 +21,7 @@ from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import TABLES, analyze, path_options
 from toolpath_stiff.api.results import Progress, Result, one_of
+from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessDied, ProcessPool, job_count
 from toolpath_stiff.report.batch import files, names, text
@@ -127,9 +128,9 @@ def analyze_many(
     show_plunges: bool = False,
     replace: bool = False,
     origin_mm_deg: Sequence[float] | None = None,
-    load: str = "tangential",
+    load: str = LOAD,
     step_mm: float = 1.0,
-    force_N: float = 1000.0,
+    force_N: float = FORCE,
     partial: bool = False,
     require_N_per_mm: float | None = None,
     compare_with: Machine | str | Path | None = None,

@@ -20,7 +20,7 @@ from toolpath_stiff.api.inputs import (
 )
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
-from toolpath_stiff.defaults import OBJECTIVES
+from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
@@ -145,9 +145,9 @@ def place(
     pick: int | None = None,
     earlier: Placement | str | Path | Mapping[str, Any] | None = None,
     origin_mm_deg: Sequence[float] | None = None,
-    load: str = "tangential",
+    load: str = LOAD,
     step_mm: float = 1.0,
-    force_N: float = 1000.0,
+    force_N: float = FORCE,
     write: str | Path | None = None,
     decimals: int | None = None,
     linearise_mm: float | None = None,

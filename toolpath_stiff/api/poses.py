@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from toolpath_stiff.api.inputs import FARTHEST_MM, STRONGEST_N, positive, whole
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import FolderResult, Progress, Result, counter
+from toolpath_stiff.defaults import FORCE
 from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import command_line
@@ -156,7 +157,7 @@ def pose(
     machine: Machine | str | Path,
     pose_mm_deg: ArrayLike,
     *,
-    force_N: float = 1000.0,
+    force_N: float = FORCE,
 ) -> PoseStiffness:
     """Stiffness at a pose, or at many.
 
@@ -270,7 +271,7 @@ def map_stiffness(
     load: str = "radial",
     tilt_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
     points: int = 61,
-    force_N: float = 1000.0,
+    force_N: float = FORCE,
     progress: Progress | None = None,
 ) -> StiffnessMap:
     """Stiffness over one or several horizontal planes.

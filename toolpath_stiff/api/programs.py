@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from toolpath_stiff.api.inputs import LONGEST_STEP_MM, STRONGEST_N, Program, pose_si, positive, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
+from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.units import (
@@ -157,9 +158,9 @@ def analyze(
     program: Program | str | Path,
     *,
     origin_mm_deg: Sequence[float] | None = None,
-    load: str = "tangential",
+    load: str = LOAD,
     step_mm: float = 1.0,
-    force_N: float = 1000.0,
+    force_N: float = FORCE,
     partial: bool = False,
     require_N_per_mm: float | None = None,
     compare_with: Machine | str | Path | None = None,

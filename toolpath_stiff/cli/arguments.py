@@ -9,7 +9,8 @@ import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM
+from toolpath_stiff.defaults import LOAD, MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import ShopPose
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.inputs import Program
     from toolpath_stiff.api.machines import Machine
 
-FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 ALL_BLOCKS = "all"
 LOADS_HELP = "tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ"
@@ -64,9 +64,9 @@ def pose_argument(text: str) -> ShopPose:
         raise argparse.ArgumentTypeError(f"{text!r}: expected X,Y,Z or X,Y,Z,A,B,C in mm and degrees")
     x, y, z, *angles = (finite_number(part) for part in parts)
     a, b, c = angles or (0.0, 0.0, 0.0)
-    if max(abs(x), abs(y), abs(z)) > FARTHEST_MM or max(abs(a), abs(b), abs(c)) > 360.0:
+    if max(abs(x), abs(y), abs(z)) > FARTHEST_MM or max(abs(a), abs(b), abs(c)) > FARTHEST_DEG:
         raise argparse.ArgumentTypeError(
-            f"{text!r}: expected positions within +-{FARTHEST_MM:g} mm and angles within +-360 degrees"
+            f"{text!r}: expected positions within +-{FARTHEST_MM:g} mm and angles within +-{FARTHEST_DEG:g} degrees"
         )
     return (x, y, z, a, b, c)
 
@@ -222,7 +222,7 @@ def add_load_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--load",
         type=load_argument,
-        default="tangential",
+        default=LOAD,
         metavar="DIRECTION",
         help=f"{LOADS_HELP} (default: tangential)",
     )

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolpath_stiff.api.measuring import COSTS
 from toolpath_stiff.cli.arguments import (
     add_condition_options,
     add_json_option,
@@ -336,7 +337,6 @@ examples:
 
 Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png.
 """
-COSTS = ("reading", "pose", "tool", "setup")
 
 
 def plan_arguments(parser: argparse.ArgumentParser) -> None:

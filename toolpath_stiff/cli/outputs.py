@@ -13,10 +13,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import Content, check_outputs, keep_old
+from toolpath_stiff.files import Content, check_outputs, keep_old, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 
 if TYPE_CHECKING:
@@ -98,9 +99,16 @@ class Destination:
         return write_folder(self.folder, contents, command=self.command, rules=self.rules)
 
 
-def show(args: argparse.Namespace, result: FolderResult, target: Destination, **options: Any) -> int:
-    """Save a result, print it as text or as JSON; the exit code of success."""
+def show(
+    args: argparse.Namespace,
+    result: FolderResult,
+    target: Destination,
+    also: Mapping[str, Content] = MappingProxyType({}),
+    **options: Any,
+) -> int:
+    """Save a result, then the files `also`, print it as text or as JSON; the exit code of success."""
     written = result.save(target.folder, plots=not args.no_plots, rules=target.rules, **options)
+    written += [write_atomically(file, content) for file, content in also.items()]
     if args.json:
         sys.stdout.write(result.to_json())
     else:

@@ -149,7 +149,6 @@ def _keep_out(text: str) -> tuple[str, list[float]]:
 def place(args: argparse.Namespace) -> int:
     """Search, or take another point of an earlier search; write the files."""
     from toolpath_stiff.api.placements import KeepOut, place
-    from toolpath_stiff.files import write_atomically
     from toolpath_stiff.report.place import names
 
     replaced = check_written(args, [args.write])
@@ -183,9 +182,7 @@ def place(args: argparse.Namespace) -> int:
             progress=progress,
         )
     keep(replaced, quiet=args.json)
-    if args.write:
-        write_atomically(args.write, found.program_bytes)
-    return show(args, found, target)
+    return show(args, found, target, {args.write: found.program_bytes} if args.write else {})
 
 
 # -- tps case-study ---------------------------------------------------------------------------------------------------
