@@ -20,6 +20,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.stiffness import closed_form, exact
+from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 
@@ -118,6 +119,7 @@ def _fast(
         compliance, good = compiled.tip_compliance(kernel, position, rotation)
     else:
         compliance, good = closed_form.tip_compliance(kernel, position, rotation)
+    good &= guard.is_compliance(compliance)  # what is none goes the exact route, which says what is wrong
     if not good.all():
         bad = ~good
         turn = None if rotation is None else rotation[bad]
