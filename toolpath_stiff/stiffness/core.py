@@ -7,7 +7,9 @@ pivots, by themselves.
 The softest and the stiffest direction of the tip are eigenvectors of the compliance tensor, unless the compliance
 depends on the load. With gaps and contacts there is no tensor: the compliance along a direction is the secant one
 under the load in that direction, and its extremes are searched on the half sphere. Gaps give it kinks, where
-derivatives say nothing, so the search compares values alone.
+derivatives say nothing, so the search compares values alone. Where a strut's force changes its sign its gap costs
+least: the stiffest direction tends to lie in such a plane, or where two of them meet, and that valley is too narrow for
+steps in any direction. So the stiffest one is looked for in the planes as well, by steps that stay in them.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
 CLIMBS = 3  # from so many of the best
 FIRST_STEP, LAST_STEP = 0.13, 1e-4  # rad; half the distance of neighbours; the compliance is then certain to 1e-6
 AROUND = 6  # directions tried about the best one at each step
+IN_PLANE = 12  # over half a circle of the directions in which one strut is idle
 
 
 def is_closed_form(model: StiffnessModel) -> bool:
@@ -196,7 +199,8 @@ def extreme_directions(
             return exact.compliance_along(model, path.take(poses), directions)
 
         normals = None if across is None else across[rows]
-        result[rows] = searched_directions(along, exact.tip_compliance(model, path), softest, normals)
+        idle = None if softest else exact.strut_forces(model, path)
+        result[rows] = searched_directions(along, exact.tip_compliance(model, path), softest, normals, idle)
     return result
 
 
@@ -209,7 +213,11 @@ def half_sphere(count: int) -> FloatArray:
 
 
 def searched_directions(
-    along: Along, tensor: FloatArray, softest: bool = True, across: FloatArray | None = None
+    along: Along,
+    tensor: FloatArray,
+    softest: bool = True,
+    across: FloatArray | None = None,
+    idle: FloatArray | None = None,
 ) -> FloatArray:
     """Directions in which the tip gives way most, or least.
 
@@ -223,6 +231,9 @@ def searched_directions(
         The softest, else the stiffest direction.
     across
         (n, 3) unit vectors; only directions across these are looked at.
+    idle
+        (n, 6, 3) N per N, the forces of the struts under loads along the axes: across its row a strut is idle. Where
+        kinks in these planes may hold the extreme.
 
     Returns
     -------
@@ -237,6 +248,9 @@ def searched_directions(
 
     spread = np.broadcast_to(half_sphere(DIRECTIONS), (n, DIRECTIONS, 3))
     tried = np.concatenate([spread, np.swapaxes(np.linalg.eigh(tensor)[1], 1, 2)], axis=1)
+    if idle is not None:
+        idle = idle / np.linalg.norm(idle, axis=-1, keepdims=True)
+        tried = np.concatenate([tried, _in_planes(idle)], axis=1)
     tried = tried if across is None else _flattened(tried, across)
     found = value(tried)
     best = np.argsort(-found, axis=1, kind="stable")[:, :CLIMBS]
@@ -245,8 +259,9 @@ def searched_directions(
     step = np.full(reached.shape, FIRST_STEP)
     while (step > LAST_STEP).any():
         around = _around(directions, step)
+        around = around if idle is None else np.concatenate([around, _turned_about(directions, idle, step)], axis=2)
         around = around if across is None else _flattened(around, across)
-        values = value(around.reshape(n, -1, 3)).reshape(n, CLIMBS, AROUND)
+        values = value(around.reshape(n, -1, 3)).reshape(n, CLIMBS, -1)
         better = values.argmax(axis=-1)
         top = np.take_along_axis(values, better[..., None], axis=-1)[..., 0]
         risen = top > reached
@@ -267,6 +282,28 @@ def _around(directions: FloatArray, step: FloatArray) -> FloatArray:
     angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
     side = one[..., None, :] * np.cos(angle)[:, None] + two[..., None, :] * np.sin(angle)[:, None]
     turned = directions[..., None, :] * np.cos(step)[..., None, None] + side * np.sin(step)[..., None, None]
+    return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+
+
+def _in_planes(normal: FloatArray) -> FloatArray:
+    """(n, m, 3) unit vectors spread over the planes across unit vectors (n, 6, 3), and where two planes meet."""
+    first, second = np.triu_indices(6, 1)
+    meeting = np.cross(normal[:, first], normal[:, second])
+    length = np.linalg.norm(meeting, axis=-1, keepdims=True)
+    meeting = np.where(length > 1e-6, meeting / np.maximum(length, 1e-6), normal[:, first])
+    one = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=-1)])
+    one /= np.linalg.norm(one, axis=-1, keepdims=True)
+    angle = np.pi * np.arange(IN_PLANE)[:, None] / IN_PLANE
+    circle = one[..., None, :] * np.cos(angle) + np.cross(normal, one)[..., None, :] * np.sin(angle)
+    return np.concatenate([meeting, circle.reshape(len(normal), -1, 3)], axis=1)
+
+
+def _turned_about(directions: FloatArray, axis: FloatArray, step: FloatArray) -> FloatArray:
+    """(n, c, 12, 3) directions (n, c, 3) turned to and fro about each axis (n, 6, 3) by `step` (n, c)."""
+    axis = np.concatenate([axis, -axis], axis=1)[:, None]
+    one, angle = directions[..., None, :], step[..., None, None]
+    along = (axis * one).sum(axis=-1, keepdims=True) * axis
+    turned = along + (one - along) * np.cos(angle) + np.cross(axis, one) * np.sin(angle)
     return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
 
 

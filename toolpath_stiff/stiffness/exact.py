@@ -311,10 +311,19 @@ def wrench_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
 
 def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n, 3, 3) m/N, displacements of the tip under forces at it; load-dependent effects are not in it."""
-    wrenches = np.zeros((len(path), 6, 3))
-    wrenches[:, :3] = np.eye(3)
-    twists, _ = respond(path, assemble_links(model, path), wrenches)
+    twists, _ = respond(path, assemble_links(model, path), _unit_forces(len(path)))
     return guard.possible(_acting(model), path, twists[:, :3])
+
+
+def strut_forces(model: StiffnessModel, path: LoadPath) -> FloatArray:
+    """(n, 6, 3) N per N, forces in the struts under forces at the tip; load-dependent effects are not in it."""
+    return respond(path, assemble_links(model, path), _unit_forces(len(path)))[1]
+
+
+def _unit_forces(n: int) -> FloatArray:
+    wrenches = np.zeros((n, 6, 3))
+    wrenches[:, :3] = np.eye(3)
+    return wrenches
 
 
 def _acting(model: StiffnessModel) -> list[Effect]:

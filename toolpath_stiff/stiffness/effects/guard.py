@@ -161,9 +161,9 @@ def is_compliance(tensor: FloatArray) -> BoolArray:
             return np.asarray((tensor[:, 0, 0] > 0.0) & (tensor[:, 0, 0] < np.inf))
         if size != 3:
             return _has_positive_eigenvalues(tensor)
-        (a, d, e), (_, b, f), (_, _, c) = (tensor[:, i].T for i in range(3))
+        a, d, e, left_d, b, f, left_e, left_f, c = np.ascontiguousarray(tensor.reshape(-1, 9).T)
         minor = a * b - d * d
-        apart = np.abs(d - tensor[:, 1, 0]) + np.abs(e - tensor[:, 2, 0]) + np.abs(f - tensor[:, 2, 1])
+        apart = np.abs(d - left_d) + np.abs(e - left_e) + np.abs(f - left_f)
         trace = a + b + c
         # Sylvester: all leading minors above zero. Nothing that is not finite passes.
         determinant = minor * c - a * f * f - b * e * e + 2.0 * d * e * f
