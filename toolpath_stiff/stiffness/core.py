@@ -35,7 +35,7 @@ ROUTES = ("exact", "closed_form", "compiled")
 Along = Callable[[FloatArray, IntArray], FloatArray]
 
 DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
-CLIMBS = 3  # from so many of the best
+CLIMBS, CLIMBS_IN_PLANES = 3, 6  # from so many of the best; kinks make more basins
 FIRST_STEP, LAST_STEP = 0.13, 1e-4  # rad; half the distance of neighbours; the compliance is then certain to 1e-6
 AROUND = 6  # directions tried about the best one at each step
 IN_PLANE = 12  # over half a circle of the directions in which one strut is idle
@@ -240,6 +240,7 @@ def searched_directions(
     (n, 3) unit vectors whose largest component is positive.
     """
     n, sign = len(tensor), 1.0 if softest else -1.0
+    climbs = CLIMBS if idle is None else CLIMBS_IN_PLANES
 
     def value(directions: FloatArray) -> FloatArray:
         """(n, m) of directions (n, m, 3), to be made large."""
@@ -253,7 +254,7 @@ def searched_directions(
         tried = np.concatenate([tried, _in_planes(idle)], axis=1)
     tried = tried if across is None else _flattened(tried, across)
     found = value(tried)
-    best = np.argsort(-found, axis=1, kind="stable")[:, :CLIMBS]
+    best = np.argsort(-found, axis=1, kind="stable")[:, :climbs]
     directions = np.take_along_axis(tried, best[..., None], axis=1)
     reached = np.take_along_axis(found, best, axis=1)
     step = np.full(reached.shape, FIRST_STEP)
@@ -261,7 +262,7 @@ def searched_directions(
         around = _around(directions, step)
         around = around if idle is None else np.concatenate([around, _turned_about(directions, idle, step)], axis=2)
         around = around if across is None else _flattened(around, across)
-        values = value(around.reshape(n, -1, 3)).reshape(n, CLIMBS, -1)
+        values = value(around.reshape(n, -1, 3)).reshape(n, climbs, -1)
         better = values.argmax(axis=-1)
         top = np.take_along_axis(values, better[..., None], axis=-1)[..., 0]
         risen = top > reached
