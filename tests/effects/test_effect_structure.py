@@ -17,6 +17,7 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
 from toolpath_stiff.stiffness.model import build_model, load_path
+from toolpath_stiff.updating.measurements import read_measurements
 
 NIST_TEXT = (resources.files("toolpath_stiff") / "data" / "machines" / "nist.toml").read_text("utf-8")
 
@@ -76,7 +77,7 @@ def test_frame_as_assembled_nodes_on_springs(vertex):
 
 def test_the_rigid_tangential_direction_costs_what_the_catalogue_says():
     """Energy of the vertices' tangential forces against that of the struts; the largest ratio is an eigenvalue."""
-    position, direction, _ = nist_readings()
+    table = read_measurements("nist-table1", nist())
     square = np.array([[x, y, z] for x in (-0.3, 0.0, 0.3) for y in (-0.3, 0.0, 0.3) for z in (0.8, 1.27)])
     around = np.cross([0.0, 0.0, 1.0], OUTWARD)
 
@@ -90,7 +91,7 @@ def test_the_rigid_tangential_direction_costs_what_the_catalogue_says():
         energy = forces / nist().strut_law.stiffness(struts.lengths)[..., None]
         return np.swapaxes(forces, 1, 2) @ energy, 3e-9 * np.swapaxes(tangential, 1, 2) @ tangential
 
-    own, more = (np.einsum("ni,nij,nj->n", direction, form, direction) for form in forms(position))
+    own, more = (np.einsum("ni,nij,nj->n", table.direction, form, table.direction) for form in forms(table.position))
     assert 100.0 * np.sqrt(np.mean((more / own) ** 2)) == pytest.approx(0.08, abs=0.005)
     worst = np.array([eigh(b, a, eigvals_only=True)[-1] for a, b in zip(*forms(square), strict=True)])
     assert 100.0 * worst[square[:, 2] == 0.8].max() == pytest.approx(0.38, abs=0.005)
