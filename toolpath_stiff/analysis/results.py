@@ -280,8 +280,6 @@ def assumptions(analysis: Analysis) -> list[str]:
 
 def summarise(analysis: Analysis) -> dict[str, Any]:
     """The figures of `summary.json`, in the shop's units."""
-    from toolpath_stiff import __version__
-
     samples = analysis.samples
     places = weakest_places(analysis)
     cutting = samples.cutting & analysis.at.reachable
@@ -319,7 +317,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
         ],
         "assumptions": assumptions(analysis),
         "warnings": list(analysis.warnings),
-        "version": __version__,
+        "version": defaults.VERSION,
     }
 
 

@@ -504,7 +504,7 @@ def case_study(
     <CaseStudy: nist, 3 of 3 conclusions of the paper hold>
     >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
     >>> tps.case_study("nist", slot, {"left": (-200, 0, 800), "right": (200, 0, 800, 90)}, step_mm=10)
-    <CaseStudy: slot.nc on nist, 0 of 1 conclusion of the paper holds>
+    <CaseStudy: slot.nc on nist, 1 of 1 conclusion of the paper holds>
     """
     from toolpath_stiff.placement.case_study import run_case_study
 
@@ -527,7 +527,7 @@ def _regions(
 
     if given is None:
         return None, ()
-    files = (str(given),) if isinstance(given, str | Path) else ()
+    files: tuple[str, ...] = (str(given),) if isinstance(given, str | Path) else ()
     named: Mapping[str, Sequence[float]] = read_regions(files[0]) if isinstance(given, str | Path) else given
     if not 0 < len(named) <= MOST_REGIONS:
         raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}", file=files[0] if files else "")
