@@ -6,11 +6,14 @@ import json
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import toolpath_stiff as tps
+from toolpath_stiff.analysis import analyze
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.placement.case_study import LOW_MM, run_case_study
+from toolpath_stiff.placement.case_study import LOW_MM, case_study_program, origin_of, run_case_study
 from toolpath_stiff.stiffness.model import build_model
 
 ROOT = Path(__file__).parent.parent
@@ -85,3 +88,88 @@ def test_pictures_are_drawn(tmp_path):
 def test_program_stands_in_both_places():
     packaged = resources.files("toolpath_stiff") / "data" / "programs" / "case_study.nc"
     assert packaged.read_bytes() == (ROOT / "programs" / "case_study.nc").read_bytes()
+
+
+SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n"
+REGIONS = {"low": (100, 0, 600, 30), "high": (100, 0, 900, 30), "beside": (-100, 0, 600), "alone": (0, 0, 700)}
+
+
+@pytest.fixture
+def slot(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("slot.nc").write_text(SLOT, encoding="ascii")
+    return tps.case_study("nist", "slot.nc", REGIONS, step_mm=10)
+
+
+def test_own_path_in_own_regions_has_the_figures_of_analyze(slot):
+    rows = {row["region"]: row for row in slot.to_dict()["regions"]}
+    assert list(rows) == list(REGIONS)
+    for name, (x, y, z, *turn) in REGIONS.items():
+        alone = tps.analyze("nist", "slot.nc", origin_mm_deg=(x, y, z, 0, 0, *(turn or [0])), step_mm=10)
+        assert rows[name]["mean_N_per_mm"] == pytest.approx(alone.mean_N_per_mm, abs=1e-3)
+        assert rows[name]["range_N_per_mm"] == pytest.approx(alone.range_N_per_mm, abs=1e-3)
+
+
+def test_conclusions_on_own_regions_compare_what_can_be_compared(slot):
+    mean, _, same = slot.to_dict()["conclusions"]
+    assert mean["holds"] and mean["numbers"].startswith("region low to high: ") and ";" not in mean["numbers"]
+    assert same["numbers"].startswith("regions low and beside: ")
+    limits, heights = slot.to_dict()["limits_of_the_conclusions"], slot.to_dict()["heights"]
+    assert {600.0, limits["largest_mean_at_z_mm"]} <= {row["z_mm"] for row in heights}
+    assert "slot.nc in 4 regions" in str(slot) and "Non-planar" not in str(slot)
+    one = tps.case_study("nist", "slot.nc", {"a": (0, 0, 800)}, step_mm=20)
+    assert [found["holds"] for found in one.to_dict()["conclusions"]] == [None, None, None]
+    assert "not tested. no two regions" in str(one) and "0 of 0" in repr(one)
+
+
+def test_regions_by_option_by_file_and_from_python_are_the_same(slot, capsys):
+    options = [f"--region={name}:{','.join(map(str, at))}" for name, at in REGIONS.items()]
+    assert main(["case-study", "slot.nc", *options, "--step", "10", "--out", "one", "--json"]) == 0
+    shown = capsys.readouterr().out
+    assert json.loads(shown) == slot.to_dict()
+    command = ["case-study", "slot.nc", "--regions", "one/case_study.csv", "--step", "10", "--json", "--no-plots"]
+    assert main(command) == 0
+    assert capsys.readouterr().out == shown
+    assert {file.name for file in Path("one").iterdir()} >= {"regions.png", "heights.png", "case_study.md"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--region", "a:0,0,5000"], "region a: "),
+        (["--region", "a:0,0,800", "--region", "a:0,0,700"], "a name is given twice"),
+        (["--region", "a:0,0"], "expected NAME:X,Y,Z"),
+        (["--region", "a:0,0,1e9"], "region a"),
+        (["--regions", "none.csv"], "none.csv"),
+        (["--regions", "two.csv"], "two.csv:3: region a stands twice"),
+        (["--regions", "short.csv"], "short.csv:1: column z_mm is missing"),
+        (["--regions", "word.csv"], "word.csv:2: "),
+        (["--regions", "empty.csv"], "empty.csv"),
+    ],
+)
+def test_regions_that_are_refused(slot, capsys, arguments, told):
+    Path("two.csv").write_text("region,x_mm,y_mm,z_mm\na,0,0,800\na,0,0,900\n")
+    Path("short.csv").write_text("region,x_mm,y_mm\na,0,0\n")
+    Path("word.csv").write_text("region,x_mm,y_mm,z_mm\na,0,zero,800\n")
+    Path("empty.csv").write_text("region,x_mm,y_mm,z_mm\n")
+    try:
+        code = main(["case-study", "slot.nc", *arguments, "--step", "10", "--no-plots", "--out", "o"])
+    except SystemExit as stopped:
+        code = stopped.code
+    error = capsys.readouterr().err
+    assert code == 2 and told in error and "Traceback" not in error
+    assert not Path("o").exists()
+
+
+def test_the_page_says_how_far_the_papers_conclusions_go():
+    """Means of 18 places about the axis, turned and not, by whole analyses: docs/case_study.md prints these figures."""
+    model, program = build_model(load_machine("nist")), case_study_program()
+    page = (ROOT / "docs" / "case_study.md").read_text("utf-8")
+    for z in (400, 1200):
+        places = [(x, y, z, turn) for x in (-300, 0, 300) for y in (-300, 0, 300) for turn in (0, 45)]
+        found = [analyze(model, program, origin=origin_of(*at), step=1e-2).summary() for at in places]
+        means, ranges = (np.array([one[f"{what}_N_per_mm"] for one in found]) for what in ("mean", "range"))
+        spread = f"{100 * (means.max() / means.min() - 1):.1f} %"
+        assert spread in page, spread
+        for value in (ranges.min(), ranges.max()):
+            assert f"{round(value, -2):,.0f}".replace(",", " ") in page, value

@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from toolpath_stiff.defaults import VERSION as _VERSION
+
 if TYPE_CHECKING:
     from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.api.effects import EffectCheck as EffectCheck
@@ -77,7 +79,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.stiffness.effects.contract import Effect as Effect
     from toolpath_stiff.stiffness.effects.contract import Parameter as Parameter
 
-__version__ = "0.2.0"
+__version__ = _VERSION
 
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {

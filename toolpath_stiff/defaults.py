@@ -6,6 +6,8 @@ import math
 
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, rad_from_deg
 
+VERSION = "0.2.0"  # of the package; pyproject.toml reads it from this text
+
 MACHINE = "nist"  # name of a packaged machine: the paper's
 LOAD = "tangential"  # direction of the load
 FORCE = 1000.0  # N at the tool tip, assumed wherever neither the user nor the data say at which load

@@ -6,6 +6,7 @@ from importlib import resources
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from tests.effects.cases import model_with, readings
 from tests.stiffness.cases import nist, orthogonal_hexapod, random_poses
@@ -16,6 +17,7 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
 from toolpath_stiff.stiffness.model import build_model, load_path
+from toolpath_stiff.updating.measurements import read_measurements
 
 NIST_TEXT = (resources.files("toolpath_stiff") / "data" / "machines" / "nist.toml").read_text("utf-8")
 
@@ -71,6 +73,29 @@ def test_frame_as_assembled_nodes_on_springs(vertex):
     found = tip_compliance(model, position, rotation)
     # 1e18 N/m holds a vertex to 1e-11 of the struts; the assembly's condition number costs the rest.
     assert np.abs(found - expected).max() < 1e-8 * np.abs(found).max()
+
+
+def test_the_rigid_tangential_direction_costs_what_the_catalogue_says():
+    """Energy of the vertices' tangential forces against that of the struts; the largest ratio is an eigenvalue."""
+    table = read_measurements("nist-table1", nist())
+    square = np.array([[x, y, z] for x in (-0.3, 0.0, 0.3) for y in (-0.3, 0.0, 0.3) for z in (0.8, 1.27)])
+    around = np.cross([0.0, 0.0, 1.0], OUTWARD)
+
+    def forms(at):
+        """(n, 3, 3) compliance of the struts alone, and what 3 nm/N at three vertices adds."""
+        struts = solve_struts(nist(), at)
+        forces = np.linalg.inv(np.swapaxes(struts.jacobian, 1, 2))[:, :, :3]
+        tangential = np.zeros((len(at), 3, 3))
+        for strut, vertex in enumerate(VERTEX_OF):
+            tangential[:, vertex] += (struts.directions[:, strut] @ around[vertex])[:, None] * forces[:, strut]
+        energy = forces / nist().strut_law.stiffness(struts.lengths)[..., None]
+        return np.swapaxes(forces, 1, 2) @ energy, 3e-9 * np.swapaxes(tangential, 1, 2) @ tangential
+
+    own, more = (np.einsum("ni,nij,nj->n", table.direction, form, table.direction) for form in forms(table.position))
+    assert 100.0 * np.sqrt(np.mean((more / own) ** 2)) == pytest.approx(0.08, abs=0.005)
+    worst = np.array([eigh(b, a, eigvals_only=True)[-1] for a, b in zip(*forms(square), strict=True)])
+    assert 100.0 * worst[square[:, 2] == 0.8].max() == pytest.approx(0.38, abs=0.005)
+    assert 100.0 * worst.max() == pytest.approx(0.61, abs=0.005)
 
 
 def test_table_as_a_rigid_body_on_springs_at_the_origin():

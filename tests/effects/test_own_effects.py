@@ -86,7 +86,7 @@ def test_a_fault_at_run_time_names_file_line_and_pose(tmp_path, changes, line, t
 
 def test_an_effect_that_takes_more_than_there_is_names_effect_and_pose(tmp_path):
     file = own(tmp_path, (BODY, "return np.full((len(path), 6), -1.0)"))
-    with pytest.raises(InputError, match=r"with effect mine the tip has no positive stiffness at X0 Y0 Z800 mm"):
+    with pytest.raises(InputError, match=r"with effect mine strut \d has no positive stiffness at X0 Y0 Z800 mm"):
         use(file)
     overflow = own(tmp_path, (BODY, "return np.full((len(path), 6), 1.7e308)"))
     with pytest.raises(InputError, match="effect mine the tip has no positive stiffness"):

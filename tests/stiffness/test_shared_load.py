@@ -186,20 +186,20 @@ def test_forces_that_do_not_settle_are_an_error_that_names_effect_and_pose():
             ActiveEffect(Slack(), {"size": 1e-6}),
         ],
     )
-    position, _ = random_poses(200, 2)
+    position, _ = random_poses(4, 2)
     with pytest.raises(InputError, match=r"do not settle at X.* under 400 N with slack"):
-        core.compliance_along(model, np.tile(unit([1, 2, 3]), (200, 1)), position, force=400.0)
+        core.compliance_along(model, np.tile(unit([1, 2, 3]), (4, 1)), position, force=400.0)
 
 
 @pytest.mark.parametrize("kappa", [0.0, 1e5])
 def test_no_direction_is_softer_than_the_softest_or_stiffer_than_the_stiffest(kappa):
     model = model_of(kappa, 4e-6, 10e-9)
     rng = np.random.default_rng(8)
-    count = 1500
-    found = evaluate_poses(model, POSITION[:5], roll_pitch_yaw(ROTATION[:5]), force=500.0)
-    linear = evaluate_poses(model_of(kappa), POSITION[:5], roll_pitch_yaw(ROTATION[:5]), force=500.0)
+    count = 800
+    found = evaluate_poses(model, POSITION[:3], roll_pitch_yaw(ROTATION[:3]), force=500.0)
+    linear = evaluate_poses(model_of(kappa), POSITION[:3], roll_pitch_yaw(ROTATION[:3]), force=500.0)
     beyond = []
-    for i in range(5):
+    for i in range(3):
         directions = rng.normal(size=(count, 3))
         directions /= np.linalg.norm(directions, axis=1)[:, None]
         place = np.repeat(POSITION[i : i + 1], count, axis=0), np.repeat(ROTATION[i : i + 1], count, axis=0)
@@ -210,6 +210,50 @@ def test_no_direction_is_softer_than_the_softest_or_stiffer_than_the_stiffest(ka
         beyond.append(by_tensor / found.softest_stiffness[i] - 1.0)
         assert by_tensor >= found.softest_stiffness[i] * (1.0 - 1e-9)
     assert max(beyond) > 1e-3  # the eigenvector of the linear tensor was not the softest direction
+
+
+def pinned(machine, position, rotation, directions, force, gap, contact):
+    """(m,) N/m of six pinned bars: forces by statics, each bar's own stretch, and the work that they do."""
+    arms = machine.platform_joints @ rotation.T
+    spans = position + arms - machine.frame_joints
+    length = np.linalg.norm(spans, axis=1)
+    axis, law = spans / length[:, None], machine.strut_law
+    rate = (law.stiffness_2 - law.stiffness_1) / (law.length_2 - law.length_1)
+    screws = np.hstack([axis, np.cross(arms, axis)])
+    pull = np.linalg.solve(screws.T, force * np.hstack([directions, np.zeros_like(directions)]).T).T
+    size = np.abs(pull)
+    stretch = size / (law.stiffness_1 + rate * (length - law.length_1)) + gap * (size > 0.0)
+    stretch += contact * 500.0 ** (1.0 / 3.0) * size ** (2.0 / 3.0)
+    return force**2 / (size * stretch).sum(axis=1)
+
+
+@pytest.mark.parametrize(("gap", "contact", "force"), [(4e-6, 10e-9, 500.0), (40e-6, 0.0, 500.0), (0.0, 50e-9, 100.0)])
+def test_softest_and_stiffest_are_the_extremes_of_bars_assembled_here(gap, contact, force):
+    """Over 20,000 directions; the stiffest ones lie in kinks too narrow for those, and so may be stiffer still."""
+    directions = core.half_sphere(20_000)
+    found = evaluate_poses(model_of(0.0, gap, contact), POSITION[:8], roll_pitch_yaw(ROTATION[:8]), force=force)
+    linear = evaluate_poses(model_of(), POSITION[:8], roll_pitch_yaw(ROTATION[:8]))
+    off = []
+    for i in range(8):
+        given = nist(), POSITION[i], ROTATION[i]
+        tried = pinned(*given, directions, force, gap, contact)
+        assert found.softest_stiffness[i] <= tried.min() * (1.0 + 1e-6)
+        assert found.stiffest_stiffness[i] >= tried.max() * (1.0 - 1e-6)
+        own = pinned(*given, np.array([found.softest[i], found.stiffest[i]]), force, gap, contact)
+        # A strut below a thousandth of a newton counts as idle there.
+        assert own == pytest.approx([found.softest_stiffness[i], found.stiffest_stiffness[i]], rel=1e-5)
+        off.append(pinned(*given, linear.softest[i : i + 1], force, gap, contact)[0] / found.softest_stiffness[i] - 1.0)
+    assert max(off) > 1e-3  # what the linear tensor calls softest is not
+
+
+def test_the_stiffest_direction_beside_stiff_joints_is_not_missed():
+    """A basin of its own, where three struts are idle: 1.1 % stiffer than the best of three climbs."""
+    place = POSITION[1:2], ROTATION[1:2]
+    model = model_of(1e5, 4e-6)
+    near = np.array([0.41081598, -0.55017609, 0.72700516])
+    direction = core.extreme_directions(model, *place, force=500.0, softest=False)
+    found = 1.0 / core.compliance_along(model, direction, *place, force=500.0)[0]
+    assert found >= opponent(nist(), POSITION[1], ROTATION[1], unit(near), 500.0, 1e5, 4e-6, 0.0) * (1.0 - 1e-5)
 
 
 def test_without_load_dependence_the_search_finds_the_eigenvectors():

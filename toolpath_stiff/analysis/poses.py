@@ -14,12 +14,14 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load, load_directions, softest_directions, stiffest_directions
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.errors import InputError, PoseError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Limit, Reach, machine_limits, reach
+from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.units import mm_from_m
 
 BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
 Progress = Callable[[int, int], None]
@@ -153,6 +155,7 @@ def _evaluate_block(
     compliance = np.full((len(tip), 3, 3), np.nan)
     turned = None if rotation is None else rotation[within]
     compliance[within] = core.tip_compliance(model, tip[within], turned, tool[within], force, route)
+    _refuse_no_number(machine, tip, within & np.isnan(compliance[:, 0, 0]))
     softest = partial(_softest, model, tip, rotation, tool, force, within) if model.load_dependent else None
     direction, substituted = load_directions(load, compliance, tip, rotation, tangent[rows], softest)
     along = np.full(len(tip), np.nan)
@@ -160,7 +163,9 @@ def _evaluate_block(
         along[within] = core.compliance_along(model, direction[within], tip[within], turned, tool[within], force)
     else:
         along = np.einsum("ni,nij,nj->n", direction, compliance, direction)
-    result.stiffness[rows] = 1.0 / along
+    stiffness = 1.0 / along
+    _refuse_no_number(machine, tip, within & ~((stiffness > 0.0) & (stiffness < np.inf)))
+    result.stiffness[rows] = stiffness
     result.direction[rows] = direction
     result.substituted[rows] = substituted
     result.strut_lengths[rows] = struts.lengths
@@ -168,6 +173,16 @@ def _evaluate_block(
     result.margin[rows] = stand.margin
     result.limit[rows] = stand.limit
     result.limit_value[rows] = stand.value
+
+
+def _refuse_no_number(machine: Machine, tip: FloatArray, bad: BoolArray) -> None:
+    """Raise `PoseError` where the limits let poses pass (n,) that have no stiffness."""
+    if bad.any():
+        x, y, z = (mm_from_m(float(v)) + 0.0 for v in tip[int(np.argmax(bad))])
+        raise PoseError(
+            f"machine {machine.name} is singular at X{x:g} Y{y:g} Z{z:g} mm: the tip has no stiffness there",
+            hint="keep such poses out of reach: min_index of [limits.singularity] in the machine file, such as 0.05",
+        )
 
 
 def _softest(
@@ -241,6 +256,7 @@ def evaluate_poses(
     n, within = len(position), stand.reachable
     tip, turn = position[within], rotation[within]
     compliance = core.tip_compliance(model, tip, turn, tool_length, force)
+    _refuse_no_number(model.machine, tip, np.isnan(compliance[:, 0, 0]))
 
     def along(direction: FloatArray) -> FloatArray:
         if model.load_dependent:

@@ -280,8 +280,6 @@ def assumptions(analysis: Analysis) -> list[str]:
 
 def summarise(analysis: Analysis) -> dict[str, Any]:
     """The figures of `summary.json`, in the shop's units."""
-    from toolpath_stiff import __version__
-
     samples = analysis.samples
     places = weakest_places(analysis)
     cutting = samples.cutting & analysis.at.reachable
@@ -319,17 +317,23 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
         ],
         "assumptions": assumptions(analysis),
         "warnings": list(analysis.warnings),
-        "version": __version__,
+        "version": defaults.VERSION,
     }
 
 
 def required_stiffness_missed(analysis: Analysis, required: float) -> list[tuple[int, float]]:
-    """(line, smallest stiffness in N/mm) of cutting moves below `required` N/m, weakest first."""
-    counted = analysis.counted
-    line, stiffness = analysis.samples.line[counted], analysis.at.stiffness[counted]
-    lines, index = np.unique(line, return_inverse=True)
+    """(line, smallest stiffness in N/mm) of cutting moves that are not known to have `required` N/m, weakest first.
+
+    What has no stiffness does not have the required one: nan, before all others, for lines that are out of reach in
+    part (`partial`), and for all cutting lines where no sample counts at all.
+    """
+    samples, counted = analysis.samples, analysis.counted
+    asked = samples.cutting & ((samples.weight > 0.0) | (not counted.any()))
+    stiffness = np.where(counted, analysis.at.stiffness, np.nan)[asked]
+    lines, index = np.unique(samples.line[asked], return_inverse=True)
     lowest = np.full(len(lines), np.inf)
-    np.minimum.at(lowest, index, stiffness)
-    below = np.flatnonzero(lowest < required)
-    order = below[np.argsort(lowest[below], kind="stable")]
+    with np.errstate(invalid="ignore"):
+        np.minimum.at(lowest, index, stiffness)
+    missed = np.flatnonzero(~(lowest >= required))
+    order = missed[np.argsort(np.nan_to_num(lowest[missed], nan=-np.inf), kind="stable")]
     return [(int(lines[i]), n_per_mm_from_n_per_m(float(lowest[i]))) for i in order]

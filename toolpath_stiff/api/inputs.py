@@ -12,14 +12,10 @@ from toolpath_stiff.hints import options
 from toolpath_stiff.units import Pose, pose_in_mm, pose_in_si
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
-    from numpy.typing import NDArray
 
     from toolpath_stiff.nc.controller import Controller
     from toolpath_stiff.nc.moves import Program as ReadProgram
-
-    FloatArray = NDArray[np.float64]
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0

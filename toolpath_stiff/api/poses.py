@@ -17,16 +17,14 @@ from toolpath_stiff.hints import command_line
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from toolpath_stiff.analysis.poses import PoseReport
     from toolpath_stiff.analysis.poses import StiffnessMap as StiffnessGrid
+    from toolpath_stiff.arrays import FloatArray
     from toolpath_stiff.stiffness.model import StiffnessModel
-
-    FloatArray = NDArray[np.float64]
 
 FARTHEST = FARTHEST_MM  # mm and degrees of a pose
 MOST_POINTS = 2001  # along a side of a map

@@ -68,17 +68,22 @@ class Analysis(FolderResult):
     @property
     def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
         """Mean stiffness over the length of the cuts, plunges along the tool axis left out."""
-        return float(self._document["mean_N_per_mm"])
+        return self._figure("mean_N_per_mm")
 
     @property
     def min_N_per_mm(self) -> float:  # noqa: N802
         """The smallest stiffness of these cuts."""
-        return float(self._document["min_N_per_mm"])
+        return self._figure("min_N_per_mm")
 
     @property
     def range_N_per_mm(self) -> float:  # noqa: N802
         """The largest less the smallest."""
-        return float(self._document["range_N_per_mm"])
+        return self._figure("range_N_per_mm")
+
+    def _figure(self, name: str) -> float:
+        """A figure of the document; nan where no sample counts (rotary axes alone)."""
+        found = self._document[name]
+        return float("nan") if found is None else float(found)
 
     @property
     def weakest(self) -> dict[str, Any]:
@@ -114,8 +119,10 @@ class Analysis(FolderResult):
         return text(self._document, self.path.program.source, other)
 
     def _short(self) -> str:
+        from toolpath_stiff.report.words import number
+
         found = self._document
-        mean, low = (f"{found[name]:,.0f}".replace(",", " ") for name in ("mean_N_per_mm", "min_N_per_mm"))
+        mean, low = (number(found[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
         return f"{found['program']} on {found['machine']}, mean {mean} N/mm, min {low} N/mm"
 
     def to_frame(self) -> pd.DataFrame:

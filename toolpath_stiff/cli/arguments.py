@@ -110,16 +110,17 @@ def load_argument(text: str) -> str:
     return text
 
 
-def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True) -> None:
-    """Options about how a program is read and, where it is `sampled`, how finely."""
+def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True, placed: bool = True) -> None:
+    """Options about how a program is read and, where it is `sampled`, how finely, where `placed`, at which origin."""
     group = parser.add_argument_group("program")
-    group.add_argument(
-        "--origin",
-        type=pose_argument,
-        metavar="X,Y,Z[,A,B,C]",
-        help="where program zero (G54) sits in machine coordinates, mm and degrees "
-        "(default: where the program's G10 says, else the machine's default)",
-    )
+    if placed:
+        group.add_argument(
+            "--origin",
+            type=pose_argument,
+            metavar="X,Y,Z[,A,B,C]",
+            help="where program zero (G54) sits in machine coordinates, mm and degrees "
+            "(default: where the program's G10 says, else the machine's default)",
+        )
     if sampled:
         group.add_argument(
             "--step",

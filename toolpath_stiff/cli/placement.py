@@ -18,6 +18,7 @@ from toolpath_stiff.cli.arguments import (
 )
 from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, progress_line, show
 from toolpath_stiff.defaults import OBJECTIVES
+from toolpath_stiff.errors import InputError
 
 # -- tps place --------------------------------------------------------------------------------------------------------
 
@@ -188,8 +189,15 @@ def place(args: argparse.Namespace) -> int:
 # -- tps case-study ---------------------------------------------------------------------------------------------------
 
 CASE_STUDY_EPILOG = """\
+examples:
+  tps case-study
+  tps case-study programs/pocket.nc
+  tps case-study programs/pocket.nc --region left:-200,0,800 --region right:200,0,800,90
+  tps case-study programs/pocket.nc --regions reports/case_study/case_study.csv
+
 Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
 displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
+A file of regions has the columns region, x_mm, y_mm, z_mm, rotation_deg (CSV or FILE.xlsx[#SHEET]).
 """
 
 
@@ -197,11 +205,35 @@ def case_study_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = CASE_STUDY_EPILOG
-    parser.add_argument("--out", metavar="DIR", help="folder (default: reports/<machine>-case-study)")
+    parser.add_argument(
+        "program",
+        nargs="?",
+        metavar="PROGRAM",
+        help="NC program or cutter-location file (default: the packaged contour of a 200 mm square)",
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--region", action="append", default=[], type=_region, metavar="NAME:X,Y,Z[,TURN]",
+        help="where program zero sits, mm, and how far the path is turned about it, degrees; once for each region "
+        "(default: four of the reference machine)",
+    )  # fmt: skip
+    where.add_argument("--regions", metavar="FILE", help="the same as a table")
+    parser.add_argument(
+        "--out", metavar="DIR", help="folder (default: reports/<machine>-case-study, or <program>-case-study)"
+    )
     add_replace_option(parser, force=False)
     parser.add_argument("--no-plots", action="store_true", help="no pictures")
+    add_program_options(parser, placed=False)
     add_machine_options(parser)
     add_json_option(parser, "print case_study.json to standard output and nothing else")
+
+
+def _region(text: str) -> tuple[str, list[float]]:
+    name, _, numbers = text.rpartition(":")
+    values = [finite_number(part) for part in numbers.split(",")]
+    if not name or len(values) not in (3, 4):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected NAME:X,Y,Z or NAME:X,Y,Z,TURN")
+    return name, values
 
 
 def case_study(args: argparse.Namespace) -> int:
@@ -209,8 +241,14 @@ def case_study(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.placements import case_study
     from toolpath_stiff.report.case_study import names
 
-    target = destination(args, "case-study", [args.machine], "-case-study").check(names(not args.no_plots))
-    return show(args, case_study(machine_for(args)), target)
+    regions = dict(args.region)
+    if len(regions) < len(args.region):
+        raise InputError("--region: a name is given twice", expected="a name of its own for each region")
+    source = args.program or args.machine
+    target = destination(args, "case-study", [source], "-case-study").check(names(not args.no_plots))
+    program = None if args.program is None else program_for(args, args.program)
+    found = case_study(machine_for(args), program, regions or args.regions, step_mm=args.step)
+    return show(args, found, target)
 
 
 # Command -> what declares its arguments, what runs it.

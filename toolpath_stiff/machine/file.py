@@ -34,6 +34,7 @@ from toolpath_stiff.units import (
 
 INFINITY = math.inf
 
+CLOSEST_LENGTHS = 1e-6  # m, of a strut law: nobody measures closer, and the slope between them stays a number
 # Smallest singular value of the six strut screws (arms in units of the platform's size) that is no singularity.
 SINGULAR = 1e-6
 
@@ -71,7 +72,7 @@ SECTIONS: dict[str, dict[str, Key]] = {
     "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
     "strut_law": {
         "length_mm": Key(unit="mm", shape=(2,), low=0.0, open_low=True),
-        "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=0.0, high=1e5, open_low=True),
+        "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=1e-6, high=1e5),
     },
     "platform": {"bar_stiffness_N_per_m": Key(unit="N/m", low=1e5, high=INFINITY, infinite=True, open_low=True)},
     "limits.strut_length": {
@@ -366,6 +367,8 @@ def _strut_law(toml: TomlReader, values: dict[str, Any]) -> StrutLaw:
     lengths, stiffnesses = m_from_mm(values["length_mm"]), n_per_m_from_n_per_um(values["stiffness_N_per_um"])
     if lengths[0] == lengths[1]:
         raise _fail(toml, "strut_law", "length_mm", ": both lengths are equal", "two lengths apart")
+    if abs(lengths[1] - lengths[0]) < CLOSEST_LENGTHS:
+        raise _fail(toml, "strut_law", "length_mm", ": the lengths are all but equal", "two lengths 0.001 mm apart")
     return StrutLaw(float(lengths[0]), float(stiffnesses[0]), float(lengths[1]), float(stiffnesses[1]))
 
 

@@ -1,39 +1,48 @@
 """The paper's case study: one tool path in four regions of the workspace, at two heights, displaced and turned.
 
 Clinton, Zhang, Wavering (1997), Figure 10 and conclusion 3. The paper prints neither its path nor its figures; path and
-regions are ours. What it concludes is checked one by one, and where it stops holding is shown.
+regions are ours. What it concludes is checked one by one, and where it stops holding is shown. The same for a path and
+regions of one's own, but for the non-planar variants, which are those of the packaged square.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Any
+
+import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
 from toolpath_stiff.nc import Program, parse_program
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated, machine_words
+from toolpath_stiff.tables import Columns, read_table
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
 PROGRAM = "case_study.nc"
 LOW_MM, HIGH_MM = 400.0, 1200.0
-# Region -> x, y, z in mm, turn in degrees.
-REGIONS: dict[str, tuple[float, float, float, float]] = {
+Region = tuple[float, float, float, float]  # x, y, z of program zero in mm, turn in degrees
+REGIONS: dict[str, Region] = {
     "1": (150.0, 100.0, LOW_MM, 0.0),
     "2": (-150.0, 100.0, LOW_MM, 45.0),
     "3": (150.0, 100.0, HIGH_MM, 0.0),
     "4": (-150.0, 100.0, HIGH_MM, 45.0),
 }
-PAIRS_IN_HEIGHT = (("1", "3"), ("2", "4"))
-PAIRS_IN_PLANE = (("1", "2"), ("3", "4"))
 HEIGHTS_MM = tuple(float(z) for z in range(300, 1401, 25))
+STEP_MM, MOST_STEPS, ROOM_MM = 25.0, 50, 500.0  # of other heights; where no workspace is bounded, above and below
+REGION_COLUMNS = ("x_mm", "y_mm", "z_mm", "rotation_deg")
+MOST_REGIONS = 50
 MEANS_AGREE = 0.01  # the paper: "stiffnesses of the same magnitude"; we ask for one per cent
 WAVES_MM = (10.0, 20.0, 40.0)  # how far the non-planar variants of the path go up and down
+HOLDS = {True: "yes", False: "NO", None: "not tested"}
 DECIMALS = 3  # N/mm: finer than anything that can be measured, coarser than the processor's last digits
 
 
@@ -43,6 +52,11 @@ class CaseStudy:
 
     summary: dict[str, Any]
     regions: dict[str, Analysis]
+
+    @property
+    def is_own(self) -> bool:
+        """Whether path or regions are a user's; the packaged ones come with non-planar variants."""
+        return not self.summary["non_planar"]
 
 
 def case_study_program() -> Program:
@@ -68,13 +82,29 @@ def origin_of(x_mm: float, y_mm: float, z_mm: float, turn_deg: float) -> Pose:
     return (m_from_mm(x_mm), m_from_mm(y_mm), m_from_mm(z_mm), 0.0, 0.0, rad_from_deg(turn_deg))
 
 
-def run_case_study(model: StiffnessModel, step: float = defaults.STEP) -> CaseStudy:
-    """Analyze the path in every region, over the heights, and its non-planar variants.
+def run_case_study(
+    model: StiffnessModel,
+    step: float = defaults.STEP,
+    read: Callable[[Pose], Program] | None = None,
+    regions: Mapping[str, Region] | None = None,
+) -> CaseStudy:
+    """Analyze a path in every region and over the heights, the packaged one also with waves.
+
+    Parameters
+    ----------
+    model
+        Machine and effects.
+    step
+        Distance of the samples, m.
+    read
+        A program of one's own, read for where its zero sits; unless given, the packaged square.
+    regions
+        Name -> where program zero sits; unless given, `REGIONS`.
 
     Raises
     ------
     UnreachableError
-        The machine cannot reach a region (the regions are those of the reference machine).
+        The machine cannot reach a region (`REGIONS` are those of the reference machine).
 
     Examples
     --------
@@ -84,57 +114,133 @@ def run_case_study(model: StiffnessModel, step: float = defaults.STEP) -> CaseSt
     >>> [found["holds"] for found in study.summary["conclusions"]]
     [True, True, True]
     """
-    program = case_study_program()
-    regions = {name: analyze(model, program, origin=origin_of(*at), step=step) for name, at in REGIONS.items()}
-    figures = {name: _figures(analysis) for name, analysis in regions.items()}
-    heights = [
-        {"z_mm": z, **_figures(analyze(model, program, origin=origin_of(150.0, 100.0, z, 0.0), step=step))}
-        for z in HEIGHTS_MM
-    ]
-    waves = [_wave(model, amplitude, step) for amplitude in WAVES_MM]
+    own = read is not None or regions is not None
+    packaged = case_study_program()
+    where = dict(regions or REGIONS)
+
+    def at(place: Region) -> Analysis:
+        origin = origin_of(*place)
+        return analyze(model, read(origin) if read else packaged, origin=origin, step=step)
+
+    analyses = {name: _in_region(at, name, place, own) for name, place in where.items()}
+    figures = {name: _figures(analysis) for name, analysis in analyses.items()}
+    x, y, z, turn = next(iter(where.values()))
+    heights = _over_heights(at, (x, y, turn), _heights(model, z) if own else HEIGHTS_MM)
+    first = next(iter(analyses.values()))
     summary = {
-        "program": PROGRAM,
+        "program": first.program.name,
         "machine": model.machine.name,
         "step_mm": round(mm_from_m(step), 6),
         **effects_stated(model),
         "warnings": condition_warnings(model),
-        "note": "the paper does not print its path; path and regions are ours",
+        "note": "path and regions as given" if own else "the paper does not print its path; path and regions are ours",
         "regions": [
             {"region": name, "x_mm": at[0], "y_mm": at[1], "z_mm": at[2], "rotation_deg": at[3], **figures[name]}
-            for name, at in REGIONS.items()
+            for name, at in where.items()
         ],
-        "conclusions": _conclusions(figures),
+        "conclusions": _conclusions(figures, where),
         "heights": heights,
         "limits_of_the_conclusions": _limits(heights),
-        "non_planar": waves,
+        "non_planar": [] if own else [_wave(model, amplitude, step) for amplitude in WAVES_MM],
     }
-    return CaseStudy(summary, regions)
+    return CaseStudy(summary, analyses)
+
+
+def _in_region(at: Callable[[Region], Analysis], name: str, place: Region, own: bool) -> Analysis:
+    try:
+        return at(place)
+    except UnreachableError as error:
+        if not own:
+            raise
+        raise UnreachableError(
+            f"region {name}: {error.found}",
+            hint="give regions that the machine reaches: --region NAME:X,Y,Z[,TURN]",
+            file=error.file,
+            line=error.line,
+        ) from None
+
+
+def _over_heights(
+    at: Callable[[Region], Analysis], place: tuple[float, float, float], heights: Iterable[float]
+) -> list[dict[str, float]]:
+    """The figures at x, y, turn and every height that is within reach."""
+    found, (x, y, turn) = [], place
+    for z in heights:
+        with suppress(UnreachableError):
+            found.append({"z_mm": z, **_figures(at((x, y, z, turn)))})
+    return found
+
+
+def _heights(model: StiffnessModel, own: float) -> list[float]:
+    """mm, whole steps over the workspace, and the height of the path itself."""
+    low, high = (mm_from_m(float(end)) for end in model.machine.limits.workspace[:, 2])
+    low, high = (low if np.isfinite(low) else own - ROOM_MM), (high if np.isfinite(high) else own + ROOM_MM)
+    step = STEP_MM * max(1, math.ceil((high - low) / STEP_MM / MOST_STEPS))
+    steps = range(math.ceil(low / step), math.floor(high / step) + 1)
+    return sorted({own, *(step * i for i in steps)})
+
+
+def read_regions(file: str) -> dict[str, Region]:
+    """Regions of a table (CSV or FILE.xlsx[#SHEET]): x_mm, y_mm, z_mm, and if there rotation_deg and region, its name.
+
+    `case_study.csv` is such a table.
+
+    Raises
+    ------
+    InputError
+        A column is missing, a cell is no number, a name stands twice, or there is no region or too many; with line.
+    """
+    table = read_table(file, "regions", Columns(REGION_COLUMNS, ("region",)))
+    missing = [name for name in REGION_COLUMNS[:3] if name not in table.heading]
+    if missing:
+        raise TableError(
+            f"column {missing[0]} is missing", expected=",".join(REGION_COLUMNS), file=file, line=table.heading_line
+        )
+    found: dict[str, Region] = {}
+    for number, (line, cells) in enumerate(table.rows, 1):
+        row = dict(zip(table.heading, cells, strict=False))
+        name = row.get("region") or str(number)
+        if name in found:
+            raise TableError(f"region {name} stands twice", file=file, line=line)
+        try:
+            x, y, z, turn = (float(row.get(column) or 0.0) for column in REGION_COLUMNS)
+        except ValueError as error:
+            raise TableError(
+                f"region {name}: {error}", expected="numbers in mm and degrees", file=file, line=line
+            ) from None
+        found[name] = (x, y, z, turn)
+    return found
 
 
 def _figures(analysis: Analysis) -> dict[str, float]:
     found = stiffness_figures(analysis, analysis.headline)
+    if found["mean_N_per_mm"] is None:
+        raise ProgramError("no cut moves the tool tip", file=analysis.program.name)
     return {
         key: round(float(found[key]), DECIMALS)
         for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
     }
 
 
-def _conclusions(figures: dict[str, dict[str, float]]) -> list[dict[str, Any]]:
-    """The paper's three statements, each with the numbers that decide it."""
+def _conclusions(
+    figures: Mapping[str, Mapping[str, float]], regions: Mapping[str, Region] = REGIONS
+) -> list[dict[str, Any]]:
+    """The paper's three statements, each with the numbers that decide it; None where no two regions can."""
+    in_height, in_plane = _pairs_in_height(regions), _pairs_in_plane(figures, regions)
 
-    def rises(key: str) -> tuple[bool, str]:
-        steps = [(figures[low][key], figures[high][key]) for low, high in PAIRS_IN_HEIGHT]
+    def rises(key: str) -> tuple[bool | None, str]:
+        steps = [(figures[low][key], figures[high][key]) for low, high in in_height]
         words = "; ".join(
             f"region {low} to {high}: {a:.0f} to {b:.0f} N/mm"
-            for (low, high), (a, b) in zip(PAIRS_IN_HEIGHT, steps, strict=True)
+            for (low, high), (a, b) in zip(in_height, steps, strict=True)
         )
-        return all(b > a for a, b in steps), words
+        return (all(b > a for a, b in steps) if steps else None), words or "no two regions differ in height alone"
 
     mean_rises, mean_words = rises("mean_N_per_mm")
     range_rises, range_words = rises("range_N_per_mm")
     apart = [
         (abs(figures[b]["mean_N_per_mm"] / figures[a]["mean_N_per_mm"] - 1.0), figures[a], figures[b], f"{a} and {b}")
-        for a, b in PAIRS_IN_PLANE
+        for a, b in in_plane
     ]
     same_words = "; ".join(
         f"regions {pair}: means apart by {100 * gap:.2f} %, ranges {one['range_N_per_mm']:.0f} and "
@@ -148,9 +254,32 @@ def _conclusions(figures: dict[str, dict[str, float]]) -> list[dict[str, Any]]:
             "statement": "at one height means agree closely and ranges differ a little",
             "holds": all(
                 gap < MEANS_AGREE and one["range_N_per_mm"] != two["range_N_per_mm"] for gap, one, two, _ in apart
-            ),
-            "numbers": same_words,
+            )
+            if apart
+            else None,
+            "numbers": same_words or "no two regions are at one height",
         },
+    ]
+
+
+def _pairs_in_height(regions: Mapping[str, Region]) -> list[tuple[str, str]]:
+    """Regions above each other, the lower first, neighbours in height."""
+    above: dict[tuple[float, ...], list[str]] = {}
+    for name, (x, y, _, turn) in regions.items():
+        above.setdefault((x, y, turn), []).append(name)
+    return [pair for names in above.values() for pair in pairwise(sorted(names, key=lambda name: regions[name][2]))]
+
+
+def _pairs_in_plane(figures: Mapping[str, Mapping[str, float]], regions: Mapping[str, Region]) -> list[tuple[str, str]]:
+    """Of each height with several regions the two whose means are farthest apart."""
+    beside: dict[float, list[str]] = {}
+    for name, place in regions.items():
+        beside.setdefault(place[2], []).append(name)
+    mean = {name: found["mean_N_per_mm"] for name, found in figures.items()}
+    return [
+        max(combinations(names, 2), key=lambda pair: abs(math.log(mean[pair[1]] / mean[pair[0]])))
+        for _, names in sorted(beside.items())
+        if len(names) > 1
     ]
 
 
@@ -172,7 +301,7 @@ def _wave(model: StiffnessModel, amplitude: float, step: float) -> dict[str, Any
         "regions": [{"region": name, **row} for name, row in figures.items()],
         "means_apart_at_one_height_percent": [
             round(100 * abs(figures[b]["mean_N_per_mm"] / figures[a]["mean_N_per_mm"] - 1.0), DECIMALS)
-            for a, b in PAIRS_IN_PLANE
+            for a, b in _pairs_in_plane(figures, REGIONS)
         ],
     }
 
@@ -196,12 +325,21 @@ def region_rows(study: CaseStudy) -> str:
 def study_text(study: CaseStudy) -> str:
     """The case study in words and numbers, Markdown."""
     summary = study.summary
+    count = len(summary["regions"])
+    asked = [
+        f"One path ({summary['program']}, {summary['note']}) in four regions, as the paper's Figure 10: mean stiffness",
+        "under a load along the motion, and in parentheses its range, N/mm.",
+    ]
+    if study.is_own:
+        asked = [
+            f"{summary['program']} in {count} region{'s' if count > 1 else ''}: mean stiffness under a load along the",
+            "motion, and in parentheses its range, N/mm.",
+        ]
     lines = [
         f"# Case study on {machine_words(summary)}",
         "",
         *(line for text in summary["warnings"] for line in (f"Warning: {text}.", "")),
-        f"One path ({summary['program']}, {summary['note']}) in four regions, as the paper's Figure 10: mean stiffness",
-        "under a load along the motion, and in parentheses its range, N/mm.",
+        *asked,
         "",
         "| region | program zero, mm | turned | mean (range), N/mm |",
         "| --- | --- | --- | --- |",
@@ -214,15 +352,11 @@ def study_text(study: CaseStudy) -> str:
         )
     lines += ["", "## The paper's conclusions", ""]
     for number, found in enumerate(summary["conclusions"], 1):
-        lines.append(f"{number}. {found['statement']}: {'yes' if found['holds'] else 'NO'}. {found['numbers']}.")
-    limits = summary["limits_of_the_conclusions"]
+        lines.append(f"{number}. {found['statement']}: {HOLDS[found['holds']]}. {found['numbers']}.")
+    lines += ["", "## Where they stop holding", "", *_limits_words(summary, study.is_own)]
+    if study.is_own:
+        return "\n".join([*lines, ""])
     lines += [
-        "",
-        "## Where they stop holding",
-        "",
-        f"Moved up and down at (150, 100) mm, the same path has its largest mean at z = "
-        f"{limits['largest_mean_at_z_mm']:g} mm and its largest range at z = {limits['largest_range_at_z_mm']:g} mm: "
-        "beyond, both fall again.",
         "",
         "Non-planar cuts, of which the paper warns: the square with its height going up and down along every side.",
         "The means of two places at one height stay as close as before; it is the range that grows, several times,",
@@ -236,3 +370,19 @@ def study_text(study: CaseStudy) -> str:
         ranges = ", ".join(f"{row['range_N_per_mm']:.0f}" for row in wave["regions"])
         lines.append(f"| {wave['amplitude_mm']:g} | {low:.2f} % | {high:.2f} % | {ranges} |")
     return "\n".join([*lines, ""])
+
+
+def _limits_words(summary: Mapping[str, Any], own: bool) -> list[str]:
+    limits, heights, at = summary["limits_of_the_conclusions"], summary["heights"], summary["regions"][0]
+    turned = f", turned {at['rotation_deg']:g} deg," if at["rotation_deg"] else ","
+    moved = f"Moved up and down at ({at['x_mm']:g}, {at['y_mm']:g}) mm{turned}"
+    mean, widest = (f"{limits[f'largest_{what}_at_z_mm']:g}" for what in ("mean", "range"))
+    if not own:
+        return [
+            f"{moved} the same path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm: "
+            "beyond, both fall again."
+        ]
+    return [
+        f"{moved} as region {at['region']}, from z = {heights[0]['z_mm']:g} to {heights[-1]['z_mm']:g} mm (where it is "
+        f"within reach), the path has its largest mean at z = {mean} mm and its largest range at z = {widest} mm."
+    ]

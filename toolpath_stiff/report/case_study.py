@@ -1,4 +1,4 @@
-"""The results of the paper's case study: files and pictures."""
+"""The results of a case study, the paper's or one's own: files and pictures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolpath_stiff.files import Content
-from toolpath_stiff.placement.case_study import HIGH_MM, LOW_MM, CaseStudy, region_rows, study_text
+from toolpath_stiff.placement.case_study import CaseStudy, region_rows, study_text
 from toolpath_stiff.report.figure import (
     BLUE,
     COLOUR_MAP,
@@ -28,19 +28,32 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+MOST_PANELS = 3
+ABOVE, LEAST_ASPECT = 0.2, 0.6  # of a path of one's own: room for words above it; a panel's height over its width
+BESIDE = 1.3  # inches
+NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
+
+
 @picture
 def regions_picture(study: CaseStudy) -> Figure:
-    """PNG of the four regions, one panel a height, each path coloured by its stiffness, mean (range) beside it."""
-    stiffness = [n_per_mm_from_n_per_m(a.at.stiffness[a.counted]) for a in study.regions.values()]
+    """PNG of the regions, one panel a height, each path coloured by its stiffness, mean (range) beside it."""
+    heights = _drawn_heights(study)
+    # Plunges would stretch the scale of colours; the packaged square has none.
+    shown = [a.headline if study.is_own else a.counted for a in study.regions.values()]
+    stiffness = [
+        n_per_mm_from_n_per_m(a.at.stiffness[rows]) for a, rows in zip(study.regions.values(), shown, strict=True)
+    ]
     low, high = min(float(s.min()) for s in stiffness), max(float(s.max()) for s in stiffness)
     with house_style():
         (left, right), (bottom, top) = _frame(study)
         panel = 5.9  # inches wide; as high as its scale asks for
-        width, tall = 14.2, panel * (top - bottom) / (right - left)
+        right_of = BESIDE if study.is_own else 1.0  # inches for the scale of colours
+        width = 13.2 + right_of + (panel + 0.35) * (len(heights) - 2)
+        tall = panel * (top - bottom) / (right - left)
         above = tall + 1.65
         figure = new_figure(width, above)
         drawn = None
-        for column, height in enumerate((LOW_MM, HIGH_MM)):
+        for column, height in enumerate(heights):
             place = ((0.75 + (panel + 0.35) * column) / width, 0.6 / above, panel / width, tall / above)
             axes = figure.add_axes(place)
             for row in study.summary["regions"]:
@@ -54,16 +67,30 @@ def regions_picture(study: CaseStudy) -> Figure:
             axes.tick_params(labelleft=not column)
             axes.plot(0, 0, "+", color=MUTED, ms=10)
         if drawn is not None:
-            bar = figure.add_axes((1.0 - 1.0 / width, 0.6 / above, 0.18 / width, tall / above))
+            bar = figure.add_axes((1.0 - right_of / width, 0.6 / above, 0.18 / width, tall / above))
             figure.colorbar(drawn, cax=bar, label="tangential stiffness, N/mm")
             bar.yaxis.set_major_formatter(lambda value, _: number(value))
             bar.grid(visible=False)
         x = 0.25 / width
-        title = "One path in four regions: mean (range) of stiffness, N/mm"
+        count = len(study.regions)
+        regions = f"{NUMBERS.get(count, count)} region{'s' if count > 1 else ''}"
+        title = f"One path in {regions}: mean (range) of stiffness, N/mm"
         figure.text(x, 1.0 - 0.4 / above, title, fontsize=14, weight="bold")
-        text = f"{study.summary['program']} on {study.summary['machine']}; path and regions are ours, as Figure 10"
+        text = f"{study.summary['program']} on {study.summary['machine']}"
+        text += _left_out(study, heights) if study.is_own else "; path and regions are ours, as Figure 10"
         figure.text(x, 1.0 - 0.68 / above, text, fontsize=10, color=MUTED)
         return figure
+
+
+def _drawn_heights(study: CaseStudy) -> list[float]:
+    """The heights of the regions, or the lowest and the highest where there are many."""
+    heights = sorted({float(row["z_mm"]) for row in study.summary["regions"]})
+    return heights if len(heights) <= MOST_PANELS else [heights[0], heights[-1]]
+
+
+def _left_out(study: CaseStudy, drawn: list[float]) -> str:
+    hidden = sum(row["z_mm"] not in drawn for row in study.summary["regions"])
+    return f"; {hidden} regions at heights between are not drawn" if hidden else ""
 
 
 def _frame(study: CaseStudy) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -72,6 +99,10 @@ def _frame(study: CaseStudy) -> tuple[tuple[float, float], tuple[float, float]]:
     points.append(np.zeros((1, 2)))
     low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
     pad = 0.08 * float((high - low).max())
+    if study.is_own:  # room for the words above each path, and for the scale of colours
+        high[1] += ABOVE * float((high - low).max())
+        flat = max(0.0, LEAST_ASPECT * float(high[0] - low[0]) - float(high[1] - low[1]))
+        low[1], high[1] = low[1] - 0.5 * flat, high[1] + 0.5 * flat
     return (float(low[0]) - pad, float(high[0]) + pad), (float(low[1]) - pad, float(high[1]) + pad)
 
 
@@ -79,16 +110,24 @@ def _path(axes: Axes, study: CaseStudy, row: dict[str, float | str], low: float,
     from matplotlib.collections import LineCollection
 
     analysis = study.regions[str(row["region"])]
-    rows = analysis.counted
+    rows = np.flatnonzero(analysis.counted)
+    together = np.diff(rows) == 1  # no line across the rapids between two cuts
     points = mm_from_m(analysis.samples.position[rows, :2])
     values = n_per_mm_from_n_per_m(analysis.at.stiffness[rows])
-    segments = np.stack([points[:-1], points[1:]], axis=1)
+    segments = np.stack([points[:-1], points[1:]], axis=1)[together]
     lines = LineCollection(list(segments), cmap=COLOUR_MAP, linewidths=5, capstyle="round")
-    lines.set_array(0.5 * (values[:-1] + values[1:]))
+    lines.set_array(0.5 * (values[:-1] + values[1:])[together])
     lines.set_clim(low, high)
     axes.add_collection(lines)
     text = f"region {row['region']}\n{number(float(row['mean_N_per_mm']))}\n({number(float(row['range_N_per_mm']))})"
-    axes.text(float(row["x_mm"]), float(row["y_mm"]), text, ha="center", va="center", color=INK, fontsize=11)
+    if study.is_own:
+        middle = 0.5 * float(points[:, 0].min() + points[:, 0].max())
+        axes.annotate(
+            text, (middle, float(points[:, 1].max())), xytext=(0, 6), textcoords="offset points", ha="center",
+            va="bottom", color=INK, fontsize=11,
+        )  # fmt: skip
+    else:
+        axes.text(float(row["x_mm"]), float(row["y_mm"]), text, ha="center", va="center", color=INK, fontsize=11)
     return lines
 
 
@@ -125,7 +164,8 @@ def heights_picture(study: CaseStudy) -> Figure:
             )  # fmt: skip
         handles = [*axes.get_legend_handles_labels()[0], *other.get_legend_handles_labels()[0]]
         figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.08, 0.89), ncol=3, frameon=False)
-        figure.text(0.09, 0.92, "Mean and range rise with z, until they turn over", fontsize=14, weight="bold")
+        title = "Mean and range over z" if study.is_own else "Mean and range rise with z, until they turn over"
+        figure.text(0.09, 0.92, title, fontsize=14, weight="bold")
         return figure
 
 

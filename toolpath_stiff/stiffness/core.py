@@ -7,7 +7,9 @@ pivots, by themselves.
 The softest and the stiffest direction of the tip are eigenvectors of the compliance tensor, unless the compliance
 depends on the load. With gaps and contacts there is no tensor: the compliance along a direction is the secant one
 under the load in that direction, and its extremes are searched on the half sphere. Gaps give it kinks, where
-derivatives say nothing, so the search compares values alone.
+derivatives say nothing, so the search compares values alone. Where a strut's force changes its sign its gap costs
+least: the stiffest direction tends to lie in such a plane, or where two of them meet, and that valley is too narrow for
+steps in any direction. So the stiffest one is looked for in the planes as well, by steps that stay in them.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.stiffness import closed_form, exact
+from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 
@@ -32,9 +35,10 @@ ROUTES = ("exact", "closed_form", "compiled")
 Along = Callable[[FloatArray, IntArray], FloatArray]
 
 DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
-CLIMBS = 3  # from so many of the best
+CLIMBS, CLIMBS_IN_PLANES = 3, 6  # from so many of the best; kinks make more basins
 FIRST_STEP, LAST_STEP = 0.13, 1e-4  # rad; half the distance of neighbours; the compliance is then certain to 1e-6
 AROUND = 6  # directions tried about the best one at each step
+IN_PLANE = 12  # over half a circle of the directions in which one strut is idle
 
 
 def is_closed_form(model: StiffnessModel) -> bool:
@@ -118,6 +122,7 @@ def _fast(
         compliance, good = compiled.tip_compliance(kernel, position, rotation)
     else:
         compliance, good = closed_form.tip_compliance(kernel, position, rotation)
+    good &= guard.is_compliance(compliance)  # what is none goes the exact route, which says what is wrong
     if not good.all():
         bad = ~good
         turn = None if rotation is None else rotation[bad]
@@ -194,7 +199,8 @@ def extreme_directions(
             return exact.compliance_along(model, path.take(poses), directions)
 
         normals = None if across is None else across[rows]
-        result[rows] = searched_directions(along, exact.tip_compliance(model, path), softest, normals)
+        idle = None if softest else exact.strut_forces(model, path)
+        result[rows] = searched_directions(along, exact.tip_compliance(model, path), softest, normals, idle)
     return result
 
 
@@ -207,7 +213,11 @@ def half_sphere(count: int) -> FloatArray:
 
 
 def searched_directions(
-    along: Along, tensor: FloatArray, softest: bool = True, across: FloatArray | None = None
+    along: Along,
+    tensor: FloatArray,
+    softest: bool = True,
+    across: FloatArray | None = None,
+    idle: FloatArray | None = None,
 ) -> FloatArray:
     """Directions in which the tip gives way most, or least.
 
@@ -221,12 +231,16 @@ def searched_directions(
         The softest, else the stiffest direction.
     across
         (n, 3) unit vectors; only directions across these are looked at.
+    idle
+        (n, 6, 3) N per N, the forces of the struts under loads along the axes: across its row a strut is idle. Where
+        kinks in these planes may hold the extreme.
 
     Returns
     -------
     (n, 3) unit vectors whose largest component is positive.
     """
     n, sign = len(tensor), 1.0 if softest else -1.0
+    climbs = CLIMBS if idle is None else CLIMBS_IN_PLANES
 
     def value(directions: FloatArray) -> FloatArray:
         """(n, m) of directions (n, m, 3), to be made large."""
@@ -235,16 +249,20 @@ def searched_directions(
 
     spread = np.broadcast_to(half_sphere(DIRECTIONS), (n, DIRECTIONS, 3))
     tried = np.concatenate([spread, np.swapaxes(np.linalg.eigh(tensor)[1], 1, 2)], axis=1)
+    if idle is not None:
+        idle = idle / np.linalg.norm(idle, axis=-1, keepdims=True)
+        tried = np.concatenate([tried, _in_planes(idle)], axis=1)
     tried = tried if across is None else _flattened(tried, across)
     found = value(tried)
-    best = np.argsort(-found, axis=1, kind="stable")[:, :CLIMBS]
+    best = np.argsort(-found, axis=1, kind="stable")[:, :climbs]
     directions = np.take_along_axis(tried, best[..., None], axis=1)
     reached = np.take_along_axis(found, best, axis=1)
     step = np.full(reached.shape, FIRST_STEP)
     while (step > LAST_STEP).any():
         around = _around(directions, step)
+        around = around if idle is None else np.concatenate([around, _turned_about(directions, idle, step)], axis=2)
         around = around if across is None else _flattened(around, across)
-        values = value(around.reshape(n, -1, 3)).reshape(n, CLIMBS, AROUND)
+        values = value(around.reshape(n, -1, 3)).reshape(n, climbs, -1)
         better = values.argmax(axis=-1)
         top = np.take_along_axis(values, better[..., None], axis=-1)[..., 0]
         risen = top > reached
@@ -265,6 +283,28 @@ def _around(directions: FloatArray, step: FloatArray) -> FloatArray:
     angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
     side = one[..., None, :] * np.cos(angle)[:, None] + two[..., None, :] * np.sin(angle)[:, None]
     turned = directions[..., None, :] * np.cos(step)[..., None, None] + side * np.sin(step)[..., None, None]
+    return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+
+
+def _in_planes(normal: FloatArray) -> FloatArray:
+    """(n, m, 3) unit vectors spread over the planes across unit vectors (n, 6, 3), and where two planes meet."""
+    first, second = np.triu_indices(6, 1)
+    meeting = np.cross(normal[:, first], normal[:, second])
+    length = np.linalg.norm(meeting, axis=-1, keepdims=True)
+    meeting = np.where(length > 1e-6, meeting / np.maximum(length, 1e-6), normal[:, first])
+    one = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=-1)])
+    one /= np.linalg.norm(one, axis=-1, keepdims=True)
+    angle = np.pi * np.arange(IN_PLANE)[:, None] / IN_PLANE
+    circle = one[..., None, :] * np.cos(angle) + np.cross(normal, one)[..., None, :] * np.sin(angle)
+    return np.concatenate([meeting, circle.reshape(len(normal), -1, 3)], axis=1)
+
+
+def _turned_about(directions: FloatArray, axis: FloatArray, step: FloatArray) -> FloatArray:
+    """(n, c, 12, 3) directions (n, c, 3) turned to and fro about each axis (n, 6, 3) by `step` (n, c)."""
+    axis = np.concatenate([axis, -axis], axis=1)[:, None]
+    one, angle = directions[..., None, :], step[..., None, None]
+    along = (axis * one).sum(axis=-1, keepdims=True) * axis
+    turned = along + (one - along) * np.cos(angle) + np.cross(axis, one) * np.sin(angle)
     return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
 
 

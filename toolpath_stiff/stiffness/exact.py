@@ -33,20 +33,18 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import EffectError, InputError, PoseError
-from toolpath_stiff.hints import command_line
 from toolpath_stiff.stiffness.effects import guard
-from toolpath_stiff.stiffness.effects.contract import LoadPath
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 WHOLE_STEPS, MOST_STEPS, LINE_STEPS = 25, 200, 40
+LEAST_STIFFNESS = 1e-6  # N/m; what a strut law gives below is no stiffness, and its inverse may be no number
 SETTLED = 1e-8  # of the load: the tip's compliance is then certain to some 1e-8 of itself
 DIFFERENCE = 1e-9  # of the load, for the tangent: well below what settles, or the edge of a gap would be straddled
 LEAST_TANGENT = 1e-3  # of the secant: a strut whose stretch does not grow with its force would be infinitely stiff
 FLAT = 0.1  # of its slope at the start, to which a line search brings the slope of the energy
 FAINT = 1e-7  # of the struts' stiffness: added to the parallel one in the search alone, so that it can be inverted
-
-NOT_POSITIVE = -1e-10  # of the largest eigenvalue: below, it is no rounding
 
 
 @dataclass(frozen=True)
@@ -218,10 +216,11 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
     Raises
     ------
     InputError
-        The strut law was extrapolated to no stiffness or less.
+        The strut law was extrapolated to no stiffness or less, or the effects take more from a strut than it has.
     """
-    stiffness = path.machine.strut_law.stiffness(path.struts.lengths)
-    refuse_law_beyond_zero(path.struts.lengths, stiffness)
+    with np.errstate(invalid="ignore"):  # a law of absurd slope; refused with what it gives
+        stiffness = path.machine.strut_law.stiffness(path.struts.lengths)
+    refuse_law_beyond_zero(path, stiffness)
     strut = 1.0 / stiffness
     loads: FloatArray | None = None
     parallel: FloatArray | None = None
@@ -234,18 +233,22 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
         strut = strut if series is None else strut + series
         loads = form if loads is None else loads if form is None else loads + form
         parallel = beside if parallel is None else parallel if beside is None else parallel + beside
+    guard.refuse_struts_without_stiffness(_acting(model), path, strut)
     return Links(strut, loads, parallel)
 
 
-def refuse_law_beyond_zero(lengths: FloatArray, stiffness: FloatArray) -> None:
-    """Raise `InputError` where the linear strut law gives (n, 6) struts no stiffness or less."""
-    if not (stiffness <= 0.0).any():
+def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
+    """Raise `InputError` where the linear strut law gives (n, 6) struts no stiffness or less, or no number."""
+    holds = (stiffness >= LEAST_STIFFNESS) & (stiffness < np.inf)
+    lengths = path.struts.lengths
+    holds |= np.isnan(lengths)  # a pose that is no number, which stays nan
+    if holds.all():
         return
-    worst = np.unravel_index(np.argmin(stiffness), stiffness.shape)
+    worst = np.unravel_index(np.argmin(np.where(holds, np.inf, stiffness)), stiffness.shape)
     raise PoseError(
         f"strut {worst[1] + 1} would be {mm_from_m(float(lengths[worst])):.1f} mm long, where the machine's strut law "
-        f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um",
-        expected="a stiffness above 0",
+        f"gives {n_per_um_from_n_per_m(float(stiffness[worst])):.4g} N/um{guard.at_pose(path, int(worst[0]))}",
+        expected="a finite stiffness above 0",
         hint="bound the strut length in the machine file so that the law stays positive",
     )
 
@@ -303,16 +306,28 @@ def wrench_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n, 6, 6) compliance of the tip for forces and moments; load-dependent effects are not in it."""
     wrenches = np.broadcast_to(np.eye(6), (len(path), 6, 6))
     twists, _ = respond(path, assemble_links(model, path), wrenches)
-    return _possible(model, path, np.asarray(0.5 * (twists + np.swapaxes(twists, 1, 2))))
+    return guard.possible(_acting(model), path, twists)
 
 
 def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n, 3, 3) m/N, displacements of the tip under forces at it; load-dependent effects are not in it."""
-    wrenches = np.zeros((len(path), 6, 3))
+    twists, _ = respond(path, assemble_links(model, path), _unit_forces(len(path)))
+    return guard.possible(_acting(model), path, twists[:, :3])
+
+
+def strut_forces(model: StiffnessModel, path: LoadPath) -> FloatArray:
+    """(n, 6, 3) N per N, forces in the struts under forces at the tip; load-dependent effects are not in it."""
+    return respond(path, assemble_links(model, path), _unit_forces(len(path)))[1]
+
+
+def _unit_forces(n: int) -> FloatArray:
+    wrenches = np.zeros((n, 6, 3))
     wrenches[:, :3] = np.eye(3)
-    twists, _ = respond(path, assemble_links(model, path), wrenches)
-    compliance = twists[:, :3]
-    return _possible(model, path, np.asarray(0.5 * (compliance + np.swapaxes(compliance, 1, 2))))
+    return wrenches
+
+
+def _acting(model: StiffnessModel) -> list[Effect]:
+    return [active.effect for active in model.effects]
 
 
 @dataclass(frozen=True)
@@ -360,7 +375,7 @@ def under_load(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> 
 def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
     """(n,) m/N, displacement along unit vectors (n, 3) per force along them; see `under_load`."""
     along = np.asarray(np.einsum("ni,ni->n", under_load(model, path, direction).twists[:, :3], direction))
-    return _possible(model, path, along[:, None, None])[:, 0, 0]
+    return guard.possible(_acting(model), path, along[:, None, None])[:, 0, 0]
 
 
 def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenches: FloatArray) -> LoadPath:
@@ -393,33 +408,4 @@ def _unsettled(model: StiffnessModel, path: LoadPath, row: int) -> InputError:
         f"the strut forces do not settle at X{x:.1f} Y{y:.1f} Z{z:.1f} (mm) under {path.force[row]:g} N with {names}",
         expected="a stretch of each strut that grows with its force",
         hint="check the parameters of these effects",
-    )
-
-
-def _possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> FloatArray:
-    """The compliance (n, k, k) itself; refused where effects from outside the package make it not positive definite.
-
-    Raises
-    ------
-    InputError
-        With these effects and the pose; a fit walks away from there.
-    """
-    foreign = [active.effect for active in model.effects if guard.is_foreign(active.effect)]
-    if not foreign or not len(compliance):
-        return compliance
-    finite = np.asarray(np.isfinite(compliance).all(axis=(1, 2)))
-    eigenvalues = np.linalg.eigvalsh(np.where(finite[:, None, None], compliance, np.eye(compliance.shape[1])))
-    bad = np.asarray(eigenvalues[:, 0] <= NOT_POSITIVE * np.abs(eigenvalues).max(axis=1))
-    if not finite.all():  # a singular pose has no answer with or without the effects
-        regular = np.isfinite(_solve(path.struts.jacobian, path.struts.directions[..., :1])).all(axis=(1, 2))
-        bad = np.asarray(bad | (~finite & regular))
-    if not bad.any():
-        return compliance
-    x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[int(np.argmax(bad))])
-    those = f"effect{'s' if len(foreign) > 1 else ''} {', '.join(effect.name for effect in foreign)}"
-    check = command_line("effects", "check", guard.file_of(foreign[0]))
-    raise EffectError(
-        f"with {those} the tip has no positive stiffness at X{x:g} Y{y:g} Z{z:g} mm",
-        expected="a compliance that is positive definite",
-        hint=f"`{check}` tries an effect by itself",
     )

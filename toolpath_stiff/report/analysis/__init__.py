@@ -99,7 +99,9 @@ def text(summary: Mapping[str, Any], source: Sequence[str] = (), other: Mapping[
         lines.append(f"below the required {required['required_N_per_mm']:g} N/mm:")
         for entry in required["below"]:
             shown = source[entry["line"] - 1].strip() if source else ""
-            lines.append(f"  line {entry['line']}: {entry['min_N_per_mm']:.0f} N/mm  {shown}")
+            lowest = entry["min_N_per_mm"]
+            found = "no stiffness (out of reach, or no motion)" if lowest is None else f"{lowest:.0f} N/mm"
+            lines.append(f"  line {entry['line']}: {found}  {shown}")
     return "\n".join(lines)
 
 

@@ -16,7 +16,8 @@ EXPERIENCE = "engineering experience, no source: stiff machine frames are built 
 class FrameCompliance(Effect):
     """Each vertex of the frame is a node on a radial and a vertical spring; it carries the forces of two struts.
 
-    The tangential direction is taken as rigid: 3 nm/N there changes the tip's compliance by less than 0.1 %.
+    The tangential direction is taken as rigid: 3 nm/N there adds 0.08 % to the tip's compliance (root mean square over
+    the paper's readings), 0.4 % at most at z = 800 mm and 0.6 % in the corners of the upper plane.
     """
 
     name = "frame_compliance"

@@ -13,15 +13,16 @@ import inspect
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import EffectError, EffectFault, InputError
+from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import LINKS, Effect, LoadPath, Parameter
 from toolpath_stiff.units import mm_from_m
@@ -34,6 +35,10 @@ SHAPES: dict[str, tuple[tuple[int, ...], str]] = {
 }
 HOOKS = (*SHAPES, "geometry", "reading")
 ASYMMETRY = 1e-9  # of the largest entry at the pose
+APART = 1e-6  # of the tip's compliance: how far a result may be from symmetric
+# Condition of the struts' screws, arms in units of their size, beyond which a pose with an impossible compliance counts
+# as singular: rounding may have left nothing right but its largest eigenvalue.
+NEARLY_SINGULAR = 1e7
 TRIED = 2000  # poses that are tried one by one for the one that fails
 
 TEXTS = ("name", "title", "link", "equation", "source")
@@ -66,7 +71,7 @@ def added(effect: Effect, hook: str, path: LoadPath, values: Mapping[str, Any]) 
         if bad.any():
             i, j, k = (int(v) for v in np.unravel_index(_largest_gap(found, bad), found.shape))
             raise _fault(
-                effect, hook, f"is not symmetric{_at(path, i)}: entry ({j}, {k}) is {found[i, j, k]:g}, "
+                effect, hook, f"is not symmetric{at_pose(path, i)}: entry ({j}, {k}) is {found[i, j, k]:g}, "
                 f"entry ({k}, {j}) is {found[i, k, j]:g}", words,
             )  # fmt: skip
     return found
@@ -99,8 +104,106 @@ def read_off(effect: Effect, stiffness: FloatArray, path: LoadPath, values: Mapp
     bad = np.isfinite(stiffness) & ~(np.isfinite(found) & (found > 0.0))
     if bad.any():
         i = int(np.argmax(bad))
-        raise _fault(effect, "reading", f"shows {found[i]:g} N/m{_at(path, i)}", "a finite number above 0")
+        raise _fault(effect, "reading", f"shows {found[i]:g} N/m{at_pose(path, i)}", "a finite number above 0")
     return found
+
+
+def possible(effects: Sequence[Effect], path: LoadPath, compliance: FloatArray) -> FloatArray:
+    """The compliance of the tip, if there can be such a one; what every result of the exact route goes through.
+
+    Parameters
+    ----------
+    effects
+        What acts on the machine, for messages.
+    path
+        n poses.
+    compliance
+        (n, k, k) m/N.
+
+    Returns
+    -------
+    (n, k, k) its symmetric part; nan at a singular pose.
+
+    Raises
+    ------
+    InputError
+        It is not finite, not symmetric or not positive definite at a pose that is not singular; with effects and pose.
+        A fit walks away from there.
+    """
+    wrong = ~is_compliance(compliance)
+    with np.errstate(over="ignore", invalid="ignore"):
+        symmetric = compliance if compliance.shape[1] == 1 else 0.5 * (compliance + np.swapaxes(compliance, 1, 2))
+    if not wrong.any():
+        return np.asarray(symmetric)
+    rows = np.flatnonzero(wrong)
+    regular = ~_is_singular(path, rows)
+    if regular.any():
+        raise _impossible(effects, path, int(rows[regular][0]), "the tip")
+    symmetric[rows] = np.nan
+    return np.asarray(symmetric)
+
+
+def _is_singular(path: LoadPath, rows: IntArray) -> BoolArray:
+    arms = path.struts.arms[rows]
+    size = np.linalg.norm(arms, axis=-1).mean(axis=-1)[:, None, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        screws = np.concatenate([path.struts.directions[rows], path.struts.jacobian[rows, :, 3:] / size], axis=-1)
+    singular = ~np.isfinite(screws).all(axis=(1, 2))
+    singular[~singular] = ~(np.linalg.cond(screws[~singular]) < NEARLY_SINGULAR)
+    return np.asarray(singular)
+
+
+def is_compliance(tensor: FloatArray) -> BoolArray:
+    """(n,) whether tensors (n, k, k) are finite, symmetric and positive definite."""
+    size = tensor.shape[1]
+    with np.errstate(all="ignore"):
+        if size == 1:
+            return np.asarray((tensor[:, 0, 0] > 0.0) & (tensor[:, 0, 0] < np.inf))
+        if size != 3:
+            return _has_positive_eigenvalues(tensor)
+        a, d, e, left_d, b, f, left_e, left_f, c = np.ascontiguousarray(tensor.reshape(-1, 9).T)
+        minor = a * b - d * d
+        apart = np.abs(d - left_d) + np.abs(e - left_e) + np.abs(f - left_f)
+        trace = a + b + c
+        # Sylvester: all leading minors above zero. Nothing that is not finite passes.
+        determinant = minor * c - a * f * f - b * e * e + 2.0 * d * e * f
+        good = (a > 0.0) & (minor > 0.0) & (determinant > 0.0) & (apart <= APART * trace) & (trace < np.inf)
+        if not good.all():  # minors of tiny numbers vanish where the eigenvalues do not
+            good[~good] = _has_positive_eigenvalues(tensor[~good])
+    return np.asarray(good)
+
+
+def _has_positive_eigenvalues(tensor: FloatArray) -> BoolArray:
+    scale = np.abs(tensor).max(axis=(1, 2))
+    good = (scale > 0.0) & (scale < np.inf)
+    unit = tensor[good] / scale[good, None, None]  # sums of the largest numbers overflow
+    turned = np.swapaxes(unit, 1, 2)
+    even = np.abs(unit - turned).max(axis=(1, 2)) <= APART
+    good[good] = even & (np.linalg.eigvalsh(0.5 * (unit + turned))[:, 0] > 0.0)
+    return np.asarray(good)
+
+
+def refuse_struts_without_stiffness(effects: Sequence[Effect], path: LoadPath, strut: FloatArray) -> None:
+    """Raise `InputError` where the compliances (n, 6) m/N of struts, with all that effects add, are 0 or less."""
+    if (strut <= 0.0).any():
+        row = int(np.argmax((strut <= 0.0).any(axis=1)))
+        raise _impossible(effects, path, row, f"strut {int(np.argmin(strut[row])) + 1}")
+
+
+def _impossible(effects: Sequence[Effect], path: LoadPath, row: int, part: str) -> EffectError:
+    """An error that names the effects from outside the package, else all effects, else the machine."""
+    foreign = [effect for effect in effects if is_foreign(effect)]
+    named = foreign or list(effects)
+    those = f"effect{'s' if len(named) > 1 else ''} {', '.join(effect.name for effect in named)}"
+    hint = "check the parameters of these effects" if named else "check the machine file: strut law, joints"
+    if foreign:
+        hint = f"`{command_line('effects', 'check', file_of(foreign[0]))}` tries an effect by itself"
+    return EffectError(
+        f"with {those if named else f'machine {path.machine.name}'} {part} has no positive stiffness"
+        f"{at_pose(path, row)}",
+        expected="a compliance that is finite, symmetric and positive definite",
+        hint=hint,
+    )
 
 
 def line_in(error: BaseException, file: str) -> int | None:
@@ -140,13 +243,13 @@ def _called(effect: Effect, hook: str, path: LoadPath | None, call: Callable[[An
 
 def _where_it_fails(path: LoadPath, call: Callable[[Any], Any]) -> str:
     if len(path) < 2:
-        return _at(path, 0) if len(path) else " without poses"
+        return at_pose(path, 0) if len(path) else " without poses"
     for i in range(min(len(path), TRIED)):
         try:
             with np.errstate(all="ignore"):
                 call(path.take(np.array([i])))
         except (Exception, SystemExit):
-            return _at(path, i)
+            return at_pose(path, i)
     return f" for {len(path)} poses together, though not for each alone"
 
 
@@ -175,7 +278,7 @@ def _refuse_not_finite(effect: Effect, hook: str, found: FloatArray, path: LoadP
         bad[~np.isfinite(path.strut_forces).all(axis=1)] = False
     if bad.any():
         first = np.unravel_index(int(np.argmax(bad)), found.shape)
-        raise _fault(effect, hook, f"returns {found[first]:g}{_at(path, int(first[0]))}", "finite numbers")
+        raise _fault(effect, hook, f"returns {found[first]:g}{at_pose(path, int(first[0]))}", "finite numbers")
 
 
 def _largest_gap(found: FloatArray, bad: BoolArray) -> int:
@@ -184,7 +287,8 @@ def _largest_gap(found: FloatArray, bad: BoolArray) -> int:
     return int(np.argmax(gap))
 
 
-def _at(path: LoadPath, i: int) -> str:
+def at_pose(path: LoadPath, i: int) -> str:
+    """Pose i in words, as " at X0 Y0 Z800 mm" with the space before it."""
     x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[i])
     return f" at X{x:g} Y{y:g} Z{z:g} mm"
 

@@ -35,7 +35,7 @@ from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import Baseline
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.measurements import Measurements
+from toolpath_stiff.updating.measurements import Measurements, model_stiffness
 
 FloatArray = NDArray[np.float64]
 
@@ -136,6 +136,7 @@ def compare(
     log_model = predictor.log_stiffness()
     bad = np.flatnonzero(~np.isfinite(log_model))
     if len(bad):
+        model_stiffness(predictor.base, data)  # which effect leaves none, at which pose, if it is one
         raise InputError(
             "the model has no stiffness for this reading",
             hint="check the pose and the machine file's effects",
