@@ -14,19 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.units import MM_PER_INCH
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Point2 = tuple[float, float]
 Vector = tuple[float, float, float]
 
-# LinuxCNC's defaults (manual, "INI configuration", CENTER_ARC_RADIUS_TOLERANCE_MM; interp_arc.cc): start and end radius
-# may differ by a thousandth of the radius, or by 0.00127 mm if that is more, and never by more than 0.127 mm.
+# Of LinuxCNC's rs274 2.9, by bisection (the tests hold both sides of each): start and end radius may differ by a
+# thousandth of the larger one, or by 2 sqrt(2) hundredths of a millimetre (thousandths of an inch in inch programs) if
+# that is more, and never by more than a hundred times that. It leaves room for ends that are rounded to 0.01 mm.
 RELATIVE_TOLERANCE = 1e-3
-ABSOLUTE_TOLERANCE = 1.27e-3
-LARGEST_DIFFERENCE = 100.0 * ABSOLUTE_TOLERANCE
-RADIUS_FORMAT_TOLERANCE = 1.27e-2  # a half chord may exceed R by this much (interp_internal.hh)
-SAME_POINT = 1e-12
+MM_TOLERANCE = 2.0 * math.sqrt(2.0) * 1e-2
+INCH_TOLERANCE = 2.0 * math.sqrt(2.0) * 1e-3 * MM_PER_INCH
+MOST_TOLERANCES = 100.0
+RADIUS_FORMAT_TOLERANCE = 1.27e-3  # mm; a half chord may exceed R by this much, in inch programs too
+SMALLEST_RADIUS = 1.27e-3  # mm; an arc of less is one of radius 0
 
 PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}  # first, second axis, normal: right-handed
 CENTER_WORDS = ("I", "J", "K")
@@ -75,8 +78,10 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
     return (middle[0] - side * height * along[1], middle[1] + side * height * along[0])
 
 
-def check_radii(start: Point2, end: Point2, center: Point2) -> None:
+def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) -> None:
     """Raise `ArcError` if start and end do not lie on one circle about the centre within LinuxCNC's tolerance.
+
+    `inch`: it is an inch program, whose ends may be rounded to thousandths; the points are in mm all the same.
 
     Examples
     --------
@@ -87,12 +92,11 @@ def check_radii(start: Point2, end: Point2, center: Point2) -> None:
     toolpath_stiff.nc.geometry.ArcError: an arc of radius 0
     """
     first, last = math.dist(start, center), math.dist(end, center)
-    if first < SAME_POINT or last < SAME_POINT:
+    if first < SMALLEST_RADIUS or last < SMALLEST_RADIUS:
         raise ArcError("an arc of radius 0", "a centre apart from the start and the end point")
-    difference = abs(first - last)
-    relative = difference / max(first, last)
-    if difference > LARGEST_DIFFERENCE or (difference > ABSOLUTE_TOLERANCE and relative > RELATIVE_TOLERANCE):
-        allowed = min(max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * max(first, last)), LARGEST_DIFFERENCE)
+    difference, least = abs(first - last), INCH_TOLERANCE if inch else MM_TOLERANCE
+    allowed = min(max(least, RELATIVE_TOLERANCE * max(first, last)), MOST_TOLERANCES * least)
+    if difference > allowed:
         raise ArcError(
             f"an arc whose end lies {difference:.4f} mm off its circle (radius {first:.4f} mm at the start, "
             f"{last:.4f} mm at the end)",

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -35,13 +36,14 @@ from toolpath_stiff.nc.codes.points import read_numbers
 from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
 from toolpath_stiff.nc.moves import Jump
 from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, State
-from toolpath_stiff.nc.tables import LARGEST_MM
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.plain_lines import PlainRun
 
 
+COORDINATES = frozenset((*AXES, "@"))
 LAST_MODE = STEPS[MODES[-1]]
 WORDS_THAT_ACT = (FEED, SPEED, TOOL)
 
@@ -103,9 +105,12 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
     for letter in ("U", "V", "W"):
         if letter in current.values:
             raise current.fail(current.values[letter], "moves an axis that this machine does not have", "X Y Z A B C")
-    for letter in (*AXES, "@"):
-        if letter in current.values and abs(current.values[letter].value) > LARGEST_MM:
-            raise current.fail(current.values[letter], "is beyond 100 m", f"at most {LARGEST_MM:g}")
+    for letter, word in current.values.items():
+        if letter in COORDINATES:
+            if abs(word.value) > LARGEST_MM:
+                raise current.fail(word, "is beyond 100 m", f"at most {LARGEST_MM:g}")
+        elif abs(word.value) > LARGEST_WORD:
+            raise current.fail(word, "is beyond any number that a control takes", f"at most {LARGEST_WORD:.0f}")
     return current
 
 
@@ -208,8 +213,8 @@ DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older cont
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
 MOST_REPEATS = 9999
 FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
-SEQUENCE = re.compile(r"\s*(?:/\d?\s*)?[nN]\s*(\d+)(?![\d.])")
-HEAD = re.compile(r"\s*/?\s*[oO:]\s*(\d+)\s*(?:[(;].*)?$")
+SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
+HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
 
 
@@ -379,7 +384,7 @@ class ProgramRun:
             for index, line in enumerate(self.lines):
                 match = SEQUENCE.match(line)
                 if match:
-                    self._sequence.setdefault(int(match[1]), []).append(index)
+                    self._sequence.setdefault(int(match[1] or 0), []).append(index)
         found = self._sequence.get(call.number, [])
         if len(found) != 1:
             places = ", ".join(str(index + 1) for index in found)
@@ -439,13 +444,13 @@ class ProgramRun:
                 head = HEAD.match(line)
                 if head is None:
                     continue
-                number = int(head[1])
+                number = int(head[1] or 0)
                 if number in self._programs:
                     raise self._fail(index, f"O{number} is in line {self._programs[number] + 1} already")
                 self._programs[number] = index
         return self._programs
 
-    @property
+    @cached_property
     def _main(self) -> int:
         """The line of the main program's own number; -1 if it has none."""
         for index, line in enumerate(self.lines):

@@ -32,6 +32,7 @@ HINTS = {
     _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
     _SIEMENS: "post it as ISO G code: no frames (TRANS, ROT), no CYCLE calls, no variables, no X=... words",
 }
+LONGEST_SIGN = 200  # characters of a line that are looked at
 # What no G code of the controls read here has at the beginning of a block, blanks and N words apart.
 _SIGNS = (
     (_HEIDENHAIN, r"BEGIN\s+PGM\b"),
@@ -42,7 +43,7 @@ _SIGNS = (
     (_SIEMENS, r"DEF\s+(?:REAL|INT|BOOL|STRING|CHAR|AXIS|FRAME)\b|PROC\s+\w+|EXTERN\s+\w+"),
     (_SIEMENS, r"MSG\s*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+\s*\(|WORKPIECE\s*\("),
     (_SIEMENS, r"A?(?:TRANS|ROT|SCALE|MIRROR)(?:\s|;|$)|TRAORI\b|TRAFOOF\b|SUPA\b|D?R\d+\s*="),
-    (_SIEMENS, r"(?:[A-Z]+\d*[\d.+-]*\s+)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
+    (_SIEMENS, r"(?:[A-Z]++[\d.+-]*+\s++)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
 )
 _PATTERNS = tuple((what, re.compile(r"\s*(?:N\d+\s+|\d+\s+)?(?:" + sign + ")", re.IGNORECASE)) for what, sign in _SIGNS)
 
@@ -56,7 +57,8 @@ def language_of(line: str) -> str | None:
     "Heidenhain's conversational language"
     >>> language_of("G1 X10 Y20")
     """
-    return next((what for what, pattern in _PATTERNS if pattern.match(line)), None)
+    head = line.lstrip()[:LONGEST_SIGN]
+    return next((what for what, pattern in _PATTERNS if pattern.match(head)), None)
 
 
 def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:

@@ -17,14 +17,20 @@ from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
 
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
+NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails does not try shorter numbers
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
-WORD = re.compile(rf"([A-Z@^])({NUMBER})(E[+-]?\d+)?", re.ASCII)
+WORD = re.compile(rf"([A-Z@^])({NUMBER})(E[+-]?\d++)?", re.ASCII)
 AXES = "XYZABC"
 POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
 LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTUVWXYZ" + POLAR)
 COMMENT = re.compile("[();]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
+# Caps. Longer is no NC program, and what reads a line takes time by the square of its length.
+LARGEST_FILE = 512 << 20  # bytes: some ten million lines
+LONGEST_LINE = 10_000  # characters, comments included
+LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
+LONGEST_NUMBER = 100  # characters
+MOST_DIGITS = 9  # of a program number, its O included
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
 
 
@@ -68,6 +74,13 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
         return Block(line, ())
     if compact == "%":
         return Block(line, (), percent=True)
+    if len(compact) > LONGEST_BLOCK:
+        raise ProgramError(
+            f"a block of {len(compact)} characters without comments and blanks",
+            expected=f"at most {LONGEST_BLOCK}",
+            file=name,
+            line=line,
+        )
     start = 0
     optional = compact[0] == "/"
     switch = 1
@@ -75,10 +88,10 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
         start = 1
         while start < len(compact) and "0" <= compact[start] <= "9":
             start += 1
-        switch = int(compact[1:start] or 1)
+        switch = int(compact[1:start] or 1) if start < 3 else 0
         if not 1 <= switch <= 9:
             raise ProgramError(
-                f"block-delete switch {compact[:start]!r}",
+                f"block-delete switch {compact[:20][:start]!r}",
                 expected="/ or /1 to /9",
                 file=name,
                 line=line,
@@ -93,6 +106,14 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
 def _program_number(compact: str, column: int, line: int, name: str) -> Block:
     """`O1234` alone is a program's number; any other O word controls subprograms or loops."""
     if compact[1:].isascii() and compact[1:].isdigit():
+        if len(compact) > MOST_DIGITS:
+            raise ProgramError(
+                f"a program number of {len(compact) - 1} digits",
+                expected="O and up to 8 digits",
+                file=name,
+                line=line,
+                column=column,
+            )
         return Block(line, (Word("O", float(compact[1:]), column, compact),))
     raise ProgramError(
         f"O word {compact[:20]!r}: subprograms and loops are not supported",
@@ -171,6 +192,14 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
             else:
                 number += exponent
         original = text[column - 1 : columns[end - 1]]
+        if end - position > 1 + LONGEST_NUMBER:
+            raise ProgramError(
+                f"a number of {end - position - 1} characters after {letter}",
+                expected=f"at most {LONGEST_NUMBER}",
+                file=name,
+                line=line,
+                column=column,
+            )
         if letter == "N":
             if words:
                 raise ProgramError(
@@ -280,9 +309,19 @@ def read_lines(path: str | Path) -> tuple[str, ...]:
         The file cannot be read or is not text.
     """
     try:
-        content = Path(path).read_bytes()
+        with Path(path).open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
     except OSError as error:
         raise ProgramError(f"cannot read {str(path)!r}: {error.strerror}") from None
+    except ValueError as error:  # a NUL in the name
+        raise ProgramError(f"cannot read {str(path)!r}: {error}") from None
+    if len(content) > LARGEST_FILE:
+        raise ProgramError(
+            "a file that is too large to be read",
+            expected=f"an NC program of at most {LARGEST_FILE >> 20} MB",
+            hint="split the program",
+            file=Path(path).name,
+        )
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -312,4 +351,12 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
     found = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
     if not found[-1]:
         found.pop()
+    if max(map(len, found), default=0) > LONGEST_LINE:
+        at = next(number for number, line in enumerate(found, 1) if len(line) > LONGEST_LINE)
+        raise ProgramError(
+            f"a line of {len(found[at - 1])} characters",
+            expected=f"lines of at most {LONGEST_LINE}",
+            file=name,
+            line=at,
+        )
     return tuple(found)

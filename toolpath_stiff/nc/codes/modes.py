@@ -91,6 +91,9 @@ MODE_ALIASES = (
 # -- feed and spindle --------------------------------------------------------------------------------------------------
 
 
+SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
+
+
 def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
     """G93: F is one over the minutes of the move; G94: per minute; G95: per revolution."""
     if code != state.feed_mode:
@@ -105,6 +108,8 @@ def feed_word(state: State, block: CurrentBlock, code: str) -> None:
     word = block.values["F"]
     if feed < 0.0:
         raise block.fail(word, "is a negative feed", "F above 0")
+    if 0.0 < feed * state.feed_scale < SLOWEST:
+        raise block.fail(word, "is slower than a nanometre a minute", "a feed that moves")
     if "." not in word.text and feed and bare_feed_is_open(state):
         units = "inch" if state.inch else "mm"
         raise block.fail(
@@ -174,8 +179,8 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
         feed, state.feed = state.feed, None  # every move needs its own
         return feed * length_of_move(start, end, arc)
     if state.feed_mode == "G95":
-        if state.speed == 0.0:
-            raise block.fail(None, "feed per revolution (G95) with the spindle at S0", "S above 0")
+        if state.feed * state.speed < SLOWEST:
+            raise block.fail(None, f"feed per revolution (G95) with the spindle at S{state.speed:g}", "S above 0")
         return state.feed * state.speed
     linear = math.dist(start[:3], end[:3]) if arc is None else arc_length(arc, start, end)
     return rotary_feed(state, state.feed) if linear == 0.0 else state.feed

@@ -221,7 +221,7 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
     clockwise = code == "G2"
     try:
         center = _center(state, block, start, end, clockwise, words)
-        sweep = sweep_about(center, start, end, clockwise, turns)
+        sweep = sweep_about(center, start, end, clockwise, state.inch, turns)
     except geometry.ArcError as error:
         raise block.fail(None, error.found, error.expected) from None
     middle = list(here)
@@ -237,9 +237,9 @@ def normal_of(plane: str) -> tuple[float, float, float]:
     return (float(normal == 0), float(normal == 1), float(normal == 2))
 
 
-def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, turns: int = 1) -> float:
+def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inch: bool, turns: int = 1) -> float:
     """Signed angle of an arc in rad. Raises `ArcError` unless start and end lie on one circle about the centre."""
-    geometry.check_radii(start, end, center)
+    geometry.check_radii(start, end, center, inch)
     return geometry.arc_sweep(start, end, center, clockwise, turns)
 
 
