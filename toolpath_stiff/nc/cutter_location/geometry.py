@@ -24,9 +24,8 @@ import math
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.geometry import (
-    LARGEST_DIFFERENCE,
     RELATIVE_TOLERANCE,
-    SAME_POINT,
+    SMALLEST_RADIUS,
     ArcError,
     Point2,
     Vector,
@@ -37,7 +36,9 @@ from toolpath_stiff.units import MM_PER_INCH
 
 VERTICAL: Vector = (0.0, 0.0, 1.0)
 SAME_POINT_MM = 5e-4  # start and end closer than this are one point: a whole turn
-# Radii may differ as LinuxCNC allows, or by what two points rounded to 0.0001 inch in each axis make of them.
+# Radii may differ by a thousandth, as LinuxCNC allows, but not by more than 0.127 mm; or by what two points rounded to
+# 0.0001 inch in each axis make of them.
+LARGEST_DIFFERENCE = 0.127
 ROUNDING_MM = 2.0 * math.sqrt(3.0) * 0.5e-4 * MM_PER_INCH
 SMOOTH_DEG = 5.0  # a path that enters an arc within this of its tangent enters it smoothly
 SWEEP_TOLERANCE_DEG = 0.05
@@ -102,7 +103,7 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
     there = (dot(to_end, first), dot(to_end, second))
     radius, last = here[0], math.hypot(*there)
     allowed = min(max(ROUNDING_MM, RELATIVE_TOLERANCE * radius), LARGEST_DIFFERENCE)
-    if last < SAME_POINT or abs(last - radius) > allowed:
+    if last < SMALLEST_RADIUS or abs(last - radius) > allowed:
         raise ArcError(
             f"an arc whose end lies {abs(last - radius):.4f} mm off its circle (radius {radius:.4f} mm at the start, "
             f"{last:.4f} mm at the end)",

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -168,6 +168,32 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
             line=line.number,
         )
     return text
+
+
+# -- steps smaller than the digits that rs274 prints -------------------------------------------------------------------
+
+# A block that moves in program coordinates, in the modes in force, and says where by numbers alone.
+PLAIN_BLOCK = re.compile(r"(?:G0*[0-3](?![\d.])|[XYZABCIJKRFSP][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII)
+COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
+
+
+def step_in_words(lines: Sequence[Line], number: int, axes: Sequence[str]) -> list[float] | None:
+    """How far a line (from 1) moves along some axes in G90, by the words alone, in program units.
+
+    None where the words do not say it: they are computed, or other codes stand between the two numbers of an axis.
+    """
+    wanted: dict[str, str] = dict(COORDINATE.findall(lines[number - 1].words))
+    steps = {axis: 0.0 for axis in axes if axis not in wanted}
+    for line in reversed(lines[:number]):
+        if line.optional or PLAIN_BLOCK.fullmatch(line.words) is None:
+            return None
+        if line.number < number:
+            for axis, value in COORDINATE.findall(line.words):
+                if axis in axes and axis not in steps:
+                    steps[axis] = float(wanted[axis]) - float(value)
+        if len(steps) == len(axes):
+            return [steps[axis] for axis in axes]
+    return None
 
 
 # -- the fence ---------------------------------------------------------------------------------------------------------
