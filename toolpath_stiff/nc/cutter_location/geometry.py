@@ -25,7 +25,6 @@ from dataclasses import dataclass
 
 from toolpath_stiff.nc.geometry import (
     RELATIVE_TOLERANCE,
-    SMALLEST_RADIUS,
     ArcError,
     Point2,
     Vector,
@@ -35,6 +34,7 @@ from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 
 VERTICAL: Vector = (0.0, 0.0, 1.0)
+SAME_POINT = 1e-12
 SAME_POINT_MM = 5e-4  # start and end closer than this are one point: a whole turn
 # Radii may differ by a thousandth, as LinuxCNC allows, but not by more than 0.127 mm; or by what two points rounded to
 # 0.0001 inch in each axis make of them.
@@ -103,7 +103,7 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
     there = (dot(to_end, first), dot(to_end, second))
     radius, last = here[0], math.hypot(*there)
     allowed = min(max(ROUNDING_MM, RELATIVE_TOLERANCE * radius), LARGEST_DIFFERENCE)
-    if last < SMALLEST_RADIUS or abs(last - radius) > allowed:
+    if last < SAME_POINT or abs(last - radius) > allowed:
         raise ArcError(
             f"an arc whose end lies {abs(last - radius):.4f} mm off its circle (radius {radius:.4f} mm at the start, "
             f"{last:.4f} mm at the end)",
