@@ -189,6 +189,7 @@ def _suits(state: State) -> bool:
         state.feed_mode in ("G93", "G94")
         and state.polar is None
         and state.unsettled is None
+        and state.corner is None
         and not state.height_lost
         and not state.arc_absolute
         and not frames.rotated
@@ -408,7 +409,7 @@ class _Lines:
         clockwise = bool(self.mode[row] == CLOCKWISE)
         by_radius, by_center = not math.isnan(radius), not (math.isnan(i) and math.isnan(j))
         no_end = math.isnan(x) and math.isnan(y)
-        if not math.isnan(off_plane) or by_radius == by_center or (by_radius and no_end):
+        if (not math.isnan(off_plane) and off_plane != 0.0) or by_radius == by_center or (by_radius and no_end):
             raise geometry.ArcError("words that do not fit", "")
         if by_radius:
             center = center_by_radius(start, end, radius, scale, clockwise)

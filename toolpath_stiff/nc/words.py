@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
@@ -19,10 +19,14 @@ from toolpath_stiff.errors import InputError, ProgramError
 
 NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails does not try shorter numbers
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
-WORD = re.compile(rf"([A-Z@^])({NUMBER})(E[+-]?\d++)?", re.ASCII)
+WORD = re.compile(rf"([A-Z@^]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
 AXES = "XYZABC"
 POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
-LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTUVWXYZ" + POLAR)
+CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (Fanuc, Haas)
+NOT_PYGCODES = (*POLAR, *CORNERS)
+LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
+# Statements of Fanuc's and Haas' macro language.
+MACRO = re.compile(r"IF(?=\[)|WHILE(?=\[)|GOTO|THEN|(?:DO|END)(?=\d)|POPEN|PCLOS|[BD]PRNT|SETVN")
 COMMENT = re.compile("[();]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
 # Caps. Longer is no NC program, and what reads a line takes time by the square of its length.
@@ -48,7 +52,8 @@ class Block:
     """One line of a program, read.
 
     `optional`: it begins with the block-delete slash; `switch`: the number of the slash, 1 to 9 (`/` is `/1`).
-    `percent`: it holds the tape mark alone.
+    `percent`: it holds the tape mark alone. `rest`: where a slash stands in the middle, the number of words before it;
+    those behind it are left out where its switch is on (Fanuc, Haas).
     """
 
     line: int
@@ -56,6 +61,13 @@ class Block:
     optional: bool = False
     percent: bool = False
     switch: int = 1
+    rest: int | None = None
+
+    def executed(self, switches: frozenset[int]) -> Block:
+        """The block without what the block-delete switches leave out behind a slash in its middle."""
+        if self.rest is None or self.switch not in switches:
+            return self
+        return replace(self, words=self.words[: self.rest])
 
 
 def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block:
@@ -81,26 +93,34 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
             file=name,
             line=line,
         )
-    start = 0
-    optional = compact[0] == "/"
-    switch = 1
-    if optional:
-        start = 1
-        while start < len(compact) and "0" <= compact[start] <= "9":
-            start += 1
-        switch = int(compact[1:start] or 1) if start < 3 else 0
-        if not 1 <= switch <= 9:
-            raise ProgramError(
-                f"block-delete switch {compact[:20][:start]!r}",
-                expected="/ or /1 to /9",
-                file=name,
-                line=line,
-                column=columns[0],
-            )
+    slash, start, rest, switch = compact.find("/"), 0, None, 1
+    if slash >= 0:
+        behind, switch = _slash(compact, slash, columns, line, name)
+        start = 0 if slash else behind
     if compact.startswith(("O", ":"), start):  # `:` is O on ISO tape
         return _program_number(compact[start:], columns[start], line, name)
-    words = _tokens(compact, columns, start, text, line, name)
-    return Block(line, _through_pygcode(words, line, name), optional=optional, switch=switch)
+    words = _tokens(compact, columns, start, text, line, name, slash if slash > 0 else None)
+    if slash > 0:
+        rest = len(words)
+        words += _tokens(compact, columns, behind, text, line, name)
+    return Block(line, _through_pygcode(words, line, name), optional=slash == 0, switch=switch, rest=rest)
+
+
+def _slash(compact: str, at: int, columns: Sequence[int], line: int, name: str) -> tuple[int, int]:
+    """Where a block-delete slash and its number end, and which switch it names."""
+    end = at + 1
+    while end < len(compact) and "0" <= compact[end] <= "9":
+        end += 1
+    switch = int(compact[at + 1 : end] or 1) if end < at + 3 else 0
+    if not 1 <= switch <= 9:
+        raise ProgramError(
+            f"block-delete switch {compact[at : min(end, at + 20)]!r}",
+            expected="/ or /1 to /9",
+            file=name,
+            line=line,
+            column=columns[at],
+        )
+    return end, switch
 
 
 def _program_number(compact: str, column: int, line: int, name: str) -> Block:
@@ -134,23 +154,15 @@ def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Seque
         return compact, [column for column, character in enumerate(text, 1) if not character.isspace()]
     characters: list[str] = []
     columns: list[int] = []
-    inside = 0
+    depth = begun = 0
     for column, character in enumerate(text, 1):
-        if inside:
-            if character == ")":
-                inside = 0
-            elif character == "(":
-                raise ProgramError(
-                    "a comment within a comment",
-                    expected="`)` before the next `(`",
-                    file=name,
-                    line=line,
-                    column=column,
-                )
-        elif character == "(":
-            inside = column
+        if character == "(":  # Haas' controls have comments within comments
+            begun = begun if depth else column
+            depth += 1
+        elif depth:
+            depth -= character == ")"
         elif character == ";":
-            if not semicolon and text[column:].strip():
+            if not semicolon and _strip(text[column:].replace(";", " "), line, name, semicolon)[0]:
                 raise ProgramError(
                     f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect",
                     expected="comments in parentheses, one block a line",
@@ -165,19 +177,22 @@ def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Seque
             # Of other scripts some letters grow in upper case, and some become ASCII ones.
             characters.append(character.upper() if character.isascii() else character)
             columns.append(column)
-    if inside:
+    if depth:
         raise ProgramError(
-            "a comment is not closed", expected="`)` on the same line", file=name, line=line, column=inside
+            "a comment is not closed", expected="`)` on the same line", file=name, line=line, column=begun
         )
     return "".join(characters), columns
 
 
-def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: int, name: str) -> list[Word]:
+def _tokens(
+    compact: str, columns: Sequence[int], start: int, text: str, line: int, name: str, stop: int | None = None
+) -> list[Word]:
     """Words of the compacted text; N words are checked and left out."""
     words: list[Word] = []
     position = start
-    while position < len(compact):
-        match = WORD.match(compact, position)
+    stop = len(compact) if stop is None else stop
+    while position < stop:
+        match = WORD.match(compact, position, stop)
         column = columns[position]
         if match is None:
             raise _unreadable(compact, position, column, line, name)
@@ -231,7 +246,11 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
             found, expected = f"{tail!r} is not a finite number", "a decimal number"
         else:
             found, expected = f"the word {character!r} has no number", f"a number after {character}"
-    if character == "#" or follower == "#" or character == "=":
+    macro = MACRO.match(compact, position)
+    if macro is not None:
+        found, expected = f"{macro[0]} is a statement of a control's macro language, which is not read", "plain blocks"
+        hint = "post the program without macros"
+    elif character == "#" or follower == "#" or character == "=":
         found, expected = "variables (#) are not supported", "numbers"
         hint = "post the program without variables, or give --interpreter linuxcnc"
     elif character == "[" or follower == "[":
@@ -251,7 +270,7 @@ def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...
     from pygcode.exceptions import GCodeWordStrError
     from pygcode.words import text2words
 
-    all_words, words = words, [word for word in words if word.letter not in POLAR]
+    all_words, words = words, [word for word in words if word.letter not in NOT_PYGCODES]
 
     try:
         read = list(text2words(" ".join([_plain(word) for word in words])))

@@ -32,7 +32,7 @@ from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
 from toolpath_stiff.nc.controller import MILLISECONDS, SECONDS
 from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
-from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, State
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, State
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
@@ -99,6 +99,8 @@ def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
     if code != state.feed_mode:
         state.feed = None  # the old number means something else now
     state.feed_mode = code
+    if code == "G95":
+        state.turning.setdefault("feed per revolution (G95)", block.line)
 
 
 def feed_word(state: State, block: CurrentBlock, code: str) -> None:
@@ -140,6 +142,7 @@ def speed_word(state: State, block: CurrentBlock, code: str) -> None:
 def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
     """G96: D is its greatest spindle speed, which does not enter."""
     block.take("D")
+    state.turning.setdefault("constant surface speed (G96)", block.line)
 
 
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
@@ -173,7 +176,7 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
         raise block.fail(
             words[0] if words else block.block.words[0],
             "is a feed move before any feed" if state.feed_mode != "G93" else "is a feed move without F under G93",
-            "F above 0",
+            "F above 0" if state.feed_mode != "G94" else "F above 0, or --feed MM_PER_MIN for such moves",
         )
     if state.feed_mode == "G93":
         feed, state.feed = state.feed, None  # every move needs its own
@@ -244,10 +247,9 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def end_of_subprogram(state: State, block: CurrentBlock, code: str) -> None:
-    """M99: back to the block after the call."""
-    if block.has("P"):
-        raise block.fail(block.values["P"], "makes M99 return to another block, which is not supported", "M99")
-    block.flow = Flow.RETURN
+    """M99: back to the block after the call; with P, to the block of the caller with that N number."""
+    number = block.whole("P", block.codes[code])
+    block.flow = Flow.RETURN if number is None else GoTo(number, block.values["P"].column)
 
 
 def end_of_program(state: State, block: CurrentBlock, code: str) -> None:

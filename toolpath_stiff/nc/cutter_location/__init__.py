@@ -57,6 +57,7 @@ def read(
     default_origin: Pose,
     tools: dict[int, ToolEntry] | None,
     warnings: tuple[str, ...] = (),
+    feed: float | None = None,
 ) -> Program:
     """Read a cutter-location file.
 
@@ -70,6 +71,8 @@ def read(
         Tool table; its lengths win over the file's.
     warnings
         Warnings of the reader, which come first.
+    feed
+        Of cuts before the first FEDRAT, mm/min; None: they are refused.
 
     Raises
     ------
@@ -82,7 +85,7 @@ def read(
     >>> read(lines, "part.apt", "", None, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), None)
     <Program part.apt: 2 moves, read as cutter-location file>
     """
-    state = State(name, copy.deepcopy(tools))
+    state = State(name, copy.deepcopy(tools), feed=feed)
     run(state, lines)
     if not state.recorder.cuts:
         raise _no_cut(name)
@@ -238,10 +241,14 @@ class CheckedCutterLocation:
 
 
 def check(
-    lines: tuple[str, ...], name: str, tools: dict[int, ToolEntry] | None, most_errors: int
+    lines: tuple[str, ...],
+    name: str,
+    tools: dict[int, ToolEntry] | None,
+    most_errors: int,
+    feed: float | None = None,
 ) -> CheckedCutterLocation:
     """Check a cutter-location file: it goes on where `read` would stop, up to so many errors."""
-    state = State(name, copy.deepcopy(tools))
+    state = State(name, copy.deepcopy(tools), feed=feed)
     checked = CheckedCutterLocation(state, in_force(state))
 
     def on_error(error: InputError) -> None:

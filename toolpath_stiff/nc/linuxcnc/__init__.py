@@ -36,6 +36,7 @@ HARMLESS_WORD = re.compile(r"([GM])([0-9]+\.?[0-9]*)")
 FILES = re.compile(r"\s*(logopen|logappend|probeopen)\b", re.IGNORECASE)
 LOOPS = re.compile(r"O(?:<[^<>]*>|\d+|[#\[].*)(?:WHILE|REPEAT|DO)")
 MOST_NAMED = 5  # loops, in a message
+TURNING = re.compile(r"G0*(33|76|95|96)(?![\d.])")  # what lathes' programs have, seldom those of mills
 WAITS = re.compile(r"M0*66(?!\d)")
 
 
@@ -50,6 +51,7 @@ class Reading:
     warnings: tuple[str, ...]
     assumptions: tuple[str, ...]
     tools: tuple[ToolUse, ...]
+    turning: dict[str, int]  # what makes the program look like a lathe's, with its line
 
 
 def read(
@@ -64,10 +66,12 @@ def read(
     rs274: str | None = None,
     limits: Limits | None = None,
     posted: bool = False,
+    feed: float | None = None,
 ) -> Reading:
     """Read a program (lines without line ends) with `rs274`; `origin`, `default_origin` in mm and degrees.
 
-    `posted`: it was posted for another machine, whose rotary axes have one zero for program and machine.
+    `posted`: it was posted for another machine, whose rotary axes have one zero for program and machine. `feed`: of
+    cuts before the first F, mm/min.
 
     Raises
     ------
@@ -76,7 +80,7 @@ def read(
     """
     lines = split(source, name)
     refuse_other_programs(lines, name)
-    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted)
+    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted, feed)
     return session.read(origin, default_origin)
 
 
@@ -100,6 +104,7 @@ class _Session:
     rs274: str
     limits: Limits | None
     posted: bool
+    feed: float | None = None
 
     def read(self, origin: ShopPose | None, default_origin: ShopPose) -> Reading:
         offsets = copying.deepcopy(self.offsets)
@@ -128,6 +133,7 @@ class _Session:
             warnings=tuple(self._warnings(says, given, follower)),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
             tools=tuple(self._tool_use(number) for number in follower.used_tools),
+            turning=self._turning(),
         )
 
     def _uses(self, codes: re.Pattern[str]) -> bool:
@@ -175,6 +181,8 @@ class _Session:
                 )
             active = plain[0]
             prefix.append("N0G54")
+        if self.feed is not None:
+            prefix.append(f"N0G21F{self.feed:.6f}")
         if any(shift):
             x, y, z = shift
             prefix += [f"N0G21G90G53G0X{x:.6f}Y{y:.6f}Z{z:.6f}", "N0G80"]
@@ -254,6 +262,13 @@ class _Session:
             m_from_mm(entry.stick_out),
             entry.material,
         )
+
+    def _turning(self) -> dict[str, int]:
+        found: dict[str, int] = {}
+        for line in self.lines:
+            for number in TURNING.findall(line.plain) if "G" in line.words else ():
+                found.setdefault(f"G{number}", line.number)
+        return found
 
     def _unsupported(self) -> list[Unsupported]:
         """Words that change nothing in a path, and comments that would write files."""
