@@ -20,7 +20,13 @@ from toolpath_stiff.nc.cutter_location.geometry import AxisError
 from toolpath_stiff.nc.cutter_location.modes import one_frame
 from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Statement, frame_in_comment, plain_point, read_statement
+from toolpath_stiff.nc.cutter_location.statements import (
+    Statement,
+    any_statement,
+    frame_in_comment,
+    plain_point,
+    read_statement,
+)
 from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program, Unsupported
@@ -145,6 +151,9 @@ def run(state: State, lines: tuple[str, ...], on_error: OnError | None = None, o
                     on_word(statement.word, statement.line)
                 _perform(state, statement, point)
         except InputError as error:
+            if state.last_word == "END" and not any_statement(lines[here:]):  # notes that a CAM system writes behind it
+                state.warnings.append(f"line {here + 1}: what follows END is no statement, and not read")
+                break
             _pass_on(error, on_error)
             at = max(at, here + 1)
     if state.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[at:]):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from operator import itemgetter
 
@@ -96,6 +96,11 @@ def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
         if seen >= HEAD_LINES:
             break
     return False
+
+
+def any_statement(lines: Iterable[str]) -> bool:
+    """Whether any of these lines is a statement that no other text looks like."""
+    return any(_SIGN.match(line) for line in lines)
 
 
 def plain_point(line: str) -> list[float] | None:
