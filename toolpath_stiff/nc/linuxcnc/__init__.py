@@ -12,6 +12,7 @@ from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
 from toolpath_stiff.nc.linuxcnc.canon import Follower
 from toolpath_stiff.nc.linuxcnc.inputs import (
+    Dropped,
     Line,
     first_offset,
     needs_tags,
@@ -22,6 +23,7 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
     tool_file,
     tool_numbers,
     unclosed,
+    without_others,
 )
 from toolpath_stiff.nc.linuxcnc.runner import Limits, Run, StoppedError, find_rs274, message_and_line, run_rs274
 from toolpath_stiff.nc.moves import Moves, ToolUse, Unsupported
@@ -78,16 +80,27 @@ def read(
     InputError
         The fence, or the interpreter, refuses the program, or a limit was exceeded.
     """
+    lines, dropped = _checked(source, name)
+    session = _Session(
+        source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted, feed, dropped
+    )
+    return session.read(origin, default_origin)
+
+
+def _checked(source: Sequence[str], name: str) -> tuple[list[Line], list[Dropped]]:
+    """The lines for rs274, which have passed the fence, and what was left out of them."""
     lines = split(source, name)
     refuse_other_programs(lines, name)
-    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted, feed)
-    return session.read(origin, default_origin)
+    lines, dropped = without_others(lines)
+    if dropped:
+        refuse_other_programs(lines, name)
+    return lines, dropped
 
 
 def refusal(source: Sequence[str], name: str) -> InputError | None:
     """Why the second interpreter is not started on a program; None if it may be."""
     try:
-        refuse_other_programs(split(source, name), name)
+        _checked(source, name)
     except InputError as error:
         return error
     return None
@@ -105,6 +118,7 @@ class _Session:
     limits: Limits | None
     posted: bool
     feed: float | None = None
+    dropped: Sequence[Dropped] = ()
 
     def read(self, origin: ShopPose | None, default_origin: ShopPose) -> Reading:
         offsets = copying.deepcopy(self.offsets)
@@ -131,7 +145,7 @@ class _Session:
             source=says,
             unsupported=tuple(self._unsupported()),
             warnings=tuple(self._warnings(says, given, follower)),
-            assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
+            assumptions=(START, "LinuxCNC's interpreter (rs274) read the program", *self._left_out()),
             tools=tuple(self._tool_use(number) for number in follower.used_tools),
             turning=self._turning(),
         )
@@ -270,9 +284,27 @@ class _Session:
                 found.setdefault(f"G{number}", line.number)
         return found
 
+    def _left_out(self) -> list[str]:
+        if not self.dropped:
+            return []
+        words = list(dict.fromkeys(word for _, word in self.dropped))
+        more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
+        return [
+            "left out for LinuxCNC's interpreter, which does not know it there, and which changes no path: "
+            f"{', '.join(words[:MOST_NAMED])}{more}"
+        ]
+
     def _unsupported(self) -> list[Unsupported]:
         """Words that change nothing in a path, and comments that would write files."""
-        found = []
+        found = [
+            Unsupported(
+                number,
+                self._column(self.lines[number - 1], word),
+                word,
+                "an M code of one control, not acted upon" if word[0] == "M" else "changes no path",
+            )
+            for number, word in self.dropped
+        ]
         for line in self.lines:
             if "G" in line.words or "M" in line.words:
                 for letter, digits in HARMLESS_WORD.findall(line.plain):
@@ -302,6 +334,11 @@ class _Session:
                 "the program or the offsets file sets G54; --origin overrides it, other offsets keep their distance "
                 "to it"
             )
+        warnings += [
+            f"line {number}: what {word} does on its control is not known"
+            for number, word in self.dropped
+            if word[0] == "M"
+        ]
         warnings += [
             f"line {line.number}: M66 waits for an input that is not there; what depends on it may differ"
             for line in self.lines

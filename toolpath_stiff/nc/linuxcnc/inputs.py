@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.tables import FIRST_OFFSET, HOME_G28, HOME_G30, OFFSET_STRIDE, ROTATION, Offsets, ToolEntry
@@ -42,6 +42,13 @@ class Line:
     words: str
     comments: tuple[tuple[int, str], ...] = ()
     optional: bool = False
+    rest: int | None = None  # how many characters of the words stand before a slash in the middle
+
+    def left_by_switches(self) -> Line:
+        """What block delete leaves of it."""
+        if not self.optional and self.rest is None:
+            return self
+        return replace(self, words=self.words[: 0 if self.optional else self.rest])
 
     @property
     def plain(self) -> str:
@@ -73,25 +80,30 @@ def _split_line(text: str, number: int, name: str) -> Line:
     optional = compact.startswith("/")
     if optional:
         compact = compact[1:].lstrip("0123456789")
-    return Line(
-        number, LINE_NUMBER.sub("", compact, count=1) if compact.startswith("N") else compact, comments, optional
-    )
+    compact = LINE_NUMBER.sub("", compact, count=1) if compact.startswith("N") else compact
+    rest = None
+    if "/" in compact and TOKENS.fullmatch(compact.replace("/", "")):  # of a block, no quotient
+        before, _, behind = compact.partition("/")
+        rest, compact = len(before), before + behind.lstrip("0123456789")
+    return Line(number, compact, comments, optional, rest)
 
 
 def _cut_comments(text: str, number: int, name: str) -> tuple[str, tuple[tuple[int, str], ...]]:
-    """LinuxCNC's rule: `(` to the next `)`, and outside of that `;` to the end; comments become blanks."""
+    """`(` to its `)`, and outside of that `;` to the end; comments become blanks.
+
+    LinuxCNC refuses a comment within a comment, which Haas' controls have; the copy has neither.
+    """
     words, comments = [], []
-    start = 0
+    start = depth = 0
     for column, character in enumerate(text, 1):
         if start:
-            if character == "(":
-                raise ProgramError("a comment within a comment", expected="`)`", file=name, line=number, column=column)
-            if character == ")":
+            depth += (character == "(") - (character == ")")
+            if not depth:
                 comments.append((start, text[start : column - 1]))
                 start = 0
             words.append(" ")
         elif character == "(":
-            start = column
+            start, depth = column, 1
             words.append(" ")
         elif character == ")":
             raise ProgramError("`)` without `(`", file=name, line=number, column=column)
@@ -141,7 +153,7 @@ def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, tags: bool
             copy.append("")
             continue
         started = started or bool(line.words)
-        copy.append(_numbered_line(line, name, tags) if not (line.optional and block_delete) else "")
+        copy.append(_numbered_line(line.left_by_switches() if block_delete else line, name, tags))
     return "\n".join([*copy, "M2", ""])
 
 
@@ -194,6 +206,68 @@ def step_in_words(lines: Sequence[Line], number: int, axes: Sequence[str]) -> li
         if len(steps) == len(axes):
             return [steps[axis] for axis in axes]
     return None
+
+
+# -- what only confuses rs274 ------------------------------------------------------------------------------------------
+
+TOKEN = re.compile(r"([A-Z])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
+TOKENS = re.compile(rf"(?:{TOKEN.pattern})++", re.ASCII)
+KNOWN_M = frozenset((*range(10), 19, 30, *range(48, 54), *range(60, 69), *range(70, 74), *range(96, 200)))
+# Codes of other controls that change no path, with their words (as in `codes.registry`); the first three are
+# LinuxCNC's own with any other word.
+OTHERS_CODES = {"G5": "P", "G5.1": "QR", "G8": "P", "G9": "", "G103": "P", "G187": "PE", "G254": "", "G255": ""}
+OWN_CODES = ("G5", "G5.1", "G8")
+ARC_CODES = frozenset(("G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G40", "G90", "G91", "G94"))
+Dropped = tuple[int, str]  # line, word
+
+
+def without_others(lines: Iterable[Line]) -> tuple[list[Line], list[Dropped]]:
+    """The lines without words of other controls that change no path and that rs274 refuses; and those words.
+
+    Blocks of plain words alone are looked at; what is left of one is a part of its words, each as it was.
+    """
+    kept, dropped = [], list[Dropped]()
+    for line in lines:
+        out = _others(line.words) if line.rest is None and TOKENS.fullmatch(line.words) else ()
+        if out:
+            found = [match for match in TOKEN.finditer(line.words) if match[0] not in out]
+            dropped += [(line.number, word) for word in out]
+            kept.append(replace(line, words="".join(match[0] for match in found)))
+        else:
+            kept.append(line)
+    return kept, dropped
+
+
+def _others(words: str) -> tuple[str, ...]:
+    """The words of a block that rs274 need not see."""
+    tokens = [(letter, number, f"{letter}{float(number):g}") for letter, number in TOKEN.findall(words)]
+    codes = [code for letter, _, code in tokens if letter in "GM"]
+    letters = {letter for letter, _, _ in tokens}
+    foreign = {code for code in codes if code[0] == "M" and _is_foreign(float(code[1:]))}
+    out = {code for code in codes if code in OTHERS_CODES}
+    for code in tuple(out):
+        others = letters - set(OTHERS_CODES[code]) - {"G", "M", "F", "S", "T"}
+        if code in OWN_CODES and (others or not letters & set(OTHERS_CODES[code])):
+            out.discard(code)
+    taken = {letter for code in out for letter in OTHERS_CODES[code]}
+    if foreign and len(foreign) + len(out) == len(codes) and not letters & set("XYZABC"):
+        taken |= set("PQERS")
+    tool = "T" in letters or "M6" in codes
+    if (tool or "G43" in codes) and not any(code.startswith(("G41", "G42", "G96")) for code in codes):
+        taken |= {"D"}
+    if tool and not any(code.startswith(("G43", "G76")) for code in codes):
+        taken |= {"H"}
+    centres = {letter: float(number) for letter, number, _ in tokens if letter in "IJK"}
+    if any(centres.values()) and {code for code in codes if code[0] == "G"} <= ARC_CODES:
+        taken |= {letter for letter, value in centres.items() if not value and len(centres) == 3}
+    return tuple(
+        letter + number for letter, number, code in tokens if code in out or code in foreign or letter in taken
+    )
+
+
+def _is_foreign(number: float) -> bool:
+    """Whether rs274 has no such M code; those that it rounds to a user's are the fence's."""
+    return number == int(number) and int(number) not in KNOWN_M
 
 
 # -- the fence ---------------------------------------------------------------------------------------------------------
