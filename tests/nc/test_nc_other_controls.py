@@ -367,3 +367,28 @@ def test_a_feed_for_programs_without_one():
     assert "as asked for" in program.assumptions[-1]
     with pytest.raises(InputError, match="--feed MM_PER_MIN"):
         parse_program(apt, "p.apt")
+
+
+# -- text before the tape mark -----------------------------------------------------------------------------------------
+
+
+def test_text_before_the_tape_mark_is_no_part_of_the_program():
+    text = "Part: bracket, rev. A\nmade 2024-05-01 by J.\n\n%\nO1234(NAME)\nG21 G90 F600\nG1 X5\nM30\n%\n"
+    program = parse_program(text, "p.nc")
+    assert cuts(program) == [[5, 0, 0]]
+    assert program.moves.line.tolist() == [7]
+    assert any("before the tape mark (%) in line 4 is not read" in text for text in program.warnings)
+    assert check_lines(tuple(text.splitlines()), "p.nc").complete
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Part: bracket\nG21 G90 F600\nG1 X5\nM30\n%\n",  # the mark ends the program
+        "G1 X5 F100\nsome text\n%\nG1 X6\nM30\n%\n",  # a block stands before it too
+        "text\n" * 60 + "%\nG1 X6 F100\nM30\n%\n",
+    ],
+)
+def test_text_that_is_no_leader_is_refused(text):
+    with pytest.raises(InputError):
+        parse_program(text, "p.nc")
