@@ -38,7 +38,7 @@ from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_para
 from toolpath_stiff.nc.moves import Jump
 from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
-from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word, read_block
+from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word, leader, read_block
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.plain_lines import PlainRun
@@ -226,7 +226,6 @@ def _move(state: State, block: CurrentBlock) -> None:
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
 MOST_REPEATS = 9999
-LONGEST_LEADER = 50  # lines of text before the first tape mark
 FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
 SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
 HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
@@ -277,7 +276,9 @@ class ProgramRun:
 
     def run(self) -> list[str]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
-        at, percent, numbered = self._leader(), False, False
+        at, percent, numbered = leader(self.lines, self.name, self.state.dialect.semicolon), False, False
+        if at:
+            self.state.warnings.append(f"what stands before the tape mark (%) in line {at + 1} is not read")
         while at < len(self.lines):
             if self._plain is not None and not self._levels:
                 rows = self._plain.execute(at)
@@ -315,27 +316,6 @@ class ProgramRun:
                         continue
             at += 1
         return self._end(len(self.lines) - 1, "the file")
-
-    def _leader(self) -> int:
-        """The line of the first tape mark, if what stands before it is text that no block reads; else the first one.
-
-        Controls read nothing before the tape mark (Fanuc's operator's manuals, "Leader section").
-        """
-        heads = self.lines[: LONGEST_LEADER + 1]
-        mark = next((at for at, line in enumerate(heads) if line.strip() == "%"), 0)
-        texts = [(at, line) for at, line in enumerate(self.lines[:mark]) if line.strip()]
-        if not texts or not any(line.strip() not in ("", "%") for line in self.lines[mark + 1 :]):
-            return 0
-        unread = 0
-        for at, line in texts:
-            try:
-                if read_block(line, at + 1, self.name, self.state.dialect.semicolon).words:
-                    return 0
-            except InputError:
-                unread += 1
-        if unread:
-            self.state.warnings.append(f"what stands before the tape mark (%) in line {mark + 1} is not read")
-        return mark if unread else 0
 
     def _block(self, at: int) -> Block:
         if not self._levels:

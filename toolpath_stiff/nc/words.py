@@ -28,12 +28,14 @@ LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
 # Statements of Fanuc's and Haas' macro language.
 MACRO = re.compile(r"IF(?=\[)|WHILE(?=\[)|GOTO|THEN|(?:DO|END)(?=\d)|POPEN|PCLOS|[BD]PRNT|SETVN")
 COMMENT = re.compile("[();]")
+EXPRESSION = re.compile(r"[#\[]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
 # Caps. Longer is no NC program, and what reads a line takes time by the square of its length.
 LARGEST_FILE = 512 << 20  # bytes: some ten million lines
 LONGEST_LINE = 10_000  # characters, comments included
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
 LONGEST_NUMBER = 100  # characters
+LONGEST_LEADER = 50  # lines of text before the first tape mark
 MOST_DIGITS = 9  # of a program number, its O included
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
 
@@ -94,6 +96,8 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
             line=line,
         )
     slash, start, rest, switch = compact.find("/"), 0, None, 1
+    if slash > 0 and EXPRESSION.search(compact):  # a quotient
+        slash = -1
     if slash >= 0:
         behind, switch = _slash(compact, slash, columns, line, name)
         start = 0 if slash else behind
@@ -310,6 +314,25 @@ def _expected(letter: str) -> str:
     if letter in "LTN":
         return "a whole number that is not negative"
     return "a decimal number"
+
+
+def leader(lines: Sequence[str], name: str, semicolon: bool) -> int:
+    """The line (from 0) of the first tape mark, if what stands before it is text that no block reads; else the first.
+
+    Controls read nothing before the tape mark (Fanuc's operator's manuals, "Leader section").
+    """
+    mark = next((at for at, line in enumerate(lines[: LONGEST_LEADER + 1]) if line.strip() == "%"), 0)
+    texts = [(at, line) for at, line in enumerate(lines[:mark]) if line.strip()]
+    if not texts or not any(line.strip() not in ("", "%") for line in lines[mark + 1 :]):
+        return 0
+    unread = 0
+    for at, line in texts:
+        try:
+            if read_block(line, at + 1, name, semicolon).words:
+                return 0
+        except InputError:
+            unread += 1
+    return mark if unread else 0
 
 
 # -- text to lines -----------------------------------------------------------------------------------------------------

@@ -155,24 +155,31 @@ def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, give
 
 def _words_of_one_control(state: State, block: CurrentBlock, code: str) -> None:
     """I, J, K of Haas' pecks; what taps and fine boring have besides, which changes no cut."""
-    pecking = [letter for letter in "IJK" if block.has(letter)]
-    if pecking and code in PECKS and state.dialect.name == "haas":
-        if "Q" in block.values or "I" not in pecking or ("J" in pecking and "K" not in pecking):
-            raise block.fail(block.values[pecking[0]], "beside Q, or without I or K", "Q, or I, J and K")
-        for letter in "IJK":
-            state.sticky[letter] = abs(block.take(letter) or 0.0) * state.length_scale
-        state.sticky["Q"] = state.sticky["K"] or state.sticky["I"]
-    elif "Q" in block.values:
-        state.sticky |= dict.fromkeys("IJK", 0.0)
-    if code in TAPS and block.has("J") and state.dialect.name == "haas":
-        block.take("J")
+    haas = state.dialect.name == "haas"
+    if code in PECKS and haas:
+        _shallower_pecks(state, block)
+    if code in TAPS and haas and block.take("J") is not None:
         state.note(block.line, block.values["J"], "how much faster the tap comes out")
     if code in TAPS and state.sticky.get("Q"):
         raise block.fail(block.values.get("Q"), "is a tap in pecks, which depends on the control's parameters", "no Q")
-    if code == "G76":
-        for letter in "QIJ":
-            if letter in block.values and (letter == "Q" or block.take(letter) is not None):
-                state.note(block.line, block.values[letter], "the shift off the wall before the rapid out")
+    for letter in "QIJ" if code == "G76" else "":
+        block.take(letter)
+        if letter in block.values:
+            state.note(block.line, block.values[letter], "the shift off the wall before the rapid out")
+
+
+def _shallower_pecks(state: State, block: CurrentBlock) -> None:
+    """I: the first peck; J: how much less each further one is; K: the least (Haas' manual, G83)."""
+    given = [letter for letter in "IJK" if block.has(letter)]
+    if not given:
+        if "Q" in block.values:
+            state.sticky |= dict.fromkeys("IJK", 0.0)
+        return
+    if "Q" in block.values or "I" not in given or ("J" in given and "K" not in given):
+        raise block.fail(block.values[given[0]], "beside Q, or without I or K", "Q, or I, J and K")
+    for letter in "IJK":
+        state.sticky[letter] = abs(block.take(letter) or 0.0) * state.length_scale
+    state.sticky["Q"] = state.sticky["K"] or state.sticky["I"]
 
 
 def _check_cycle(state: State, block: CurrentBlock, code: str, normal: int) -> None:

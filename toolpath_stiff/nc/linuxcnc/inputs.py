@@ -240,29 +240,47 @@ def without_others(lines: Iterable[Line]) -> tuple[list[Line], list[Dropped]]:
 
 def _others(words: str) -> tuple[str, ...]:
     """The words of a block that rs274 need not see."""
-    tokens = [(letter, number, f"{letter}{float(number):g}") for letter, number in TOKEN.findall(words)]
-    codes = [code for letter, _, code in tokens if letter in "GM"]
-    letters = {letter for letter, _, _ in tokens}
-    foreign = {code for code in codes if code[0] == "M" and _is_foreign(float(code[1:]))}
-    out = {code for code in codes if code in OTHERS_CODES}
-    for code in tuple(out):
-        others = letters - set(OTHERS_CODES[code]) - {"G", "M", "F", "S", "T"}
-        if code in OWN_CODES and (others or not letters & set(OTHERS_CODES[code])):
-            out.discard(code)
-    taken = {letter for code in out for letter in OTHERS_CODES[code]}
-    if foreign and len(foreign) + len(out) == len(codes) and not letters & set("XYZABC"):
-        taken |= set("PQERS")
-    tool = "T" in letters or "M6" in codes
-    if (tool or "G43" in codes) and not any(code.startswith(("G41", "G42", "G96")) for code in codes):
-        taken |= {"D"}
-    if tool and not any(code.startswith(("G43", "G76")) for code in codes):
-        taken |= {"H"}
-    centres = {letter: float(number) for letter, number, _ in tokens if letter in "IJK"}
-    if any(centres.values()) and {code for code in codes if code[0] == "G"} <= ARC_CODES:
-        taken |= {letter for letter, value in centres.items() if not value and len(centres) == 3}
+    tokens = TOKEN.findall(words)
+    codes = {f"{letter}{float(number):g}" for letter, number in tokens if letter in "GM"}
+    letters = {letter for letter, _ in tokens}
+    out = _others_codes(codes, letters)
+    taken = _centres_of_no_plane(tokens, codes) | _numbers_of_tools(codes, letters)
+    taken |= {letter for code in out for letter in OTHERS_CODES.get(code, "")}
+    if out == codes and any(code[0] == "M" for code in out) and not letters & set("XYZABC"):
+        taken |= set("PQERS")  # parameters of the M code
     return tuple(
-        letter + number for letter, number, code in tokens if code in out or code in foreign or letter in taken
+        letter + number
+        for letter, number in tokens
+        if letter in taken or (letter in "GM" and f"{letter}{float(number):g}" in out)
     )
+
+
+def _others_codes(codes: set[str], letters: set[str]) -> set[str]:
+    """Codes of a block that are of other controls."""
+    out = {code for code in codes if code[0] == "M" and _is_foreign(float(code[1:]))}
+    for code in codes & OTHERS_CODES.keys():
+        words = set(OTHERS_CODES[code])
+        if code not in OWN_CODES or (letters & words and letters <= words | set("GMFST")):
+            out.add(code)
+    return out
+
+
+def _numbers_of_tools(codes: set[str], letters: set[str]) -> set[str]:
+    """D and H of a block that calls a tool or takes its length, and nothing that uses them."""
+    tool, taken = "T" in letters or "M6" in codes, set[str]()
+    if (tool or "G43" in codes) and not any(code.startswith(("G41", "G42", "G96")) for code in codes):
+        taken.add("D")
+    if tool and not any(code.startswith(("G43", "G76")) for code in codes):
+        taken.add("H")
+    return taken
+
+
+def _centres_of_no_plane(tokens: Sequence[tuple[str, str]], codes: set[str]) -> set[str]:
+    """Those of I, J and K that are 0, where all three are given and not all 0."""
+    centres = {letter: float(number) for letter, number in tokens if letter in "IJK"}
+    if len(centres) < 3 or not any(centres.values()) or any(code[0] == "G" for code in codes - ARC_CODES):
+        return set()
+    return {letter for letter, value in centres.items() if not value}
 
 
 def _is_foreign(number: float) -> bool:
