@@ -386,6 +386,7 @@ def test_text_before_the_tape_mark_is_no_part_of_the_program():
     [
         "Part: bracket\nG21 G90 F600\nG1 X5\nM30\n%\n",  # the mark ends the program
         "G1 X5 F100\nsome text\n%\nG1 X6\nM30\n%\n",  # a block stands before it too
+        "#1 = 1\n%\nG1 X6 F100\nM30\n%\n",  # a variable may be meant
         "text\n" * 60 + "%\nG1 X6 F100\nM30\n%\n",
     ],
 )

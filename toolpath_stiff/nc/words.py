@@ -323,7 +323,8 @@ def leader(lines: Sequence[str], name: str, semicolon: bool) -> int:
     """
     mark = next((at for at, line in enumerate(lines[: LONGEST_LEADER + 1]) if line.strip() == "%"), 0)
     texts = [(at, line) for at, line in enumerate(lines[:mark]) if line.strip()]
-    if not texts or not any(line.strip() not in ("", "%") for line in lines[mark + 1 :]):
+    computed = any(EXPRESSION.search(line) for _, line in texts)
+    if not texts or computed or not any(line.strip() not in ("", "%") for line in lines[mark + 1 :]):
         return 0
     unread = 0
     for at, line in texts:
