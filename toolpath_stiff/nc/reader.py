@@ -168,11 +168,10 @@ def parse_program(
 
     What cannot be read is refused, with its place and what to do:
 
-    >>> parse_program("G21 G90\nG1 X10\n", "slot.nc")
+    >>> parse_program("G21 G90\nG1 X10\n", "slot.nc")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0, or \
---feed MM_PER_MIN for such moves
+    toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0, ...
     """
     lines, place = split_lines(text, name), None if origin is None else _six(origin)
     offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools
