@@ -136,8 +136,9 @@ def corner(
 
     Examples
     --------
-    >>> corner((0, 0, 0), (10, 0, 0), (10, 10, 0), (0.0, 0.0, 1.0), 2.0, rounded=True)[:3]
-    ((8.0, 0.0, 0.0), (10.0, 2.0, 0.0), (8.0, 2.0, 0.0))
+    >>> first, last, center, sweep = corner((0, 0, 0), (9, 0, 0), (9, 9, 0), (0.0, 0.0, 1.0), 2.0, rounded=True)
+    >>> first, center
+    ((7.0, 0.0, 0.0), (7.0, 2.0, 0.0))
     """
     here, z = np.asarray(at, dtype=float), np.array(normal)
     before, after = here - begin, np.asarray(end, dtype=float) - here
