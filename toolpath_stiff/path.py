@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.units import deg_from_rad, m_per_s_from_mm_per_min, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-RAPID_FEED = m_per_s_from_mm_per_min(10_000.0)  # assumed where no machine says otherwise
 ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
 BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
 MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
@@ -165,7 +165,7 @@ def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
 # -- sampling ----------------------------------------------------------------------------------------------------------
 
 
-def move_durations(moves: Moves, rapid_feed: float = RAPID_FEED) -> FloatArray:
+def move_durations(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> FloatArray:
     r"""(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s.
 
     Examples
@@ -181,7 +181,7 @@ def move_durations(moves: Moves, rapid_feed: float = RAPID_FEED) -> FloatArray:
 def sample_moves(
     moves: Moves,
     step: float,
-    rapid_feed: float = RAPID_FEED,
+    rapid_feed: float = defaults.RAPID_FEED,
     origin: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> Samples:
     r"""Sample moves along their true path, both ends of every move included.

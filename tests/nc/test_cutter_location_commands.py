@@ -169,3 +169,38 @@ def test_mutated_files_are_read_or_refused_with_their_line():
             outcomes["refused"] += 1
         check_lines(tuple(text.splitlines()), "part.apt")
     assert min(outcomes.values()) > 25
+
+
+CUTS = "UNITS/MM\nFEDRAT/600,MMPM\nFROM/0,0,50\nGOTO/0,0,9\n"
+
+
+def test_a_tap_feeds_in_and_out():
+    program = parse_program(
+        f"{CUTS}CYCLE/TAP,DEPTH,8,CLEAR,2,MMPM,100,RETURN,5\nGOTO/1,0,0\nCYCLE/OFF\nFINI\n", "p.apt"
+    )
+    cuts = program.moves.end[program.moves.motion == 3, 2] * 1e3
+    assert cuts.round(9).tolist() == [-8, 2]
+    assert program.moves.end[-1, 2] * 1e3 == pytest.approx(5)
+
+
+@pytest.mark.parametrize("word", ["ROTABL/ATANGL,0", "ROTABL/0,BAXIS", "ROTATE/TABLE,INCR,0.0"])
+def test_a_table_that_turns_by_nothing_is_listed(word):
+    program = parse_program(f"{CUTS}{word}\nGOTO/4,0,9\nFINI\n", "p.apt")
+    assert [(note.line, note.reason) for note in program.unsupported] == [(5, "a rotary axis that stays at 0")]
+    with pytest.raises(InputError, match="turns the work or the head"):
+        parse_program(f"{CUTS}{word.replace('0', '30', 1)}\nGOTO/4,0,9\nFINI\n", "p.apt")
+
+
+@pytest.mark.parametrize("word", ["MODE/TURN", "TOOLNO/1,TURN"])
+def test_turning_is_doubted(word):
+    program = parse_program(f"{CUTS}{word}\nGOTO/4,0,9\nFINI\n", "p.apt")
+    assert any(text.startswith(f"line 5: {word}: turning") for text in program.warnings)
+
+
+def test_notes_behind_the_end_are_not_read():
+    program = parse_program(f"{CUTS}GOTO/4,0,9\nEND\n*** 3 operations = 4 min\nG1 X5\n", "p.apt")
+    assert any("line 7: what follows END is no statement" in text for text in program.warnings)
+    assert len(program.moves) == 2
+    with pytest.raises(InputError) as refusal:
+        parse_program(f"{CUTS}GOTO/4,0,9\nEND\n*** = 4\nGOTO/9,9,9\nFINI\n", "p.apt")
+    assert refusal.value.line == 7

@@ -179,7 +179,7 @@ def test_harmless_lines_pass_the_fence(line, started):
 def test_no_comment_reaches_the_interpreter(started):
     """Were the fence to miss one, it would be gone: the copy has no comments but numbers and `abort`."""
     text = program_with("(msg,hello) G1 X1 (LOGOPEN,x.txt) ; print") + "(abort, (\n"
-    with pytest.raises(InputError, match="within"):
+    with pytest.raises(InputError, match="not closed"):
         parse_program(text, interpreter="linuxcnc")
     with pytest.raises(InputError, match="started"):
         parse_program(program_with("(msg,hello) G1 X1 (LOGOPEN,x.txt) ; print"), interpreter="linuxcnc")

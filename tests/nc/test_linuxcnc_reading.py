@@ -312,8 +312,51 @@ def test_programs_of_others_against_an_independent_reading(tmp_path):
             program = parse_program(text, file.name, tools=tools, interpreter="linuxcnc")
         except InputError:
             continue
+        if any(text.startswith("left out for") for text in program.assumptions):  # rs274 alone refuses it
+            continue
         home = tmp_path / f"home{index}"  # rs274 keeps its parameters from run to run
         home.mkdir()
         assert_same_path(program, rs274.run(file, home, table))
         read += 1
     assert read >= 25
+
+
+CONFUSING = {
+    "M codes of one control": ("M200\nM13 P5\nM250 G1 X2\nG1 X3", ["M200", "M13", "P5", "M250"], 3),
+    "codes of Haas and Fanuc": ("G103 P1\nG187 P1 E0.1\nG05 P10000\nG5.1 Q1\nG8 P1\nG09 G1 X4", None, 4),
+    "numbers of tools": ("T1 M6 D1 H1\nG43 H1 D1\nG1 X5", ["D1", "H1", "D1"], 5),
+    "centres of no plane": ("G2 X2 Y1 I1 J0 K0\nG1 X6", ["J0", "K0"], 6),
+    "comments and a slash": ("(a (b) c)\nG1 X1 / M8 Y2\nX7", [], 7),
+}
+
+
+@needs_rs274
+@pytest.mark.parametrize("kind", CONFUSING)
+def test_what_only_confuses_rs274_is_left_out_and_listed(kind):
+    blocks, words, end = CONFUSING[kind]
+    tools = {1: ToolEntry(1, 50.0, 6.0)}
+    text = f"G21 G90 F100\n#1=0\nG1 Y1 Y[#1+1]\n{blocks}\nM2\n".replace("G1 Y1 Y", "G1 Y")
+    program = parse_program(text, interpreter="auto", tools=tools)
+    assert program.interpreter == "linuxcnc"
+    assert program.moves.end[-1, 0] * 1e3 == pytest.approx(end)
+    found = [note.word for note in program.unsupported if note.word not in ("M8", "M6")]
+    if words is not None:
+        assert found == words
+    said = [text for text in program.assumptions if text.startswith("left out for LinuxCNC's interpreter")]
+    assert len(said) == (1 if found else 0)
+    unknown = [text for text in program.warnings if "on its control is not known" in text]
+    assert len(unknown) == sum(word[0] == "M" for word in found)
+
+
+@needs_rs274
+@pytest.mark.parametrize("block", ["M150", "M1 50", "M200 M150", "M99.9", "M[100+50]", "M200 M0150 P1"])
+def test_leaving_words_out_opens_no_gap_in_the_fence(block):
+    with pytest.raises(InputError, match=r"is not started on such a program|not an M code"):
+        parse_program(f"F100\nG1 X1\n{block}\nM2\n", interpreter="linuxcnc")
+
+
+@needs_rs274
+def test_a_slash_in_the_middle_is_a_switch_to_the_second_interpreter_too():
+    text = "G21 G90 F100\n#1=1\nG1 X#1\nX3 / Y4\nX[6/2]\nM2\n"
+    ends = [parse_program(text, interpreter="linuxcnc", block_delete=on).moves.end[-1, 1] for on in (False, True)]
+    assert np.allclose(ends, [4e-3, 0.0])

@@ -105,7 +105,7 @@ def test_m99_outside_any_subprogram_is_one_run_and_said():
         ("M98 P5\nM30\nO5\nS1\nO6\nM99", 5, "has no end"),
         ("M98 P5\nM30\nO5\nS1\nM99\nO5\nM99", 6, "in line 3 already"),
         ("M98 P21000\nM30\nO1000\nM99\nO21000\nM99", 1, "the file has both"),
-        ("M98 P5\nM30\nO5\nS1\nM99 P100", 5, "another block"),
+        ("M98 P5\nM30\nO5\nS1\nM99 P100", 5, "no such block"),
         ("G4 M98 P5\nM30\nO5\nS1\nM99", 1, "P"),
         ("O1\nG1 F100 X1\nO2\nS2\nM30", 3, "begins another program"),
         (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import options
@@ -21,6 +21,7 @@ FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0
 STRONGEST_N = 1e6
 LONGEST_STEP_MM = 1000.0
+FASTEST_MM_PER_MIN = 1e6
 
 
 def positive(name: str, value: float, unit: str, highest: float) -> float:
@@ -60,6 +61,19 @@ def origin_word(origin: Pose) -> str:
     return ",".join(words if any(origin[3:]) else words[:3])
 
 
+class Reading(TypedDict, total=False):
+    """How a program is read: the arguments of `Program.read`."""
+
+    dialect: str | None
+    controller: str | Path | None
+    offsets: str | Path | None
+    tools: str | Path | None
+    block_delete: bool | Iterable[int]
+    interpreter: str
+    rs274: str | None
+    feed_mm_per_min: float | None
+
+
 @dataclass(frozen=True)
 class Program:
     r"""An NC program or a cutter-location file, and how it is to be read.
@@ -97,6 +111,7 @@ class Program:
         block_delete: bool | Iterable[int] = False,
         interpreter: str = "builtin",
         rs274: str | None = None,
+        feed_mm_per_min: float | None = None,
     ) -> Program:
         """A program in a file.
 
@@ -117,6 +132,8 @@ class Program:
             "builtin"; "linuxcnc", LinuxCNC's rs274; "auto", the second where the first refuses.
         rs274
             LinuxCNC's interpreter, if it is not on PATH.
+        feed_mm_per_min
+            Feed of cuts before the program's first F (a cutter-location file's first FEDRAT), mm/min.
 
         Raises
         ------
@@ -127,26 +144,14 @@ class Program:
 
         if not Path(file).is_file():
             read_lines(file)  # says what is wrong with it
-        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
+        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274, feed_mm_per_min)
         return cls(Path(file).name, str(file), *_control(said, block_delete), said=said)
 
     @classmethod
-    def from_text(
-        cls,
-        text: str,
-        name: str = "program",
-        *,
-        dialect: str | None = None,
-        controller: str | Path | None = None,
-        offsets: str | Path | None = None,
-        tools: str | Path | None = None,
-        block_delete: bool | Iterable[int] = False,
-        interpreter: str = "builtin",
-        rs274: str | None = None,
-    ) -> Program:
-        """A program given as text; arguments as of `read`."""
-        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
-        return cls(name, None, *_control(said, block_delete), text, said)
+    def from_text(cls, text: str, name: str = "program", **reading: Unpack[Reading]) -> Program:
+        """A program given as text; further arguments as of `read`."""
+        said = _said(**reading)
+        return cls(name, None, *_control(said, reading.get("block_delete", False)), text, said)
 
     def __repr__(self) -> str:
         count = "" if self.text is None else f": {len(self.text.splitlines())} lines"
@@ -210,13 +215,14 @@ class Program:
 
 
 def _said(
-    dialect: str | None,
-    controller: str | Path | None,
-    offsets: str | Path | None,
-    tools: str | Path | None,
-    block_delete: bool | Iterable[int],
-    interpreter: str,
-    rs274: str | None,
+    dialect: str | None = None,
+    controller: str | Path | None = None,
+    offsets: str | Path | None = None,
+    tools: str | Path | None = None,
+    block_delete: bool | Iterable[int] = False,
+    interpreter: str = "builtin",
+    rs274: str | None = None,
+    feed_mm_per_min: float | None = None,
 ) -> dict[str, Any]:
     """What was said of the reading, as options have it; None for what was not."""
     switches = block_delete if isinstance(block_delete, bool) else sorted(block_delete)
@@ -229,6 +235,7 @@ def _said(
         "block_delete": ",".join(map(str, switches)) if isinstance(switches, list) else switches,
         "interpreter": interpreter if interpreter != "builtin" else None,
         "rs274": rs274,
+        "feed": None if feed_mm_per_min is None else positive("feed", feed_mm_per_min, "mm/min", FASTEST_MM_PER_MIN),
     }
 
 
@@ -243,6 +250,8 @@ def _control(said: Mapping[str, Any], block_delete: bool | Iterable[int]) -> tup
         found = replace(found, offsets=read_offsets(said["offsets"]))
     if said["tools"]:
         found = replace(found, tools=read_tool_table(said["tools"]))
+    if said["feed"]:
+        found = replace(found, feed=said["feed"])
     switches = block_delete if isinstance(block_delete, bool) else frozenset(block_delete)
     interpreter = said["interpreter"] or "builtin"
     return found, {"block_delete": switches, "interpreter": interpreter, "rs274": said["rs274"]}

@@ -159,6 +159,12 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
         help="who reads the program: ours; LinuxCNC's rs274, which knows variables, O words and cutter compensation; "
         "auto: the second where the first refuses (default: builtin)",
     )
+    group.add_argument(
+        "--feed",
+        type=positive_number("mm/min", 1e6),
+        metavar="MM_PER_MIN",
+        help="feed of cuts before the program's first F (a cutter-location file's first FEDRAT)",
+    )
     group.add_argument("--rs274", metavar="PATH", help="LinuxCNC's interpreter, if it is not on PATH")
 
 
@@ -244,6 +250,7 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
         "block_delete": args.block_delete,
         "interpreter": args.interpreter,
         "rs274": args.rs274,
+        "feed_mm_per_min": args.feed,
     }
 
 

@@ -24,8 +24,15 @@ from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
 from toolpath_stiff.nc.plain_lines import G_COLUMN
-from toolpath_stiff.nc.reader import INTERPRETERS, ZERO, foreign_program, parse_program
-from toolpath_stiff.nc.state import Call, Flow, State
+from toolpath_stiff.nc.reader import (
+    INTERPRETERS,
+    ZERO,
+    feed_assumption,
+    foreign_program,
+    lathe_warning,
+    parse_program,
+)
+from toolpath_stiff.nc.state import Flow, State, Then
 from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
 from toolpath_stiff.nc.words import Block
 from toolpath_stiff.units import Pose, m_from_mm, pose_in_mm, pose_in_si
@@ -138,7 +145,7 @@ class _CheckingRun(ProgramRun):
                 self.first[code] = (line + 1, column)
             self.count[code] = self.count.get(code, 0) + count
 
-    def _execute(self, block: Block) -> Flow | Call:
+    def _execute(self, block: Block) -> Then:
         for word in block.words:
             if word.letter in "GM":
                 code = f"{word.letter}{word.value:g}"
@@ -188,11 +195,14 @@ def check_lines(
     else:  # first in the coordinates of the machine that the program was posted for
         frames = Frames(copy.deepcopy(controller.offsets or Offsets()), None, ZERO, posted=posted)
     state = State(name, frames, copy.deepcopy(controller.tools), controller.dialect)
+    state.feed = controller.feed
     run = _CheckingRun(state, lines, name, switches_on(block_delete, controller))
     start = modal_state(state)
     errors, warnings = _run_to_the_end(run)
     warnings, assumptions = [*warnings, *state.warnings], list(state.assumptions)
     moves = state.recorder.moves() if len(state.recorder) else None
+    warnings += lathe_warning(state.turning, moves)
+    assumptions += feed_assumption(controller, moves)
     at = frames.origin
     if posted is not None:
         at = default if place is None else place
@@ -252,7 +262,7 @@ def _on_the_part(
 def _check_cutter_location(
     lines: tuple[str, ...], name: str, origin: Iterable[float], block_delete: bool, controller: Controller
 ) -> Checked:
-    checked = cutter_location.check(lines, name, controller.tools, MOST_ERRORS)
+    checked = cutter_location.check(lines, name, controller.tools, MOST_ERRORS, controller.feed)
     state = checked.state
     offsets = controller.offsets is not None and any(offset.given for offset in controller.offsets.table)
     warnings = (*cutter_location.not_for(controller, offsets, block_delete), *state.warnings)
@@ -308,7 +318,7 @@ def finding_of(error: InputError) -> Finding:
 
 
 def _of_unsupported(word: Unsupported) -> Finding:
-    text = f"{word.reason}; it would change {would_change(word.word) or NO_CHANGE}"
+    text = f"{word.reason}; it would change {would_change(word.word, listed=True) or NO_CHANGE}"
     return Finding(word.line, word.column, word.word, text, NOTE)
 
 

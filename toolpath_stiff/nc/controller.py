@@ -25,6 +25,7 @@ from toolpath_stiff.nc.kinematics import PostedKinematics, read_kinematics
 from toolpath_stiff.nc.tables import (
     HOMES,
     LARGEST_MM,
+    LARGEST_WORD,
     WORK_OFFSETS,
     Offsets,
     ToolEntry,
@@ -158,7 +159,17 @@ def dialect_named(name: str) -> Dialect:
 
 ALL_SWITCHES = frozenset(range(1, 10))
 TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "material", "remark")
-KEYS = ("dialect", "block_delete", "arc_centers", "inch_metric", "offsets", "tools", "kinematics", "setup")
+KEYS = (
+    "dialect",
+    "block_delete",
+    "arc_centers",
+    "inch_metric",
+    "offsets",
+    "tools",
+    "kinematics",
+    "setup",
+    "feed_mm_per_min",
+)
 G70_UNITS, G20_UNITS = "G70 G71", "G20 G21"
 
 
@@ -178,6 +189,8 @@ class Controller:
         The machine that programs were posted for; None: A, B, C are roll, pitch, yaw of the platform.
     setup
         Name of the clamping arrangement; None where the file has none.
+    feed
+        Feed of cuts before the first F of a program, mm/min; None: such a cut is refused.
     """
 
     dialect: Dialect = GENERIC
@@ -186,6 +199,7 @@ class Controller:
     tools: dict[int, ToolEntry] | None = None
     kinematics: PostedKinematics | None = None
     setup: str | None = None
+    feed: float | None = None
 
     @property
     def plain(self) -> bool:
@@ -270,6 +284,7 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
         _tools(toml),
         read_kinematics(toml),
         _setup(toml),
+        _feed(toml),
     )
 
 
@@ -292,6 +307,15 @@ def _setup(toml: TomlReader) -> str | None:
     value = toml.data.get("setup")
     if value is not None and not is_text(value):
         raise toml.error(f"setup = {value!r}", "the name of a set-up", where="setup")
+    return value
+
+
+def _feed(toml: TomlReader) -> float | None:
+    if "feed_mm_per_min" not in toml.data:
+        return None
+    value = toml.number("feed_mm_per_min", toml.data["feed_mm_per_min"], LARGEST_WORD)
+    if value <= 0.0:
+        raise toml.error(f"feed_mm_per_min = {value:g}", "more than 0", where="feed_mm_per_min")
     return value
 
 

@@ -7,32 +7,37 @@ Arcs of G2 and G3 have LinuxCNC's tolerances. Canned drilling cycles are expande
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.units import MM_PER_INCH
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Point2 = tuple[float, float]
 Vector = tuple[float, float, float]
 
-# LinuxCNC's defaults (manual, "INI configuration", CENTER_ARC_RADIUS_TOLERANCE_MM; interp_arc.cc): start and end radius
-# may differ by a thousandth of the radius, or by 0.00127 mm if that is more, and never by more than 0.127 mm.
+# Of LinuxCNC's rs274 2.9, by bisection (the tests hold both sides of each): start and end radius may differ by a
+# thousandth of the larger one, or by 2 sqrt(2) hundredths of a millimetre (thousandths of an inch in inch programs) if
+# that is more, and never by more than a hundred times that. It leaves room for ends that are rounded to 0.01 mm.
 RELATIVE_TOLERANCE = 1e-3
-ABSOLUTE_TOLERANCE = 1.27e-3
-LARGEST_DIFFERENCE = 100.0 * ABSOLUTE_TOLERANCE
-RADIUS_FORMAT_TOLERANCE = 1.27e-2  # a half chord may exceed R by this much (interp_internal.hh)
-SAME_POINT = 1e-12
+MM_TOLERANCE = 2.0 * math.sqrt(2.0) * 1e-2
+INCH_TOLERANCE = 2.0 * math.sqrt(2.0) * 1e-3 * MM_PER_INCH
+MOST_TOLERANCES = 100.0
+RADIUS_FORMAT_TOLERANCE = 1.27e-3  # mm; a half chord may exceed R by this much, in inch programs too
+SMALLEST_RADIUS = 1.27e-3  # mm; an arc of less is one of radius 0
 
 PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}  # first, second axis, normal: right-handed
 CENTER_WORDS = ("I", "J", "K")
 CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
+FEEDS_OUT = ("G89", "G84", "G74")
 PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
+CORNER_ANGLE = 1e-6  # rad; a corner of less is none
 SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
 MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
 
@@ -75,8 +80,10 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
     return (middle[0] - side * height * along[1], middle[1] + side * height * along[0])
 
 
-def check_radii(start: Point2, end: Point2, center: Point2) -> None:
+def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) -> None:
     """Raise `ArcError` if start and end do not lie on one circle about the centre within LinuxCNC's tolerance.
+
+    `inch`: it is an inch program, whose ends may be rounded to thousandths; the points are in mm all the same.
 
     Examples
     --------
@@ -87,12 +94,11 @@ def check_radii(start: Point2, end: Point2, center: Point2) -> None:
     toolpath_stiff.nc.geometry.ArcError: an arc of radius 0
     """
     first, last = math.dist(start, center), math.dist(end, center)
-    if first < SAME_POINT or last < SAME_POINT:
+    if first < SMALLEST_RADIUS or last < SMALLEST_RADIUS:
         raise ArcError("an arc of radius 0", "a centre apart from the start and the end point")
-    difference = abs(first - last)
-    relative = difference / max(first, last)
-    if difference > LARGEST_DIFFERENCE or (difference > ABSOLUTE_TOLERANCE and relative > RELATIVE_TOLERANCE):
-        allowed = min(max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * max(first, last)), LARGEST_DIFFERENCE)
+    difference, least = abs(first - last), INCH_TOLERANCE if inch else MM_TOLERANCE
+    allowed = min(max(least, RELATIVE_TOLERANCE * max(first, last)), MOST_TOLERANCES * least)
+    if difference > allowed:
         raise ArcError(
             f"an arc whose end lies {difference:.4f} mm off its circle (radius {first:.4f} mm at the start, "
             f"{last:.4f} mm at the end)",
@@ -118,6 +124,46 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
         sweep = math.tau
     sweep += math.tau * (turns - 1)
     return -sweep if clockwise else sweep
+
+
+def corner(
+    begin: Sequence[float], at: Sequence[float], end: Sequence[float], normal: Vector, size: float, rounded: bool
+) -> tuple[Vector, Vector, Vector, float] | None:
+    """Where a corner `at` between two straight moves is cut off or rounded; None where they go straight on.
+
+    Returns the end of the first move, the beginning of the second, the centre and the signed sweep in rad about
+    `normal` (a unit vector). Raises `ArcError` unless both moves lie in the plane of `normal` and are long enough.
+
+    Examples
+    --------
+    >>> first, last, center, sweep = corner((0, 0, 0), (9, 0, 0), (9, 9, 0), (0.0, 0.0, 1.0), 2.0, rounded=True)
+    >>> first, center
+    ((7.0, 0.0, 0.0), (7.0, 2.0, 0.0))
+    """
+    here, z = np.asarray(at, dtype=float), np.array(normal)
+    before, after = here - begin, np.asarray(end, dtype=float) - here
+    lengths = float(np.linalg.norm(before)), float(np.linalg.norm(after))
+    if min(lengths) == 0.0 or max(abs(before @ z), abs(after @ z)) > SAME_HEIGHT_MM:
+        raise ArcError("a corner between moves that do not lie in the plane, or have no length", "two moves in it")
+    u, v = before / lengths[0], after / lengths[1]
+    turn = math.atan2(float(np.cross(u, v) @ z), float(u @ v))
+    if abs(turn) < CORNER_ANGLE:
+        return None
+    if math.pi - abs(turn) < CORNER_ANGLE:
+        raise ArcError("a corner of a path that goes straight back", "another direction")
+    along = size * math.tan(abs(turn) / 2.0) if rounded else size
+    if along > min(lengths):
+        raise ArcError(
+            f"a corner that takes {along:.4f} mm of moves of {lengths[0]:.4f} and {lengths[1]:.4f} mm", "a smaller one"
+        )
+    left = math.copysign(size, turn) * np.cross(z, u)
+    first = here - along * u
+    return _vector(first), _vector(here + along * v), _vector(first + left), turn
+
+
+def _vector(values: FloatArray) -> Vector:
+    x, y, z = values.tolist()
+    return (x, y, z)
 
 
 # -- tool axes ---------------------------------------------------------------------------------------------------------
@@ -239,6 +285,10 @@ class Drilling:
     clear: float  # where the cycle ends: the R plane (G99) or where it began (G98)
     peck: float
     dwell: float
+    first: float = 0.0  # of the pecks that get shallower (Haas' I, J, K): the first, its reduction, the least
+    less: float = 0.0
+    least: float = 0.0
+    out_at_r: bool = False  # a tap feeds out to R, and from there at rapid (Fanuc, Haas); else to `clear`
 
 
 @dataclass(frozen=True)
@@ -261,20 +311,27 @@ def strokes(hole: Drilling) -> Iterator[Stroke]:
     """
     if hole.code in ("G73", "G83"):
         yield from _pecks(hole)
-    dwell = hole.dwell if hole.code in ("G82", "G89") else 0.0
-    yield Stroke(hole.bottom, feed=True, dwell=dwell)
-    if hole.code == "G85":  # out to the R plane at feed, from there at rapid
+    yield Stroke(hole.bottom, feed=True, dwell=0.0 if hole.code in ("G81", "G73", "G83", "G85") else hole.dwell)
+    if hole.code == "G85" or hole.out_at_r:  # out to the R plane at feed, from there at rapid
         yield Stroke(hole.retract, feed=True)
-    yield Stroke(hole.clear, feed=hole.code == "G89")
+    yield Stroke(hole.clear, feed=hole.code in FEEDS_OUT and not hole.out_at_r)
 
 
 def _pecks(hole: Drilling) -> Iterator[Stroke]:
     """The pecks above the bottom. G73 breaks the chip at depth, G83 clears it at the R plane."""
-    count = 1
-    while hole.retract - count * hole.peck > hole.bottom + SAME_HEIGHT_MM:
-        depth = hole.retract - count * hole.peck
+    for depth in _depths(hole):
         yield Stroke(depth, feed=True)
         if hole.code == "G83":
             yield Stroke(hole.retract, feed=False)
         yield Stroke(depth + PECK_CLEARANCE_MM, feed=False)
+
+
+def _depths(hole: Drilling) -> Iterator[float]:
+    count, depth = 1, hole.retract - (hole.first or hole.peck)
+    while depth > hole.bottom + SAME_HEIGHT_MM:
+        yield depth
+        if hole.first:
+            depth -= max(hole.first - count * hole.less, hole.least)
+        else:
+            depth = hole.retract - (count + 1) * hole.peck
         count += 1

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -30,23 +31,25 @@ from toolpath_stiff.nc.codes import (
     code_name,
 )
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
-from toolpath_stiff.nc.codes.offsets import HOLDS_TIP
+from toolpath_stiff.nc.codes.motion import homes_standing
+from toolpath_stiff.nc.codes.offsets import HOLDS_TIP, list_numbers
 from toolpath_stiff.nc.codes.points import read_numbers
 from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
 from toolpath_stiff.nc.moves import Jump
-from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, State
-from toolpath_stiff.nc.tables import LARGEST_MM
-from toolpath_stiff.nc.words import AXES, Block, Word, read_block
+from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, State, Then
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
+from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word, leader, read_block
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.plain_lines import PlainRun
 
 
+COORDINATES = frozenset((*AXES, "@"))
 LAST_MODE = STEPS[MODES[-1]]
 WORDS_THAT_ACT = (FEED, SPEED, TOOL)
 
 
-def execute(state: State, block: Block) -> Flow | Call:
+def execute(state: State, block: Block) -> Then:
     """Execute a block; returns what runs after it. Raises `InputError` at a word, or at the block."""
     if not block.words:
         return Flow.NEXT
@@ -64,12 +67,21 @@ def begin(state: State, block: Block) -> CurrentBlock:
     return current
 
 
-def finish(state: State, block: CurrentBlock) -> Flow | Call:
+def finish(state: State, block: CurrentBlock) -> Then:
     """Offsets and moves of the block begun; returns what runs after it."""
     _check_axis_words(block)
     for code in _in_order(block, ahead=False):
         code.act(state, block, code.name)
+    pending = state.corner
     _move(state, block)
+    for letter in CORNERS:
+        if block.has(letter):
+            CODES[letter].act(state, block, letter)
+    if pending is not None and state.corner is pending:
+        raise block.fail(
+            None, f"line {pending.line} makes a corner ({pending.letter}) with this block", "a feed move (G1)"
+        )
+    list_numbers(state, block)
     for letter in sorted(block.free):
         raise block.fail(block.values[letter], "is not used by any code of its block", hint="remove it")
     return block.flow
@@ -101,11 +113,14 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
             current.values[word.letter] = word
     current.free = set(current.values)
     for letter in ("U", "V", "W"):
-        if letter in current.values:
+        if letter in current.values and not homes_standing(current, letter):
             raise current.fail(current.values[letter], "moves an axis that this machine does not have", "X Y Z A B C")
-    for letter in (*AXES, "@"):
-        if letter in current.values and abs(current.values[letter].value) > LARGEST_MM:
-            raise current.fail(current.values[letter], "is beyond 100 m", f"at most {LARGEST_MM:g}")
+    for letter, word in current.values.items():
+        if letter in COORDINATES:
+            if abs(word.value) > LARGEST_MM:
+                raise current.fail(word, "is beyond 100 m", f"at most {LARGEST_MM:g}")
+        elif abs(word.value) > LARGEST_WORD:
+            raise current.fail(word, "is beyond any number that a control takes", f"at most {LARGEST_WORD:.0f}")
     return current
 
 
@@ -119,6 +134,8 @@ def _sort_g(state: State, block: CurrentBlock, word: Word) -> None:
         name = INCH_METRIC[name]
     _refuse(block, word, name)
     code = CODES.get(name)
+    if code is not None and code.listed and state.dialect.name not in code.controls:
+        raise block.fail(word, f"is not a code of the dialect {state.dialect.name}", " or ".join(code.controls))
     if code is None:
         raise block.fail(word, "is not a G code that is known", hint="check the program, or post it without it")
     if code.listed:
@@ -169,6 +186,8 @@ def _check_axis_words(block: CurrentBlock) -> None:
     present = [name for group in (ONCE, ROTATION, LENGTH) if (name := block.groups.get(group)) is not None]
     takers = [name for name in present if CODES[name].takes_axes]
     moving = block.groups.get(MOTION)
+    if takers in (["G28"], ["G30"]) and moving in ("G0", "G1"):  # it homes, and that motion mode holds afterwards
+        return
     if len(takers) > 1 or (takers and moving and moving != "G80"):
         other = moving if moving and len(takers) == 1 else takers[0]
         word = block.codes[takers[-1]]
@@ -208,8 +227,8 @@ DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older cont
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
 MOST_REPEATS = 9999
 FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
-SEQUENCE = re.compile(r"\s*(?:/\d?\s*)?[nN]\s*(\d+)(?![\d.])")
-HEAD = re.compile(r"\s*/?\s*[oO:]\s*(\d+)\s*(?:[(;].*)?$")
+SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
+HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
 
 
@@ -257,7 +276,9 @@ class ProgramRun:
 
     def run(self) -> list[str]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
-        at, percent, numbered = 0, False, False
+        at, percent, numbered = leader(self.lines, self.name, self.state.dialect.semicolon), False, False
+        if at:
+            self.state.warnings.append(f"what stands before the tape mark (%) in line {at + 1} is not read")
         while at < len(self.lines):
             if self._plain is not None and not self._levels:
                 rows = self._plain.execute(at)
@@ -283,14 +304,15 @@ class ProgramRun:
                     if isinstance(flow, Call):
                         at = self._jump(at, self._enter(at, flow))
                         continue
-                    if flow is Flow.RETURN:
-                        if not self._levels:
+                    if flow is Flow.RETURN or isinstance(flow, GoTo):
+                        to = self._return(at, flow)
+                        if to is None:
                             return [
                                 f"M99 in line {at + 1}, outside any subprogram, makes the control start the program "
                                 "again, without end: it is read once",
                                 *self._end(at, "M99"),
                             ]
-                        at = self._jump(at, self._leave())
+                        at = self._jump(at, to)
                         continue
             at += 1
         return self._end(len(self.lines) - 1, "the file")
@@ -306,14 +328,15 @@ class ProgramRun:
             block = self._called[at] = self._read(at)
         return block
 
-    def _execute(self, block: Block) -> Flow | Call:
+    def _execute(self, block: Block) -> Then:
         return execute(self.state, block)
 
     def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
         """Plain lines from `at` were executed; `rows` are their words (`plain_lines.PlainLines.rows`)."""
 
     def _read(self, at: int) -> Block:
-        return read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)
+        block = read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)
+        return block if block.rest is None else block.executed(self.switches)
 
     def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
         return ProgramError(found, expected=expected, hint=hint, file=self.name, line=at + 1, column=column)
@@ -352,7 +375,7 @@ class ProgramRun:
     def _enter(self, at: int, call: Call) -> int:
         """The line at which the called subprogram begins."""
         if call.local:
-            name, repeats, first = f"N{call.number}", call.repeats or 1, self._block_numbered(at, call)
+            name, repeats, first = f"N{call.number}", call.repeats or 1, self._block_numbered(at, "M97 calls", call)
         else:
             number, repeats = self._target(at, call)
             name, first = f"O{number}", self._heads()[number] + 1
@@ -372,26 +395,43 @@ class ProgramRun:
         self.jumps.append(Jump(len(self.state.recorder), at + 1, to))
         return to
 
-    def _block_numbered(self, at: int, call: Call) -> int:
-        """The line (from 0) of the block with M97's N number. Raises `InputError` unless there is one."""
+    def _block_numbered(self, at: int, what: str, call: Call | GoTo) -> int:
+        """The line (from 0) of the block with an N number. Raises `InputError` unless there is one."""
         if self._sequence is None:
             self._sequence = {}
             for index, line in enumerate(self.lines):
                 match = SEQUENCE.match(line)
                 if match:
-                    self._sequence.setdefault(int(match[1]), []).append(index)
+                    self._sequence.setdefault(int(match[1] or 0), []).append(index)
         found = self._sequence.get(call.number, [])
         if len(found) != 1:
             places = ", ".join(str(index + 1) for index in found)
             raise self._fail(
                 at,
-                f"M97 calls N{call.number}, which is in the lines {places}"
+                f"{what} N{call.number}, which is in the lines {places}"
                 if found
-                else f"M97 calls N{call.number}, and the file has no such block",
+                else f"{what} N{call.number}, and the file has no such block",
                 "one block with that number",
                 column=call.column,
             )
         return found[0]
+
+    def _return(self, at: int, flow: Flow | GoTo) -> int | None:
+        """The line at which M99 goes on; None where that is the beginning of the program, or before this line."""
+        if not isinstance(flow, GoTo):
+            return self._leave() if self._levels else None
+        to = self._block_numbered(at, "M99 P goes to", flow)
+        if not self._levels:
+            return to if to > at else None
+        level = self._levels.pop()
+        if level.again or to < level.back:
+            raise self._fail(
+                at,
+                f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram",
+                "a block after the call, which is not repeated",
+                column=flow.column,
+            )
+        return to
 
     def _leave(self) -> int:
         level = self._levels[-1]
@@ -439,13 +479,13 @@ class ProgramRun:
                 head = HEAD.match(line)
                 if head is None:
                     continue
-                number = int(head[1])
+                number = int(head[1] or 0)
                 if number in self._programs:
                     raise self._fail(index, f"O{number} is in line {self._programs[number] + 1} already")
                 self._programs[number] = index
         return self._programs
 
-    @property
+    @cached_property
     def _main(self) -> int:
         """The line of the main program's own number; -1 if it has none."""
         for index, line in enumerate(self.lines):

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.modes import bare_feed_is_open, length_of_move, rotary_feed
+from toolpath_stiff.nc.codes.modes import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
 from toolpath_stiff.nc.codes.motion import (
     ARCS,
     STILL,
@@ -42,22 +42,23 @@ from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, MovesInMm
 from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.tables import LARGEST_MM
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, read_block
 
 CHUNK = 8192  # lines: their words fit into a processor's cache
+LONGEST_PLAIN = 256  # characters; longer lines are left to `read_block`
 LETTERS = AXES + CENTER_LETTERS
 LENGTH_LETTERS = "XYZIJKR"
 G_COLUMN, FIRST_F, FIRST_LETTER = 0, 1, 2
 LAST_F = FIRST_LETTER + len(LETTERS)
 OTHER = LAST_F + 1  # the text of a line that is not plain
 
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
-_FEED = r"(?:F((?:[0-9]+\.?[0-9]*|\.[0-9]+)))?"
+_NUMBER = r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)"
+_FEED = r"(?:F((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
 _WORDS = "".join(f"(?:{letter}({_NUMBER}))?" for letter in LETTERS)
-_COMMENT = r"(?:\([^()\n]*\))*"
+_COMMENT = r"(?:\([^()\n]*+\))*+"
 # The order of words is that of every CAM system, F in front or behind; any other order is not plain.
-_LINE = rf"^{_COMMENT}(?:N[0-9]+)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_COMMENT}%s$|^(.+)$"
+_LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_COMMENT}%s$|^(.+)$"
 _PATTERNS = {True: re.compile(_LINE % r"(?:;.*)?", re.MULTILINE), False: re.compile(_LINE % ";?", re.MULTILINE)}
 _BARE = re.compile(r"^[+-]?0*[1-9][0-9]*$", re.MULTILINE)
 _POINTED = re.compile(r"^[+-]?0*[1-9][0-9]*\.$", re.MULTILINE)
@@ -96,6 +97,8 @@ class PlainLines:
 
     def _lex(self, at: int) -> None:
         chunk = self.lines[at : at + CHUNK]
+        if max(map(len, chunk)) > LONGEST_PLAIN:
+            chunk = [line if len(line) <= LONGEST_PLAIN else "!" for line in chunk]
         text = "\n".join(chunk).replace(" ", "").replace("\t", "")
         if text.isascii():  # of other scripts some letters become ASCII ones in upper case
             text = text.upper()
@@ -174,7 +177,7 @@ class PlainRun:
         row = first_bare(columns) if state.bare is None else None
         if row is not None:
             words = read_block(self.lines.lines[at + row], at + row + 1, self.name, state.dialect.semicolon).words
-            word = next(w for w in words if w.letter in LENGTH_LETTERS and is_bare(w.text[1:].replace(" ", "")))
+            word = next(w for w in words if w.letter in LENGTH_LETTERS and is_bare("".join(w.text[1:].split())))
             state.bare = (at + row + 1, word)
         warn_of_points(state)
 
@@ -186,6 +189,7 @@ def _suits(state: State) -> bool:
         state.feed_mode in ("G93", "G94")
         and state.polar is None
         and state.unsettled is None
+        and state.corner is None
         and not state.height_lost
         and not state.arc_absolute
         and not frames.rotated
@@ -211,9 +215,8 @@ class _Lines:
         }
         self.given = {letter: ~np.isnan(values) for letter, values in self.values.items()}
         self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
-        for letter in AXES:
-            if letter in self.values:
-                self._stop(np.abs(self.values[letter]) > LARGEST_MM)
+        for letter, values in self.values.items():
+            self._stop(np.abs(values) > (LARGEST_MM if letter in AXES else LARGEST_WORD))
         if state.dialect.increments:
             self._count_increments()
 
@@ -309,7 +312,7 @@ class _Lines:
         self.feed_row = np.concatenate([[-1], np.flatnonzero(said)])[order]
         before = math.nan if state.feed is None else state.feed
         self.feed = np.concatenate([[before], values * state.feed_scale])[order]
-        self._stop(self.feed == 0.0)
+        self._stop((self.feed < SLOWEST) | (self.feed > LARGEST_WORD))
         if bare_feed_is_open(state):
             self._stop(np.array([text != "" and "." not in text for text in texts]))
 
@@ -406,13 +409,13 @@ class _Lines:
         clockwise = bool(self.mode[row] == CLOCKWISE)
         by_radius, by_center = not math.isnan(radius), not (math.isnan(i) and math.isnan(j))
         no_end = math.isnan(x) and math.isnan(y)
-        if not math.isnan(off_plane) or by_radius == by_center or (by_radius and no_end):
+        if (not math.isnan(off_plane) and off_plane != 0.0) or by_radius == by_center or (by_radius and no_end):
             raise geometry.ArcError("words that do not fit", "")
         if by_radius:
             center = center_by_radius(start, end, radius, scale, clockwise)
         else:
             center = center_by_offsets(start, (0.0 if math.isnan(i) else i, 0.0 if math.isnan(j) else j), scale)
-        return center, sweep_about(center, start, end, clockwise)
+        return center, sweep_about(center, start, end, clockwise, state.inch)
 
     # -- feeds -----------------------------------------------------------------------------------------------------
 

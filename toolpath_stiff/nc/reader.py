@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -18,11 +18,11 @@ from toolpath_stiff.nc.cutter_location.statements import HEAD_LINES, looks_like_
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
-from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.nc.moves import RAPID, Moves, Program
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
 from toolpath_stiff.nc.words import read_lines, split_lines
-from toolpath_stiff.units import Pose, ShopPose, pose_in_mm, pose_in_si
+from toolpath_stiff.units import Pose, ShopPose, mm_per_min_from_m_per_s, pose_in_mm, pose_in_si
 
 # -- other languages ---------------------------------------------------------------------------------------------------
 
@@ -32,6 +32,7 @@ HINTS = {
     _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
     _SIEMENS: "post it as ISO G code: no frames (TRANS, ROT), no CYCLE calls, no variables, no X=... words",
 }
+LONGEST_SIGN = 200  # characters of a line that are looked at
 # What no G code of the controls read here has at the beginning of a block, blanks and N words apart.
 _SIGNS = (
     (_HEIDENHAIN, r"BEGIN\s+PGM\b"),
@@ -42,7 +43,7 @@ _SIGNS = (
     (_SIEMENS, r"DEF\s+(?:REAL|INT|BOOL|STRING|CHAR|AXIS|FRAME)\b|PROC\s+\w+|EXTERN\s+\w+"),
     (_SIEMENS, r"MSG\s*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+\s*\(|WORKPIECE\s*\("),
     (_SIEMENS, r"A?(?:TRANS|ROT|SCALE|MIRROR)(?:\s|;|$)|TRAORI\b|TRAFOOF\b|SUPA\b|D?R\d+\s*="),
-    (_SIEMENS, r"(?:[A-Z]+\d*[\d.+-]*\s+)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
+    (_SIEMENS, r"(?:[A-Z]++[\d.+-]*+\s++)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
 )
 _PATTERNS = tuple((what, re.compile(r"\s*(?:N\d+\s+|\d+\s+)?(?:" + sign + ")", re.IGNORECASE)) for what, sign in _SIGNS)
 
@@ -56,7 +57,8 @@ def language_of(line: str) -> str | None:
     "Heidenhain's conversational language"
     >>> language_of("G1 X10 Y20")
     """
-    return next((what for what, pattern in _PATTERNS if pattern.match(line)), None)
+    head = line.lstrip()[:LONGEST_SIGN]
+    return next((what for what, pattern in _PATTERNS if pattern.match(head)), None)
 
 
 def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:
@@ -166,10 +168,10 @@ def parse_program(
 
     What cannot be read is refused, with its place and what to do:
 
-    >>> parse_program("G21 G90\nG1 X10\n", "slot.nc")
+    >>> parse_program("G21 G90\nG1 X10\n", "slot.nc")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0
+    toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0, ...
     """
     lines, place = split_lines(text, name), None if origin is None else _six(origin)
     offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools
@@ -247,9 +249,18 @@ def _read_cutter_location(asked: _Request) -> Program:
         )
     any_offset = any(offset.given for offset in asked.offsets.table)
     warnings = cutter_location.not_for(asked.controller, any_offset, bool(asked.block_delete))
-    return cutter_location.read(
-        asked.lines, asked.name, asked.path, asked.origin, asked.default_origin, asked.tools, warnings
+    program = cutter_location.read(
+        asked.lines,
+        asked.name,
+        asked.path,
+        asked.origin,
+        asked.default_origin,
+        asked.tools,
+        warnings,
+        asked.controller.feed,
     )
+    said = feed_assumption(asked.controller, program.moves)
+    return replace(program, assumptions=(*program.assumptions, *said)) if said else program
 
 
 def _second_opinion(error: InputError, asked: _Request) -> Program:
@@ -287,6 +298,7 @@ def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
         bool(asked.switches),
         rs274=rs274,
         posted=posted is not None,
+        feed=asked.controller.feed,
     )
     program = Program(
         name=asked.name,
@@ -296,8 +308,8 @@ def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
         origin=pose_in_si(reading.origin),
         origin_source=reading.source,
         unsupported=reading.unsupported,
-        warnings=reading.warnings,
-        assumptions=reading.assumptions,
+        warnings=(*reading.warnings, *lathe_warning(reading.turning, reading.moves)),
+        assumptions=(*reading.assumptions, *feed_assumption(asked.controller, reading.moves)),
         tools=reading.tools,
         interpreter="linuxcnc",
         dialect="linuxcnc",
@@ -309,6 +321,7 @@ def _read_built_in(asked: _Request) -> Program:
     posted = asked.posted
     frames = Frames(copy.deepcopy(asked.offsets), *asked.zero, posted=posted)
     state = State(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)
+    state.feed = asked.controller.feed
     run = ProgramRun(state, asked.lines, asked.name, asked.switches)
     warnings = run.run()
     if not state.recorder.cuts:
@@ -318,16 +331,17 @@ def _read_built_in(asked: _Request) -> Program:
         warnings.append(
             "the program or the offsets file sets G54; --origin overrides it, other offsets keep their distance to it"
         )
+    moves = state.recorder.moves()
     program = Program(
         name=asked.name,
         path=asked.path,
         source=asked.lines,
-        moves=state.recorder.moves(),
+        moves=moves,
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
         unsupported=tuple(state.unsupported),
-        warnings=(*warnings, *state.warnings),
-        assumptions=(START, *state.assumptions),
+        warnings=(*warnings, *state.warnings, *lathe_warning(state.turning, moves)),
+        assumptions=(START, *state.assumptions, *feed_assumption(asked.controller, moves)),
         tools=tuple(state.used_tools.values()),
         dialect=asked.controller.label,
         jumps=tuple(run.jumps),
@@ -335,6 +349,27 @@ def _read_built_in(asked: _Request) -> Program:
     if posted is None:
         return program
     return _on_the_part(program, asked, posted, state.tip_held, frames.offsets)
+
+
+def lathe_warning(signs: Mapping[str, int], moves: Moves | None) -> list[str]:
+    """What makes a program look like a lathe's (with its line), if nothing of it ever moves along Y."""
+    if moves is None or not signs or (moves.start[:, 1] != moves.end[:, 1]).any() or moves.arc_normal[:, 2].any():
+        return []
+    what, line = next(iter(signs.items()))
+    return [
+        f"line {line}: {what} and no move along Y: this looks like a lathe's program. X is read as a position; where "
+        "it is a diameter, the path is wrong"
+    ]
+
+
+def feed_assumption(controller: Controller, moves: Moves | None) -> list[str]:
+    """That the first cuts have the feed that was asked for."""
+    if controller.feed is None or moves is None:
+        return []
+    cuts = moves.feed[moves.motion != RAPID][:1]
+    if not len(cuts) or abs(mm_per_min_from_m_per_s(float(cuts[0])) - controller.feed) > 1e-9 * controller.feed:
+        return []
+    return [f"cuts before the first feed of the program have {controller.feed:g} mm/min, as asked for"]
 
 
 def _on_the_part(

@@ -21,6 +21,9 @@ from toolpath_stiff.units import MM_PER_INCH
 POINT_WORDS = (*AXES, *POLAR)
 
 
+LATHE_HINT = "this reads the programs of mills: post it for a mill, with X as a position"
+
+
 class Flow(Enum):
     """Which block runs after this one, unless that is a `Call`."""
 
@@ -37,6 +40,17 @@ class Call:
     repeats: int | None
     column: int
     local: bool = False
+
+
+@dataclass(frozen=True)
+class GoTo:
+    """M99 P: go on at the block with that N number, of the caller or of the main program; the column of its P."""
+
+    number: int
+    column: int
+
+
+Then = Flow | Call | GoTo  # what runs after a block
 
 
 @dataclass
@@ -68,7 +82,7 @@ class CurrentBlock:
     values: dict[str, Word] = field(default_factory=dict)
     free: set[str] = field(default_factory=set)
     polar_words: tuple[Word, float | None, float | None] | None = None
-    flow: Flow | Call = Flow.NEXT
+    flow: Then = Flow.NEXT
 
     @property
     def line(self) -> int:
@@ -125,6 +139,15 @@ class Segment(NamedTuple):
     arc: Arc | None
 
 
+@dataclass(frozen=True)
+class Corner:
+    """A corner that waits for its second move: `,C` or `,R`, its size in mm, and the line that asks for it."""
+
+    letter: str
+    size: float
+    line: int
+
+
 @dataclass
 class State:
     """The state of a control, at its start as LinuxCNC's is unless the dialect says otherwise.
@@ -178,6 +201,12 @@ class State:
         The first length without a decimal point, with its line; whether any length ends with its point, as `X10.`.
     trace
         Each move of the current block, for whoever starts the list.
+    corner
+        The corner (,C or ,R) that the next block has to make with the one before it; None: there is none.
+    named_length
+        H of a block without G43, which a later G43 without H may mean.
+    turning
+        What makes the program look like a lathe's, with its line.
     """
 
     name: str
@@ -213,6 +242,9 @@ class State:
     bare: tuple[int, Word] | None = None
     pointed: bool = False
     trace: list[Segment] | None = None
+    corner: Corner | None = None
+    named_length: float | None = None
+    turning: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.arc_absolute, self.retract = self.dialect.arc_absolute, self.dialect.retract

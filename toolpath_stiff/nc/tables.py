@@ -13,6 +13,7 @@ from toolpath_stiff.errors import ProgramError
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
 LARGEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
+LARGEST_WORD = 1e9  # any other word: the radius of an arc that is nearly straight, a tool's number
 # LinuxCNC's parameter file (manual, "Parameters"): G54 is 5221 to 5230, each further offset 20 on; X Y Z A B C U V W R.
 FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
 HOME_G28, HOME_G30 = 5161, 5181
@@ -72,7 +73,7 @@ def _number(text: str, what: str, path: str | Path, line: int) -> float:
         value = math.nan
     if not math.isfinite(value) or abs(value) > LARGEST_MM:
         raise ProgramError(
-            f"{what} = {text!r}", expected=f"a number within +-{LARGEST_MM:g}", file=str(path), line=line
+            f"{what} = {text[:40]!r}", expected=f"a number within +-{LARGEST_MM:g}", file=str(path), line=line
         )
     return value
 
@@ -109,7 +110,7 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
 
 def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
     columns = ("tool", "length_mm", "diameter_mm", "remark", "stick_out_mm", "material")
-    heading = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
+    heading = _cells(path, *lines[0])
     unknown = [name for name in heading if name not in columns]
     missing = [name for name in columns[:2] if name not in heading]
     if unknown or missing:
@@ -117,7 +118,7 @@ def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int
         raise ProgramError(found, expected=f"columns {', '.join(columns)}", file=str(path), line=lines[0][0])
     rows = []
     for line, text in lines[1:]:
-        cells = dict(zip(heading, (cell.strip() for cell in next(csv.reader([text]))), strict=False))
+        cells = dict(zip(heading, _cells(path, line, text), strict=False))
         number = _number(cells.get("tool", ""), "tool", path, line)
         if number != int(number) or number < 0:
             raise ProgramError(f"tool = {cells['tool']!r}", expected="a whole number", file=str(path), line=line)
@@ -131,6 +132,13 @@ def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int
     return rows
 
 
+def _cells(path: str | Path, line: int, text: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([text]))]
+    except csv.Error as error:  # a cell of more than 131,072 characters
+        raise ProgramError(f"a row that cannot be read: {error}", file=str(path), line=line) from None
+
+
 def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
     rows = []
     for line, text in lines:
@@ -139,9 +147,9 @@ def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tupl
             continue
         words = dict(re.findall(r"([A-Za-z])\s*([^\sA-Za-z]+(?:[eE][+-]?\d+)?)", content))
         words = {letter.upper(): value for letter, value in words.items()}
-        if "T" not in words or not words["T"].isdigit():
+        if re.fullmatch(r"[0-9]{1,9}", words.get("T", "")) is None:
             raise ProgramError(
-                f"{content.strip()!r} is not a tool",
+                f"{content.strip()[:40]!r} is not a tool",
                 expected="T<number> P<pocket> Z<length mm> D<diameter mm> ;remark",
                 file=str(path),
                 line=line,
@@ -195,7 +203,7 @@ def read_offsets(path: str | Path) -> Offsets:
         raise ProgramError("the offsets file is empty", expected="lines such as G55 = [100, 0, 0]", file=str(path))
     offsets = Offsets()
     for line, text in filled:
-        parameter = re.fullmatch(r"(\d+)\s+(\S+)", text)
+        parameter = re.fullmatch(r"([0-9]{1,9})\s+(\S+)", text)
         assignment = re.fullmatch(r'"?([Gg][\d.]+(?: ?[Pp]\d+)?)"?\s*=\s*\[(.*)\]', text)
         if parameter:
             _set_parameter(offsets, int(parameter[1]), _number(parameter[2], parameter[1], path, line))
@@ -210,7 +218,7 @@ def read_offsets(path: str | Path) -> Offsets:
             set_offset(offsets, name, values)
         else:
             raise ProgramError(
-                f"{text!r} is not an offset",
+                f"{text[:40]!r} is not an offset",
                 expected="G54 = [x, y, z, a, b, c, r] (to G59.3, G28, G30, G54.1 P1), or LinuxCNC's `5221 12.5`",
                 file=str(path),
                 line=line,

@@ -10,21 +10,33 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
 
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
+NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails does not try shorter numbers
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
-WORD = re.compile(rf"([A-Z@^])({NUMBER})(E[+-]?\d+)?", re.ASCII)
+WORD = re.compile(rf"([A-Z@^]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
 AXES = "XYZABC"
 POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
-LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTUVWXYZ" + POLAR)
+CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (Fanuc, Haas)
+NOT_PYGCODES = (*POLAR, *CORNERS)
+LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
+# Statements of Fanuc's and Haas' macro language.
+MACRO = re.compile(r"IF(?=\[)|WHILE(?=\[)|GOTO|THEN|(?:DO|END)(?=\d)|POPEN|PCLOS|[BD]PRNT|SETVN")
 COMMENT = re.compile("[();]")
+EXPRESSION = re.compile(r"[#\[]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
+# Caps. Longer is no NC program, and what reads a line takes time by the square of its length.
+LARGEST_FILE = 512 << 20  # bytes: some ten million lines
+LONGEST_LINE = 10_000  # characters, comments included
+LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
+LONGEST_NUMBER = 100  # characters
+LONGEST_LEADER = 50  # lines of text before the first tape mark
+MOST_DIGITS = 9  # of a program number, its O included
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
 
 
@@ -42,7 +54,8 @@ class Block:
     """One line of a program, read.
 
     `optional`: it begins with the block-delete slash; `switch`: the number of the slash, 1 to 9 (`/` is `/1`).
-    `percent`: it holds the tape mark alone.
+    `percent`: it holds the tape mark alone. `rest`: where a slash stands in the middle, the number of words before it;
+    those behind it are left out where its switch is on (Fanuc, Haas).
     """
 
     line: int
@@ -50,6 +63,13 @@ class Block:
     optional: bool = False
     percent: bool = False
     switch: int = 1
+    rest: int | None = None
+
+    def executed(self, switches: frozenset[int]) -> Block:
+        """The block without what the block-delete switches leave out behind a slash in its middle."""
+        if self.rest is None or self.switch not in switches:
+            return self
+        return replace(self, words=self.words[: self.rest])
 
 
 def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block:
@@ -68,31 +88,56 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
         return Block(line, ())
     if compact == "%":
         return Block(line, (), percent=True)
-    start = 0
-    optional = compact[0] == "/"
-    switch = 1
-    if optional:
-        start = 1
-        while start < len(compact) and "0" <= compact[start] <= "9":
-            start += 1
-        switch = int(compact[1:start] or 1)
-        if not 1 <= switch <= 9:
-            raise ProgramError(
-                f"block-delete switch {compact[:start]!r}",
-                expected="/ or /1 to /9",
-                file=name,
-                line=line,
-                column=columns[0],
-            )
+    if len(compact) > LONGEST_BLOCK:
+        raise ProgramError(
+            f"a block of {len(compact)} characters without comments and blanks",
+            expected=f"at most {LONGEST_BLOCK}",
+            file=name,
+            line=line,
+        )
+    slash, start, rest, switch = compact.find("/"), 0, None, 1
+    if slash > 0 and EXPRESSION.search(compact):  # a quotient
+        slash = -1
+    if slash >= 0:
+        behind, switch = _slash(compact, slash, columns, line, name)
+        start = 0 if slash else behind
     if compact.startswith(("O", ":"), start):  # `:` is O on ISO tape
         return _program_number(compact[start:], columns[start], line, name)
-    words = _tokens(compact, columns, start, text, line, name)
-    return Block(line, _through_pygcode(words, line, name), optional=optional, switch=switch)
+    words = _tokens(compact, columns, start, text, line, name, slash if slash > 0 else None)
+    if slash > 0:
+        rest = len(words)
+        words += _tokens(compact, columns, behind, text, line, name)
+    return Block(line, _through_pygcode(words, line, name), optional=slash == 0, switch=switch, rest=rest)
+
+
+def _slash(compact: str, at: int, columns: Sequence[int], line: int, name: str) -> tuple[int, int]:
+    """Where a block-delete slash and its number end, and which switch it names."""
+    end = at + 1
+    while end < len(compact) and "0" <= compact[end] <= "9":
+        end += 1
+    switch = int(compact[at + 1 : end] or 1) if end < at + 3 else 0
+    if not 1 <= switch <= 9:
+        raise ProgramError(
+            f"block-delete switch {compact[at : min(end, at + 20)]!r}",
+            expected="/ or /1 to /9",
+            file=name,
+            line=line,
+            column=columns[at],
+        )
+    return end, switch
 
 
 def _program_number(compact: str, column: int, line: int, name: str) -> Block:
     """`O1234` alone is a program's number; any other O word controls subprograms or loops."""
     if compact[1:].isascii() and compact[1:].isdigit():
+        if len(compact) > MOST_DIGITS:
+            raise ProgramError(
+                f"a program number of {len(compact) - 1} digits",
+                expected="O and up to 8 digits",
+                file=name,
+                line=line,
+                column=column,
+            )
         return Block(line, (Word("O", float(compact[1:]), column, compact),))
     raise ProgramError(
         f"O word {compact[:20]!r}: subprograms and loops are not supported",
@@ -113,23 +158,15 @@ def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Seque
         return compact, [column for column, character in enumerate(text, 1) if not character.isspace()]
     characters: list[str] = []
     columns: list[int] = []
-    inside = 0
+    depth = begun = 0
     for column, character in enumerate(text, 1):
-        if inside:
-            if character == ")":
-                inside = 0
-            elif character == "(":
-                raise ProgramError(
-                    "a comment within a comment",
-                    expected="`)` before the next `(`",
-                    file=name,
-                    line=line,
-                    column=column,
-                )
-        elif character == "(":
-            inside = column
+        if character == "(":  # Haas' controls have comments within comments
+            begun = begun if depth else column
+            depth += 1
+        elif depth:
+            depth -= character == ")"
         elif character == ";":
-            if not semicolon and text[column:].strip():
+            if not semicolon and _strip(text[column:].replace(";", " "), line, name, semicolon)[0]:
                 raise ProgramError(
                     f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect",
                     expected="comments in parentheses, one block a line",
@@ -144,19 +181,22 @@ def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Seque
             # Of other scripts some letters grow in upper case, and some become ASCII ones.
             characters.append(character.upper() if character.isascii() else character)
             columns.append(column)
-    if inside:
+    if depth:
         raise ProgramError(
-            "a comment is not closed", expected="`)` on the same line", file=name, line=line, column=inside
+            "a comment is not closed", expected="`)` on the same line", file=name, line=line, column=begun
         )
     return "".join(characters), columns
 
 
-def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: int, name: str) -> list[Word]:
+def _tokens(
+    compact: str, columns: Sequence[int], start: int, text: str, line: int, name: str, stop: int | None = None
+) -> list[Word]:
     """Words of the compacted text; N words are checked and left out."""
     words: list[Word] = []
     position = start
-    while position < len(compact):
-        match = WORD.match(compact, position)
+    stop = len(compact) if stop is None else stop
+    while position < stop:
+        match = WORD.match(compact, position, stop)
         column = columns[position]
         if match is None:
             raise _unreadable(compact, position, column, line, name)
@@ -171,6 +211,14 @@ def _tokens(compact: str, columns: Sequence[int], start: int, text: str, line: i
             else:
                 number += exponent
         original = text[column - 1 : columns[end - 1]]
+        if end - position > 1 + LONGEST_NUMBER:
+            raise ProgramError(
+                f"a number of {end - position - 1} characters after {letter}",
+                expected=f"at most {LONGEST_NUMBER}",
+                file=name,
+                line=line,
+                column=column,
+            )
         if letter == "N":
             if words:
                 raise ProgramError(
@@ -202,7 +250,11 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
             found, expected = f"{tail!r} is not a finite number", "a decimal number"
         else:
             found, expected = f"the word {character!r} has no number", f"a number after {character}"
-    if character == "#" or follower == "#" or character == "=":
+    macro = MACRO.match(compact, position)
+    if macro is not None:
+        found, expected = f"{macro[0]} is a statement of a control's macro language, which is not read", "plain blocks"
+        hint = "post the program without macros"
+    elif character == "#" or follower == "#" or character == "=":
         found, expected = "variables (#) are not supported", "numbers"
         hint = "post the program without variables, or give --interpreter linuxcnc"
     elif character == "[" or follower == "[":
@@ -222,7 +274,7 @@ def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...
     from pygcode.exceptions import GCodeWordStrError
     from pygcode.words import text2words
 
-    all_words, words = words, [word for word in words if word.letter not in POLAR]
+    all_words, words = words, [word for word in words if word.letter not in NOT_PYGCODES]
 
     try:
         read = list(text2words(" ".join([_plain(word) for word in words])))
@@ -264,6 +316,26 @@ def _expected(letter: str) -> str:
     return "a decimal number"
 
 
+def leader(lines: Sequence[str], name: str, semicolon: bool) -> int:
+    """The line (from 0) of the first tape mark, if what stands before it is text that no block reads; else the first.
+
+    Controls read nothing before the tape mark (Fanuc's operator's manuals, "Leader section").
+    """
+    mark = next((at for at, line in enumerate(lines[: LONGEST_LEADER + 1]) if line.strip() == "%"), 0)
+    texts = [(at, line) for at, line in enumerate(lines[:mark]) if line.strip()]
+    computed = any(EXPRESSION.search(line) for _, line in texts)
+    if not texts or computed or not any(line.strip() not in ("", "%") for line in lines[mark + 1 :]):
+        return 0
+    unread = 0
+    for at, line in texts:
+        try:
+            if read_block(line, at + 1, name, semicolon).words:
+                return 0
+        except InputError:
+            unread += 1
+    return mark if unread else 0
+
+
 # -- text to lines -----------------------------------------------------------------------------------------------------
 
 # Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
@@ -280,9 +352,19 @@ def read_lines(path: str | Path) -> tuple[str, ...]:
         The file cannot be read or is not text.
     """
     try:
-        content = Path(path).read_bytes()
+        with Path(path).open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
     except OSError as error:
         raise ProgramError(f"cannot read {str(path)!r}: {error.strerror}") from None
+    except ValueError as error:  # a NUL in the name
+        raise ProgramError(f"cannot read {str(path)!r}: {error}") from None
+    if len(content) > LARGEST_FILE:
+        raise ProgramError(
+            "a file that is too large to be read",
+            expected=f"an NC program of at most {LARGEST_FILE >> 20} MB",
+            hint="split the program",
+            file=Path(path).name,
+        )
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -312,4 +394,12 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
     found = joined.replace("\x1a", "").replace("\x0c", " ").split("\n")
     if not found[-1]:
         found.pop()
+    if max(map(len, found), default=0) > LONGEST_LINE:
+        at = next(number for number, line in enumerate(found, 1) if len(line) > LONGEST_LINE)
+        raise ProgramError(
+            f"a line of {len(found[at - 1])} characters",
+            expected=f"lines of at most {LONGEST_LINE}",
+            file=name,
+            line=at,
+        )
     return tuple(found)

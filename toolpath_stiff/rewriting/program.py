@@ -27,7 +27,7 @@ from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
-from toolpath_stiff.nc.words import read_block, split_lines
+from toolpath_stiff.nc.words import CORNERS, Block, read_block, split_lines
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
 from toolpath_stiff.rewriting.turn import Turn
@@ -176,6 +176,7 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
             yield raw + end
             continue
         block = read_block(line, number, name)
+        _refuse_parts(block, number, name)
         written = [line]
         if block.percent:
             running, started = not started, True
@@ -187,6 +188,20 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
             if block.optional and written != [line] and SLASHED not in controls.notes:
                 controls.notes.append(SLASHED)
         yield raw + end if written == [line] else (end or between).join(written) + end
+
+
+def _refuse_parts(block: Block, number: int, name: str) -> None:
+    """A slash in the middle of a block, and corners that a block makes of the next one."""
+    corner = next((word for word in block.words if word.letter in CORNERS), None)
+    if block.rest is not None or corner is not None:
+        raise ProgramError(
+            "a block with a slash in its middle cannot be rewritten"
+            if corner is None
+            else f"{corner.text} makes a corner with the next block, which cannot be rewritten",
+            hint="put what follows the slash into a block of its own" if corner is None else "post the corner's moves",
+            file=name,
+            line=number,
+        )
 
 
 def _refuse_left_out(words: bool, number: int, name: str) -> None:

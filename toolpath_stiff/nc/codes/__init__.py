@@ -21,20 +21,22 @@ PATH_CONTROL, SPINDLE_MODE, DIAMETER = "path control", "spindle mode", "lathe di
 POLAR, ROTATION, SCALING = "polar", "rotation", "scaling"
 M_STOP, M_TOOL, M_SPINDLE, M_COOLANT = "M stop", "M tool change", "M spindle", "M coolant"
 M_SUBPROGRAM, M_OVERRIDES = "M subprogram", "M overrides"
+EXACT_STOP, SMOOTHING, DYNAMIC, CORNER = "exact stop", "look-ahead", "dynamic offset", "corner"
+M_TAPPING = "M rigid tapping"
 DWELL, FEED, SPEED, TOOL = "dwell", "F", "S", "T"  # steps of their own: G4, and words that act without a code
 
 # The order in which the codes and words of a block act; the moves come last. Units first, so that an F beside G20 is
 # in inches. `MODES` may be executed ahead of the rest of the block: doing so twice changes nothing but dwells.
 MODES = (
     UNITS, FEED_MODE, FEED, SPEED, TOOL, M_TOOL, DWELL, PLANE, POLAR, LENGTH, M_SUBPROGRAM, OFFSET,
-    PATH_CONTROL, SPINDLE_MODE, DISTANCE, ARC_DISTANCE, RETRACT, CUTTER, DIAMETER, SCALING, M_SPINDLE, M_COOLANT,
-    M_OVERRIDES,
+    PATH_CONTROL, EXACT_STOP, SMOOTHING, DYNAMIC, SPINDLE_MODE, DISTANCE, ARC_DISTANCE, RETRACT, CUTTER, DIAMETER,
+    SCALING, M_SPINDLE, M_COOLANT, M_OVERRIDES, M_TAPPING,
 )  # fmt: skip
 ACTS = (ROTATION, ONCE, M_STOP)
-STEPS = {step: at for at, step in enumerate((*MODES, *ACTS, MOTION))}
+STEPS = {step: at for at, step in enumerate((*MODES, *ACTS, MOTION, CORNER))}
 
 EVERYWHERE = ("generic", "linuxcnc", "fanuc", "haas")
-NAME = re.compile(r"[GM](0|[1-9]\d*)(\.\d)?|[FST]")
+NAME = re.compile(r"[GM](0|[1-9]\d*)(\.\d)?|[FST]|,[CR]")
 
 Act = Callable[[State, CurrentBlock, str], None]
 
@@ -46,7 +48,7 @@ class Code:
     Attributes
     ----------
     name
-        "G1", "G59.3", "M6"; "F", "S" and "T" act as words.
+        "G1", "G59.3", "M6"; "F", "S", "T", ",C" and ",R" act as words.
     group
         Its modal group; two codes of one are an error.
     act
@@ -84,7 +86,7 @@ class Code:
 
     def __post_init__(self) -> None:
         if NAME.fullmatch(self.name) is None:
-            raise ValueError(f"{self.name!r} is not the name of a code: expected G1, G59.3, M6, F, S or T")
+            raise ValueError(f"{self.name!r} is not the name of a code: expected G1, G59.3, M6, F, S, T, `,C` or `,R`")
         if not callable(self.act):
             raise TypeError(f"{self.name} has no function that acts")
         if self.when not in STEPS:

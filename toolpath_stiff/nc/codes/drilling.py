@@ -1,4 +1,4 @@
-"""Drilling and boring cycles (G73 G81 G82 G83 G85 G89), expanded to their moves; G98 and G99. mm.
+"""Drilling, tapping and boring cycles (G73 G74 G76 G81 to G86, G89), expanded to their moves; G98 and G99. mm.
 
 Sources: LinuxCNC's manual ("G80-G89 Canned Cycles", "G73") and interp_cycles.cc; Fanuc's operator's manuals ("Canned
 cycle") where a dialect follows them.
@@ -17,7 +17,8 @@ from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import SECONDS_PER_DAY
 
-CYCLES = ("G73", "G81", "G82", "G83", "G85", "G89")
+CYCLES = ("G73", "G74", "G76", "G81", "G82", "G83", "G84", "G85", "G86", "G89")
+TAPS, BORES = ("G74", "G84"), ("G76", "G86")
 PECKS, DWELLS = ("G73", "G83"), ("G82", "G89")
 MOST_REPEATS = 10_000
 RENEWED = ("level", "unit")  # what one cycle leaves to another one of its run
@@ -40,6 +41,15 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     given = MOTION in block.groups
     if not given and not any(block.has(letter) for letter in POINT_WORDS):
         return
+    if code == "G76" and not state.dialect.increments:
+        raise block.fail(
+            block.codes.get(code),
+            "is a threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls",
+            hint="name the control with --dialect, or leave threading out",
+        )
+    if code in TAPS and state.plane != "G17" and not state.dialect.increments:
+        found = f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis"
+        raise block.fail(None, found, "G17", "name the control with --dialect")
     normal = geometry.PLANES[state.plane][2]
     repeats = _repeats(state, block)
     _keep_heights(state, block, code, normal)
@@ -49,6 +59,8 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     # The level from which a run of cycles began: G91's R counts from it, G98 returns to it.
     initial = state.sticky.setdefault("level", here)
     retract, bottom = _heights(state, block, code, initial)
+    if not repeats:  # L0, or Fanuc's K0: the words are kept for the blocks that follow, and nothing moves
+        return
     # As measured on LinuxCNC: a run that began below R goes to R first; otherwise a tool at or below R goes to the
     # level above the holes on its way to the next one.
     if initial < retract:
@@ -57,7 +69,9 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     clear = max(initial, retract) if state.retract == "G98" else retract
     level = here if here > retract + SAME_HEIGHT_MM else clear
     _check_pecks(state, block, code, retract - bottom, repeats)
-    hole = Drilling(code, bottom, retract, clear, state.sticky.get("Q", 0.0), state.sticky.get("P", 0.0))
+    peck, dwell, first, less, least = (state.sticky.get(letter, 0.0) for letter in "QPIJK")
+    out_at_r = code in TAPS and state.dialect.increments
+    hole = Drilling(code, bottom, retract, clear, peck, dwell, first, less, least, out_at_r)
     for number in range(repeats):
         if number and block.polar_words is not None:  # each hole's polar words count from the one before
             words |= xy_of_polar_words(state, block)
@@ -93,8 +107,8 @@ def _repeats(state: State, block: CurrentBlock) -> int:
         return 1
     block.take(letter)
     word = block.as_written(letter)  # a count, whatever a bare K length is
-    if word.value != int(word.value) or not 1 <= word.value <= MOST_REPEATS:
-        raise block.fail(word, "is not a number of repeats", "a whole number from 1")
+    if word.value != int(word.value) or not 0 <= word.value <= MOST_REPEATS:
+        raise block.fail(word, "is not a number of repeats", "a whole number from 0")
     return int(word.value)
 
 
@@ -127,6 +141,7 @@ def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, give
             state.sticky[letter] = value * state.length_scale
     if block.has("P"):
         state.sticky["P"] = time_word(state, block, "P") or 0.0
+    _words_of_one_control(state, block, code)
     words = point_words(state, block)
     if not words and given:
         raise block.fail(None, f"{code} without axis words", "X, Y, Z")
@@ -136,6 +151,35 @@ def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, give
         state.sticky["Z"] = words.pop(normal)
     _check_cycle(state, block, code, normal)
     return words
+
+
+def _words_of_one_control(state: State, block: CurrentBlock, code: str) -> None:
+    """I, J, K of Haas' pecks; what taps and fine boring have besides, which changes no cut."""
+    haas = state.dialect.name == "haas"
+    if code in PECKS and haas:
+        _shallower_pecks(state, block)
+    if code in TAPS and haas and block.take("J") is not None:
+        state.note(block.line, block.values["J"], "how much faster the tap comes out")
+    if code in TAPS and state.sticky.get("Q"):
+        raise block.fail(block.values.get("Q"), "is a tap in pecks, which depends on the control's parameters", "no Q")
+    for letter in "QIJ" if code == "G76" else "":
+        block.take(letter)
+        if letter in block.values:
+            state.note(block.line, block.values[letter], "the shift off the wall before the rapid out")
+
+
+def _shallower_pecks(state: State, block: CurrentBlock) -> None:
+    """I: the first peck; J: how much less each further one is; K: the least (Haas' manual, G83)."""
+    given = [letter for letter in "IJK" if block.has(letter)]
+    if not given:
+        if "Q" in block.values:
+            state.sticky |= dict.fromkeys("IJK", 0.0)
+        return
+    if "Q" in block.values or "I" not in given or ("J" in given and "K" not in given):
+        raise block.fail(block.values[given[0]], "beside Q, or without I or K", "Q, or I, J and K")
+    for letter in "IJK":
+        state.sticky[letter] = abs(block.take(letter) or 0.0) * state.length_scale
+    state.sticky["Q"] = state.sticky["K"] or state.sticky["I"]
 
 
 def _check_cycle(state: State, block: CurrentBlock, code: str, normal: int) -> None:
@@ -175,11 +219,18 @@ def _check_pecks(state: State, block: CurrentBlock, code: str, depth: float, rep
         raise block.fail(None, f"{code} with more than {MOST_STROKES} strokes", "a larger Q, or fewer repeats")
 
 
+_FANUC = "Fanuc, operator's manuals, Canned cycle for drilling"
 DRILLING_CODES = (
     Code("G73", MOTION, cycle, "chip-breaking drilling", g_codes("G73")),
     Code("G81", MOTION, cycle, "drilling", g_codes("G81")),
     Code("G82", MOTION, cycle, "drilling with dwell", g_codes("G82")),
     Code("G83", MOTION, cycle, "peck drilling", g_codes("G83")),
+    Code("G74", MOTION, cycle, "left-hand tapping", f"{g_codes('G74')}; {_FANUC}, G74"),
+    Code("G84", MOTION, cycle, "right-hand tapping", f"{g_codes('G84')}; {_FANUC}, G84"),
+    Code(
+        "G76", MOTION, cycle, "fine boring, rapid out", f"{_FANUC}, Fine boring cycle (G76)", controls=("fanuc", "haas")
+    ),
+    Code("G86", MOTION, cycle, "boring, spindle stop, rapid out", g_codes("G86")),
     Code("G85", MOTION, cycle, "boring, feed out", g_codes("G85")),
     Code("G89", MOTION, cycle, "boring with dwell, feed out", g_codes("G89")),
     Code("G98", RETRACT, return_level, "cycles return to their level", g_codes("G98 G99")),

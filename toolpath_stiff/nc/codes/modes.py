@@ -32,7 +32,7 @@ from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
 from toolpath_stiff.nc.controller import MILLISECONDS, SECONDS
 from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
-from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, State
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, State
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
@@ -91,11 +91,16 @@ MODE_ALIASES = (
 # -- feed and spindle --------------------------------------------------------------------------------------------------
 
 
+SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
+
+
 def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
     """G93: F is one over the minutes of the move; G94: per minute; G95: per revolution."""
     if code != state.feed_mode:
         state.feed = None  # the old number means something else now
     state.feed_mode = code
+    if code == "G95":
+        state.turning.setdefault("feed per revolution (G95)", block.line)
 
 
 def feed_word(state: State, block: CurrentBlock, code: str) -> None:
@@ -105,6 +110,8 @@ def feed_word(state: State, block: CurrentBlock, code: str) -> None:
     word = block.values["F"]
     if feed < 0.0:
         raise block.fail(word, "is a negative feed", "F above 0")
+    if 0.0 < feed * state.feed_scale < SLOWEST:
+        raise block.fail(word, "is slower than a nanometre a minute", "a feed that moves")
     if "." not in word.text and feed and bare_feed_is_open(state):
         units = "inch" if state.inch else "mm"
         raise block.fail(
@@ -135,6 +142,7 @@ def speed_word(state: State, block: CurrentBlock, code: str) -> None:
 def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
     """G96: D is its greatest spindle speed, which does not enter."""
     block.take("D")
+    state.turning.setdefault("constant surface speed (G96)", block.line)
 
 
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
@@ -168,14 +176,14 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
         raise block.fail(
             words[0] if words else block.block.words[0],
             "is a feed move before any feed" if state.feed_mode != "G93" else "is a feed move without F under G93",
-            "F above 0",
+            "F above 0" if state.feed_mode != "G94" else "F above 0, or --feed MM_PER_MIN for such moves",
         )
     if state.feed_mode == "G93":
         feed, state.feed = state.feed, None  # every move needs its own
         return feed * length_of_move(start, end, arc)
     if state.feed_mode == "G95":
-        if state.speed == 0.0:
-            raise block.fail(None, "feed per revolution (G95) with the spindle at S0", "S above 0")
+        if state.feed * state.speed < SLOWEST:
+            raise block.fail(None, f"feed per revolution (G95) with the spindle at S{state.speed:g}", "S above 0")
         return state.feed * state.speed
     linear = math.dist(start[:3], end[:3]) if arc is None else arc_length(arc, start, end)
     return rotary_feed(state, state.feed) if linear == 0.0 else state.feed
@@ -239,10 +247,9 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def end_of_subprogram(state: State, block: CurrentBlock, code: str) -> None:
-    """M99: back to the block after the call."""
-    if block.has("P"):
-        raise block.fail(block.values["P"], "makes M99 return to another block, which is not supported", "M99")
-    block.flow = Flow.RETURN
+    """M99: back to the block after the call; with P, to the block of the caller with that N number."""
+    number = block.whole("P", block.codes[code])
+    block.flow = Flow.RETURN if number is None else GoTo(number, block.values["P"].column)
 
 
 def end_of_program(state: State, block: CurrentBlock, code: str) -> None:

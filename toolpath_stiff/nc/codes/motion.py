@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes import MOTION, ONCE, Code, g_codes
+from toolpath_stiff.nc.codes import CORNER, DISTANCE, MOTION, ONCE, Code, g_codes
 from toolpath_stiff.nc.codes.modes import feed_of_move
 from toolpath_stiff.nc.codes.points import (
     XY,
@@ -25,9 +25,9 @@ from toolpath_stiff.nc.codes.points import (
 )
 from toolpath_stiff.nc.geometry import Point2
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, ToolUse
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Segment, State
+from toolpath_stiff.nc.state import POINT_WORDS, Corner, CurrentBlock, Segment, State
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.nc.words import Word
+from toolpath_stiff.nc.words import CORNERS, Word
 from toolpath_stiff.units import m_from_mm
 
 # -- a move recorded ---------------------------------------------------------------------------------------------------
@@ -118,6 +118,8 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
     if any(block.has(letter) for letter in POINT_WORDS):
         words = point_words(state, block)
         target = control_point(state, block, state.frames.to_program(state.frames.position), words)
+        if state.corner is not None and code == "G1":
+            cut_corner(state, block, target)
         record(state, block, RAPID if code == "G0" else FEED, target, words)
     elif MOTION in block.groups and code == "G1" and state.height_lost:  # rs274 moves then
         find_height(state, block, FEED, named=False)
@@ -148,18 +150,27 @@ def machine_move(state: State, block: CurrentBlock, code: str) -> None:
     record(state, block, motion, frames.control_of_machine(point), machine=words)
 
 
+INCREMENTAL_AXES = "UVW"  # X, Y, Z in steps, on lathes and as G28 U0 W0 on mills
+
+
+def homes_standing(block: CurrentBlock, letter: str) -> bool:
+    """Whether U, V or W is 0 beside G28 or G30: X, Y or Z goes home from where it stands."""
+    return block.groups.get(ONCE) in ("G28", "G30") and block.values[letter].value == 0.0
+
+
 def go_home(state: State, block: CurrentBlock, code: str) -> None:
     """G28, G30: rapid to the intermediate point, then the axes named there, or all, to the reference point."""
+    standing = {axis for axis, letter in enumerate(INCREMENTAL_AXES) if block.take(letter) is not None}
     words = axis_words(state, block)
     frames = state.frames
-    _leave_program_coordinates(state, block, block.codes[code], words)
+    _leave_program_coordinates(state, block, block.codes[code], {**dict.fromkeys(standing, 0.0), **words})
     if words:
         between = cartesian(state, frames.to_program(frames.position), words)
         record(state, block, RAPID, frames.to_control(between), words)
     home = frames.offsets.home_g28 if code == "G28" else frames.offsets.home_g30
     if not any(home):
         state.assume(f"the reference point of {code}, not given by any offsets file, is machine 0, 0, 0")
-    going = set(words) or set(range(6))
+    going = standing | words.keys() or set(range(6))
     # Axis by axis in program coordinates, as LinuxCNC does: with a rotation in force it is not the same.
     there = frames.to_program(frames.control_of_machine(list(home)))
     here = frames.to_program(frames.position)
@@ -201,6 +212,67 @@ STRAIGHT_CODES = (
 )
 
 
+# -- corners to the next block -----------------------------------------------------------------------------------------
+
+# Fanuc's operator's manuals, "Optional chamfering and corner R": `,C` and `,R` behind a feed move cut or round the
+# corner between it and the next one, both in the plane in force; C counts from the corner that is cut off, both ways.
+_CORNER = "Fanuc, operator's manuals, Optional chamfering and corner R; Haas, mill operator's manual, G01"
+
+
+def corner(state: State, block: CurrentBlock, code: str) -> None:
+    """`,C` and `,R`: the corner to the next block is cut off or rounded."""
+    word = block.values[code]
+    if state.dialect.name == "linuxcnc":
+        raise block.fail(word, "is not a word of the dialect linuxcnc", "generic, fanuc or haas")
+    size = block.take(code)
+    assert size is not None
+    if size <= 0.0:
+        raise block.fail(word, "is the size of a corner", "more than 0")
+    recorder = state.recorder
+    if not (recorder.line and recorder.line[-1] == block.line and recorder.motion[-1] == FEED):
+        raise block.fail(word, "beside anything but a feed move (G1)", "G1 with X, Y or Z")
+    if len(block.values.keys() & {*CORNERS}) > 1 or state.feed_mode == "G93":
+        raise block.fail(word, "beside another corner, or under G93", "one of ,C and ,R, in G94 or G95")
+    state.corner = Corner(code, size * state.length_scale, block.line)
+
+
+def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
+    """Shorten the move before this one, and add the corner between them; the tool then stands at its end."""
+    asked, frames, recorder = state.corner, state.frames, state.recorder
+    assert asked is not None
+    others = block.groups.keys() - {MOTION, DISTANCE, *(group for group in block.groups if group.startswith("M "))}
+    if others or recorder.dwell[-1]:
+        raise block.fail(
+            None, f"the second move of a corner ({asked.letter}, line {asked.line}) beside other codes", "G1"
+        )
+    state.corner = None
+    begin, at, end = recorder.start[-1], frames.to_setup(frames.position), frames.to_setup(target)
+    normal = frames.turn_direction(normal_of(state.plane))
+    try:
+        if begin[3:] != at[3:] or at[3:] != end[3:]:
+            raise geometry.ArcError("a corner while the rotary axes turn", "X, Y and Z alone")
+        ends = geometry.corner(begin[:3], at[:3], end[:3], normal, asked.size, asked.letter == ",R")
+    except geometry.ArcError as error:
+        raise block.fail(None, f"{error.found} ({asked.letter} of line {asked.line})", error.expected) from None
+    if ends is None:  # the path goes straight on
+        return
+    first, last, center, sweep = ends
+    recorder.end[-1] = [*first, *at[3:]]
+    added = Arc(center, normal, sweep) if asked.letter == ",R" else None
+    feed, bound = recorder.feed[-1], recorder.from_machine[-1]
+    recorder.add(
+        asked.line, ARC if added else FEED, recorder.end[-1], [*last, *at[3:]], feed, state.tool, state.tool_length,
+        (bound[1], bound[1]), added,
+    )  # fmt: skip
+    frames.position = [p + new - old for p, new, old in zip(frames.position, [*last, *at[3:]], at, strict=True)]
+
+
+CORNER_CODES = (
+    Code(",C", CORNER, corner, "chamfer to the next block", _CORNER, ("generic", "fanuc", "haas")),
+    Code(",R", CORNER, corner, "rounding to the next block", _CORNER, ("generic", "fanuc", "haas")),
+)
+
+
 # -- arcs --------------------------------------------------------------------------------------------------------------
 
 ARCS = ("G2", "G3")
@@ -221,7 +293,7 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
     clockwise = code == "G2"
     try:
         center = _center(state, block, start, end, clockwise, words)
-        sweep = sweep_about(center, start, end, clockwise, turns)
+        sweep = sweep_about(center, start, end, clockwise, state.inch, turns)
     except geometry.ArcError as error:
         raise block.fail(None, error.found, error.expected) from None
     middle = list(here)
@@ -237,9 +309,9 @@ def normal_of(plane: str) -> tuple[float, float, float]:
     return (float(normal == 0), float(normal == 1), float(normal == 2))
 
 
-def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, turns: int = 1) -> float:
+def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inch: bool, turns: int = 1) -> float:
     """Signed angle of an arc in rad. Raises `ArcError` unless start and end lie on one circle about the centre."""
-    geometry.check_radii(start, end, center)
+    geometry.check_radii(start, end, center, inch)
     return geometry.arc_sweep(start, end, center, clockwise, turns)
 
 
@@ -275,6 +347,8 @@ def _center(
     radius = block.take("R")
     off_plane = geometry.CENTER_WORDS[normal]
     in_plane = (geometry.CENTER_WORDS[first], geometry.CENTER_WORDS[second])
+    if block.has(off_plane) and block.values[off_plane].value == 0.0:
+        block.take(off_plane)  # posts write all three
     if block.has(off_plane):
         raise block.fail(block.values[off_plane], f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
     offsets = [block.take(letter) for letter in in_plane]

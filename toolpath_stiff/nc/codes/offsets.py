@@ -293,6 +293,20 @@ def hold_tip(state: State, block: CurrentBlock, code: str) -> None:
     _hold_tip(state, block, word, True)
 
 
+def list_numbers(state: State, block: CurrentBlock) -> None:
+    """D and H beside a tool change or a tool length: numbers of offsets that nothing of the block uses."""
+    present = block.groups.keys()
+    if block.has("D") and (present & {LENGTH, M_TOOL} or "T" in block.values):
+        block.take("D")
+        state.note(block.line, block.values["D"], "the number of a radius offset, which acts with G41 and G42 alone")
+    if not block.has("H") or not (present & {M_TOOL} or "G49" in block.codes or "T" in block.values):
+        return
+    if not math.isnan(state.tool_length):
+        raise block.fail(block.values["H"], "without G43, while a tool length is in force", "G43 beside it")
+    state.named_length = block.take("H")
+    state.note(block.line, block.values["H"], "the number of a tool length, which acts with G43 alone")
+
+
 def no_length(state: State, block: CurrentBlock, code: str) -> None:
     """G49: no tool length."""
     _hold_tip(state, block, block.codes[code], False)
@@ -340,6 +354,10 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
             return math.nan
         raise block.fail(block.values["H"], "is no offset on some controls, on LinuxCNC that of the tool", "H or G49")
     tool = state.tool if number is None else int(number)
+    if number is None and state.named_length not in (None, state.tool):
+        raise block.fail(
+            word, f"without H after H{state.named_length:g}: controls differ in whose length it takes", "H"
+        )
     if number is None and state.renamed:
         raise block.fail(
             word, "without H after M61: controls differ in whose length it takes", f"G43 H{tool}, or T and M6"

@@ -12,11 +12,11 @@ from __future__ import annotations
 import math
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes import ONCE, PLANE, POLAR, ROTATION, UNITS, Code
+from toolpath_stiff.nc.codes import ONCE, PLANE, POLAR, ROTATION, SMOOTHING, UNITS, Code
 from toolpath_stiff.nc.controller import GENERIC, INCREMENT_DEGREE, INCREMENT_INCH, INCREMENT_MM
 from toolpath_stiff.nc.frames import Rotation
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.words import AXES, Word
+from toolpath_stiff.nc.words import AXES, CORNERS, Word
 
 SAME_PLACE_MM = 1e-9
 XY = frozenset((0, 1))
@@ -279,7 +279,7 @@ POLAR_CODES = (
 # -- numbers without a decimal point -----------------------------------------------------------------------------------
 
 ANGLES = frozenset("ABC")
-LENGTHS = frozenset("XYZIJKRQ")
+LENGTHS = frozenset((*"XYZIJKRQ", *CORNERS))
 INCREMENTS = (
     "lengths and angles without a decimal point count least increments (0.001 mm, 0.0001 inch, 0.001 degrees: IS-B), "
     "as in the dialect {}"
@@ -304,10 +304,15 @@ def read_numbers(state: State, block: CurrentBlock) -> None:
     if polar and ONCE not in block.groups:
         angles.add(AXES[geometry.PLANES[block.groups.get(PLANE, state.plane)][1]])
     for letter, word in block.values.items():
-        if "." in word.text or not word.value or not (letter in LENGTHS or letter in angles):
+        if "." in word.text or not word.value or not (letter in LENGTHS or letter in angles) or is_count(block, letter):
             continue
         block.values[letter] = word._replace(value=word.value * increment(letter in angles, inch))
         assume_increments(state)
+
+
+def is_count(block: CurrentBlock, letter: str) -> bool:
+    """Whether a letter of lengths is a number of something else: G5.1 Q1, M61 Q5."""
+    return letter == "Q" and (SMOOTHING in block.groups or "M61" in block.codes)
 
 
 def increment(angle: bool, inch: bool) -> float:
@@ -328,7 +333,7 @@ def watches_points(state: State) -> bool:
 def _watch_points(state: State, block: CurrentBlock) -> None:
     """Notice what looks like a program for a control that counts increments."""
     for letter, word in block.values.items():
-        if letter not in LENGTHS or not word.value:
+        if letter not in LENGTHS or not word.value or is_count(block, letter):
             continue
         if word.text.endswith("."):
             state.pointed = True

@@ -8,32 +8,38 @@ leave the path alone, and codes that are refused with the reason, have their row
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Iterable, Iterator
 
 from toolpath_stiff.nc.codes import (
     CUTTER,
     DIAMETER,
+    DYNAMIC,
     EVERYWHERE,
+    EXACT_STOP,
     M_COOLANT,
     M_OVERRIDES,
     M_SPINDLE,
+    M_TAPPING,
     MOTION,
     ONCE,
     PATH_CONTROL,
     SCALING,
+    SMOOTHING,
     Alias,
     Code,
     Refused,
+    code_name,
     g_codes,
     holds_anyway,
     m_codes,
 )
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
 from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
-from toolpath_stiff.nc.codes.motion import ARC_CODES, STRAIGHT_CODES
+from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, STRAIGHT_CODES
 from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_CODES
 from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
 
 # -- codes that leave the path alone, and refused ones -----------------------------------------------------------------
 
@@ -52,13 +58,76 @@ def m_parameters(state: State, block: CurrentBlock) -> None:
             block.take(letter)
 
 
+def look_ahead(state: State, block: CurrentBlock, code: str) -> None:
+    """G5 P, G5.1 Q, G8 P, G103 P, G187 P E: how a control plans ahead. With other words G5 and G5.1 are splines."""
+    letters = {word.letter for word in block.block.words} - {"G", "M", "F", "S", "T"}
+    taken = PLANNING[code]
+    if code in SPLINES and (letters - set(taken) or not letters):
+        raise block.fail(block.codes[code], "is a spline, which is not supported", hint=_LINES_AND_ARCS)
+    for letter in taken:
+        if block.take(letter) is not None and code == "G8":  # alone it is a mode of lathes that holds anyway
+            state.note(block.line, block.codes[code], _PLANNING)
+
+
+def scaling_off(state: State, block: CurrentBlock, code: str) -> None:
+    """G50 alone; with S or axis words it is a lathe's."""
+    letter = next((letter for letter in "SXYZUVW" if letter in block.values), None)
+    if letter is not None:
+        raise block.fail(
+            block.codes[code],
+            f"with {letter} is a lathe's code (the limit of its speed, or a shift), and a lathe's X is a diameter",
+            hint=LATHE_HINT,
+        )
+
+
+def dynamic_offset(state: State, block: CurrentBlock, code: str) -> None:
+    """G254: the work offset follows the part where a rotary axis is turned; G255: no longer."""
+    if code == "G254":
+        state.warnings.append(
+            f"line {block.line}: {block.codes[code].text} makes the work offset follow the part where a rotary axis is "
+            "turned, which is not acted upon"
+        )
+
+
+_FANUC, _HAAS = "Fanuc, operator's manuals", "Haas, mill operator's manual"
+GENERIC_HAAS = ("generic", "haas")
+PLANNING = {"G5": "P", "G5.1": "QR", "G8": "P", "G103": "P", "G187": "PE"}  # code -> the words that it takes
+SPLINES = ("G5", "G5.1")
+_PLANNING = "how the control plans ahead: the path is taken as programmed"
+_LINES_AND_ARCS = "post the program with arcs and lines"
 _EXACT_STOP = "exact stop: corners are taken as programmed anyway"
 _COOLANT = m_codes("M7 M8 M9")
 PASSIVE_CODES = (
-    Code("G8", DIAMETER, holds_anyway, "lathe radius mode", g_codes("G8"), label=DIAMETER),
+    Code(
+        "G8", DIAMETER, look_ahead, "lathe radius mode; with P: look-ahead",
+        "LinuxCNC, G-Codes, G8; Fanuc, operator's manuals, Advanced preview control (G08)", label=DIAMETER,
+    ),
+    Code(
+        "G5", SMOOTHING, look_ahead, "high-speed machining, with P alone",
+        "Fanuc, operator's manuals, High speed cycle machining (G05)", listed=_PLANNING,
+    ),
+    Code(
+        "G5.1", SMOOTHING, look_ahead, "contour control, with Q alone",
+        "Fanuc, operator's manuals, AI contour control (G05.1)", listed=_PLANNING,
+    ),
+    Code("G9", EXACT_STOP, holds_anyway, "exact stop", f"{_FANUC}, Exact stop (G09)", listed=_EXACT_STOP),
+    Code("G103", SMOOTHING, look_ahead, "limit of the look-ahead", f"{_HAAS}, G103", GENERIC_HAAS, listed=_PLANNING),
+    Code("G187", SMOOTHING, look_ahead, "smoothness", f"{_HAAS}, G187", GENERIC_HAAS, listed=_PLANNING),
+    Code(
+        "G254", DYNAMIC, dynamic_offset, "dynamic work offset", f"{_HAAS}, G254", GENERIC_HAAS,
+        listed="the work offset follows the part",
+    ),
+    Code(
+        "G255", DYNAMIC, dynamic_offset, "no dynamic work offset", f"{_HAAS}, G255", GENERIC_HAAS,
+        listed="the work offset follows the part no longer",
+    ),
+    Code(
+        "M29", M_TAPPING, holds_anyway, "rigid tapping", f"{_FANUC}, Rigid tapping (M29)", ("generic", "fanuc"),
+        listed="rigid tapping",
+    ),
     Code("G40", CUTTER, holds_anyway, "cutter compensation off", g_codes("G40")),
     Code(
-        "G50", SCALING, holds_anyway, "scaling off", "Fanuc, operator's manuals, Scaling (G50, G51)", label=SCALING
+        "G50", SCALING, scaling_off, "scaling off", "Fanuc, operator's manuals, Scaling (G50, G51)", label=SCALING
     ),
     Code("G61", PATH_CONTROL, path_control, "exact path", g_codes("G61"), listed=_EXACT_STOP),
     Code("G61.1", PATH_CONTROL, path_control, "exact stop", g_codes("G61.1"), listed=_EXACT_STOP),
@@ -79,9 +148,7 @@ PASSIVE_CODES = (
     ),
 )  # fmt: skip
 
-_LINES_AND_ARCS = "post the program with arcs and lines"
 _CENTRE_PATH = "post the path of the tool centre, or give --interpreter linuxcnc"
-_FANUC, _HAAS = "Fanuc, operator's manuals", "Haas, mill operator's manual"
 _OTHER_PLANE = ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C", g_codes("G17 - G19.1"))
 _PROBING = ("probing", "leave probing out", g_codes("G38.2 - G38.5"))
 _CUTTER = ("cutter compensation", _CENTRE_PATH)
@@ -90,8 +157,6 @@ _MACRO = ("a macro call", "expand macros before analyzing", f"{_FANUC}, Custom m
 _MOVES = "post the moves of the cycle"
 _SAVED = ("saved modal state", "post the program without M70 to M73")
 REFUSED_CODES = (
-    Refused("G5", "a spline", _LINES_AND_ARCS, g_codes("G5")),
-    Refused("G5.1", "a spline", _LINES_AND_ARCS, g_codes("G5.1")),
     Refused("G5.2", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
     Refused("G5.3", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
     Refused("G7", "lathe diameter mode", "this is a mill", g_codes("G7")),
@@ -119,10 +184,6 @@ REFUSED_CODES = (
         f"{_FANUC}, Tilted working plane indexing (G68.2)",
     ),
     Refused("G72", "a lathe cycle", "this is a mill", g_codes("G71-G72")),
-    Refused("G74", "left-hand tapping", "leave tapping out", g_codes("G74")),
-    Refused("G76", "a threading cycle", "leave threading out", g_codes("G76")),
-    Refused("G84", "right-hand tapping", "leave tapping out", g_codes("G84")),
-    Refused("G86", "boring with spindle stop", _MOVES, g_codes("G86")),
     Refused("G87", "back boring", _MOVES, g_codes("G87")),
     Refused("G88", "boring with manual feed out", _MOVES, g_codes("G88")),
     *(Refused(code, *_SAVED, m_codes("M70 - M73")) for code in ("M70", "M71", "M72", "M73")),
@@ -133,7 +194,7 @@ REFUSED_CODES = (
 
 UNDERSTOOD = (
     *STRAIGHT_CODES, *ARC_CODES, *DRILLING_CODES, *MODE_CODES, *POLAR_CODES, *ROTATION_CODES, *OFFSET_CODES,
-    *FEED_CODES, *TOOL_CODES, *FLOW_CODES, *PASSIVE_CODES,
+    *FEED_CODES, *TOOL_CODES, *FLOW_CODES, *PASSIVE_CODES, *CORNER_CODES,
 )  # fmt: skip
 
 
@@ -153,23 +214,33 @@ ALIASES: dict[str, Alias] = {alias.name: alias for alias in (*MODE_ALIASES, *TOO
 INCH_METRIC = {alias.name: alias.code for alias in MODE_ALIASES}  # where the dialect has them
 LISTED = {code.name: code.listed for code in CODES.values() if code.listed}
 
-# What a code that is not acted upon would change, by its beginning.
-CHANGES = (
-    (("G41", "G42"), "the whole path, by the tool's radius"),
-    (("G5 ", "G5.", "G05"), "the path between its points"),
-    (("G43.4", "G43.5"), "the path of the tip wherever a rotary axis moves"),
-    (("G43.2",), "the height of the tip"),
-    (("G51",), "the size of the path"),
-    (("G68.2",), "the whole path: it is turned in space"),
-    (("G65", "G66", "M97", "M98", "O word"), "the path by whatever is called"),
-    (("G33", "G74", "G76", "G84"), "the path by the thread's moves"),
-    (("G86", "G87", "G88", "G12", "G13", "G70", "G71", "G72"), "the path by the cycle's moves"),
-    (("G38",), "where the tool stops, which only the machine knows"),
-    (("G61", "G64"), "corners, which a control rounds or stops at, and so the time"),
-    (("G7 ",), "the size of X"),
-    (("G96", "M48", "M49", "M50", "M51", "M52", "M53"), "speeds and times"),
-    (("variables", "expressions"), "every coordinate that depends on them"),
-)
+# What a code that is not read would change.
+CHANGES = {
+    "G41 G41.1 G42 G42.1": "the whole path, by the tool's radius",
+    "G5 G5.1 G5.2 G5.3": "the path between its points",
+    "G43.4 G43.5": "the path of the tip wherever a rotary axis moves",
+    "G43.2": "the height of the tip",
+    "G51": "the size of the path",
+    "G68.2": "the whole path: it is turned in space",
+    "G65 G66 M97 M98": "the path by whatever is called",
+    "G33 G33.1 G76": "the path by the thread's moves",
+    "G87 G88 G12 G13 G70 G71 G72": "the path by the cycle's moves",
+    "G38.2 G38.3 G38.4 G38.5": "where the tool stops, which only the machine knows",
+    "G7": "the size of X",
+}
+BY_CODE = {code: changes for codes, changes in CHANGES.items() for code in codes.split()}
+# What a code that is read and not acted upon would change.
+LISTED_CHANGES = {
+    **dict.fromkeys(("G61", "G61.1", "G64", "G9"), "corners, which a control rounds or stops at, and so the time"),
+    **dict.fromkeys(("G96", "M48", "M49", "M50", "M51", "M52", "M53"), "speeds and times"),
+    **dict.fromkeys(("G5", "G5.1", "G8", "G103", "G187"), "corners, by the control's tolerance, and the time"),
+    "G254": "where the part is, wherever a rotary axis is turned",
+}
+BY_TEXT = {
+    "O word": "the path by whatever is called",
+    **dict.fromkeys(("variables", "expressions"), "every coordinate that depends on them"),
+}
+FIRST_CODE = re.compile(r"([GMgm]) *0*(\d{1,9}(?:\.\d)?)(?![\d.])")
 
 
 def code_meaning(name: str) -> str:
@@ -190,21 +261,25 @@ def code_meaning(name: str) -> str:
     return "not known" if name.startswith("G") else "an M code of one control: not acted upon"
 
 
-def would_change(text: str) -> str:
+def would_change(text: str, listed: bool = False) -> str:
     """What the word at the beginning of `text` would change of the path or its time; "" if nothing is known.
+
+    `listed`: it was read and is not acted upon; else it was refused.
 
     Examples
     --------
     >>> would_change("G41 D1")
     "the whole path, by the tool's radius"
+    >>> would_change("G419 is not a G code that is known")
+    ''
     """
-    for beginnings, changes in CHANGES:
-        if (text + " ").startswith(beginnings):
-            return changes
-    word = text.split(" ", maxsplit=1)[0]
-    if word.startswith("M") and word[1:].isdigit() and f"M{int(word[1:])}" not in CODES:
+    found = FIRST_CODE.match(text)
+    if found is None:
+        return next((changes for beginning, changes in BY_TEXT.items() if text.startswith(beginning)), "")
+    code = code_name(found[1].upper(), float(found[2]))
+    if code[0] == "M" and code not in CODES and code not in REFUSED:
         return "what is not known: it may run anything on its control"
-    return ""
+    return (LISTED_CHANGES if listed else BY_CODE).get(code, "")
 
 
 # -- the table as Markdown ---------------------------------------------------------------------------------------------

@@ -20,7 +20,13 @@ from toolpath_stiff.nc.cutter_location.geometry import AxisError
 from toolpath_stiff.nc.cutter_location.modes import one_frame
 from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import State
-from toolpath_stiff.nc.cutter_location.statements import Statement, frame_in_comment, plain_point, read_statement
+from toolpath_stiff.nc.cutter_location.statements import (
+    Statement,
+    any_statement,
+    frame_in_comment,
+    plain_point,
+    read_statement,
+)
 from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program, Unsupported
@@ -57,6 +63,7 @@ def read(
     default_origin: Pose,
     tools: dict[int, ToolEntry] | None,
     warnings: tuple[str, ...] = (),
+    feed: float | None = None,
 ) -> Program:
     """Read a cutter-location file.
 
@@ -70,6 +77,8 @@ def read(
         Tool table; its lengths win over the file's.
     warnings
         Warnings of the reader, which come first.
+    feed
+        Of cuts before the first FEDRAT, mm/min; None: they are refused.
 
     Raises
     ------
@@ -82,7 +91,7 @@ def read(
     >>> read(lines, "part.apt", "", None, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), None)
     <Program part.apt: 2 moves, read as cutter-location file>
     """
-    state = State(name, copy.deepcopy(tools))
+    state = State(name, copy.deepcopy(tools), feed=feed)
     run(state, lines)
     if not state.recorder.cuts:
         raise _no_cut(name)
@@ -142,6 +151,9 @@ def run(state: State, lines: tuple[str, ...], on_error: OnError | None = None, o
                     on_word(statement.word, statement.line)
                 _perform(state, statement, point)
         except InputError as error:
+            if state.last_word == "END" and not any_statement(lines[here:]):  # notes that a CAM system writes behind it
+                state.warnings.append(f"line {here + 1}: what follows END is no statement, and not read")
+                break
             _pass_on(error, on_error)
             at = max(at, here + 1)
     if state.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[at:]):
@@ -238,10 +250,14 @@ class CheckedCutterLocation:
 
 
 def check(
-    lines: tuple[str, ...], name: str, tools: dict[int, ToolEntry] | None, most_errors: int
+    lines: tuple[str, ...],
+    name: str,
+    tools: dict[int, ToolEntry] | None,
+    most_errors: int,
+    feed: float | None = None,
 ) -> CheckedCutterLocation:
     """Check a cutter-location file: it goes on where `read` would stop, up to so many errors."""
-    state = State(name, copy.deepcopy(tools))
+    state = State(name, copy.deepcopy(tools), feed=feed)
     checked = CheckedCutterLocation(state, in_force(state))
 
     def on_error(error: InputError) -> None:

@@ -24,9 +24,7 @@ import math
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.geometry import (
-    LARGEST_DIFFERENCE,
     RELATIVE_TOLERANCE,
-    SAME_POINT,
     ArcError,
     Point2,
     Vector,
@@ -36,8 +34,11 @@ from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 
 VERTICAL: Vector = (0.0, 0.0, 1.0)
+SAME_POINT = 1e-12
 SAME_POINT_MM = 5e-4  # start and end closer than this are one point: a whole turn
-# Radii may differ as LinuxCNC allows, or by what two points rounded to 0.0001 inch in each axis make of them.
+# Radii may differ by a thousandth, as LinuxCNC allows, but not by more than 0.127 mm; or by what two points rounded to
+# 0.0001 inch in each axis make of them.
+LARGEST_DIFFERENCE = 0.127
 ROUNDING_MM = 2.0 * math.sqrt(3.0) * 0.5e-4 * MM_PER_INCH
 SMOOTH_DEG = 5.0  # a path that enters an arc within this of its tangent enters it smoothly
 SWEEP_TOLERANCE_DEG = 0.05

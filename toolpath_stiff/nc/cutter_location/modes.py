@@ -42,7 +42,7 @@ INCH_FEEDS = ("IPM", "IPR", "FPM", "FPR")
 LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_PER_INCH}
 SEVERAL_TOOLS = ToolUse(0, math.nan, math.nan, "several tools without numbers")
 SAME_LENGTH_MM = 1e-3
-TURNING, A_MILL = "is not milling", "this is a mill"
+TURNING = "turning: the points are read as those of a mill, X as a position"
 COMPENSATION = "cutter compensation"
 TOOL_CENTRE = "have the CAM system write the path of the tool centre"
 SHIFTS = "shifts all that follows"
@@ -194,9 +194,12 @@ def cutcom(state: State, statement: Statement) -> None:
 
 
 def mode(state: State, statement: Statement) -> None:
-    """Refused unless it is milling."""
+    """Milling; turning is doubted: its points are read all the same."""
+    if statement.words == ["TURN"]:
+        state.note(state.doubtful, TURNING)
+        return
     if statement.words != ["MILL"]:
-        raise state.fail(f"{statement.shown} {TURNING}", "MODE/MILL", A_MILL)
+        raise state.fail(statement.shown, "MODE/MILL or MODE/TURN")
     state.note(state.noted, "milling")
 
 
@@ -247,10 +250,11 @@ def _length_of(state: State, number: int, said: float) -> float:
 
 
 def toolno(state: State, statement: Statement) -> None:
-    """Listed; a turning tool is refused."""
+    """Listed; a turning tool is doubted."""
     if "TURN" in statement.words:
-        raise state.fail(f"{statement.shown} {TURNING}", "a milling tool", A_MILL)
-    state.note(state.noted, TOOL)
+        state.note(state.doubtful, TURNING)
+    else:
+        state.note(state.noted, TOOL)
 
 
 def cutter(state: State, statement: Statement) -> None:
@@ -317,7 +321,7 @@ MODE_WORDS = (
     Word("TLDATA", tldata, "tool diameter", NX, SIEMENS, "/kind,d"),
     Word("DELAY", delay, "pause", ALL, ISO, "/seconds or revolutions,REV"),
     Word("DWELL", delay, "pause", "", ISO, "/seconds or revolutions,REV"),
-    Word("MODE", mode, "milling, not turning", AUTODESK, POSTS, "/MILL"),
+    Word("MODE", mode, "milling; turning is read alike", AUTODESK, POSTS, "/MILL or TURN"),
     Word("CUTCOM", cutcom, COMPENSATION, f"{CATIA}, {CREO}", ISO, "/OFF"),
     Word("FINI", fini, "end of the file", _MOST, ISO),
     Word("TOOL PATH", tool_path, HEADING, NX, SIEMENS, "/name,TOOL,tool", LISTED),

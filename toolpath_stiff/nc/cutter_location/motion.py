@@ -43,8 +43,9 @@ from toolpath_stiff.units import SECONDS_PER_DAY
 
 # -- cycles ------------------------------------------------------------------------------------------------------------
 
-# The first word, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip breaking).
-KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73"}
+# The first word, and with which strokes it drills: those of G81, G83 (out after each peck), G73 (chip breaking), G84
+# (a tap, which feeds out to CLEAR too).
+KINDS = {"DRILL": "G81", "FACE": "G81", "CSINK": "G81", "DEEP": "G83", "BRKCHP": "G73", "TAP": "G84"}
 PAIRS = ("DEPTH", "CLEAR", "STEP", "RETURN", "DWELL")
 ALIASES = {"FEDTO": "DEPTH", "INCR": "STEP", "RTRCTO": "RETURN"}
 EXPAND = "have the CAM system write the moves of the cycle"
@@ -134,19 +135,20 @@ def _hole(state: State, given: _Given) -> Drilling:
     values, scale = given.values, state.scale
     dwell = values.get("DWELL", 0.0)
     return Drilling(
-        code="G82" if dwell else given.code,
+        code="G82" if dwell and given.code == "G81" else given.code,
         bottom=-abs(values["DEPTH"]) * scale,
         retract=values["CLEAR"] * scale,
         clear=values.get("RETURN", values["CLEAR"]) * scale,
         peck=values.get("STEP", 0.0) * scale,
         dwell=dwell,
+        out_at_r=given.code == "G84",
     )
 
 
 def _check(state: State, given: _Given, hole: Drilling) -> None:
     """Refuse a hole that cannot be, or of which systems mean different things."""
     values, shown = given.values, state.statement.shown
-    clear, back, pecks = hole.retract, hole.clear, given.code != "G81"
+    clear, back, pecks = hole.retract, hole.clear, given.code in ("G73", "G83")
     if not hole.bottom < 0.0 or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= hole.dwell <= SECONDS_PER_DAY:
         raise state.fail(shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more")
     if "RETURN" in values and not back > 0.0:
@@ -165,7 +167,7 @@ def _check(state: State, given: _Given, hole: Drilling) -> None:
         raise _refusal(state, "DWELL in a cycle with pecks", "no DWELL")
 
 
-CYCLE_WORDS = (Word("CYCLE", cycle, "drilling cycle", ALL, PTC, "/DRILL, DEEP or BRKCHP and pairs, or /OFF"),)
+CYCLE_WORDS = (Word("CYCLE", cycle, "drilling cycle", ALL, PTC, "/DRILL, DEEP, BRKCHP or TAP and pairs, or /OFF"),)
 
 
 HOME = "home is the control's: the way there is not part of the path"

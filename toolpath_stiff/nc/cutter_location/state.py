@@ -329,5 +329,5 @@ def _feed(state: State, motion: int) -> float:
     if motion == RAPID:
         return math.nan
     if state.feed is None:
-        raise state.fail("a cut before any feed", "FEDRAT/ with a feed above 0, or RAPID, before it")
+        raise state.fail("a cut before any feed", "FEDRAT/ with a feed above 0, or --feed MM_PER_MIN for such cuts")
     return state.feed_per_minute(state.feed, state.per_revolution)

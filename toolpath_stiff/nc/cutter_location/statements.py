@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from operator import itemgetter
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.tables import LARGEST_MM
@@ -16,7 +18,7 @@ from toolpath_stiff.nc.tables import LARGEST_MM
 EXTENSIONS = (".apt", ".aptsource", ".cl", ".cls", ".clsf", ".ncl")
 HEAD_LINES = 50  # a file says what it is at its beginning, comments and blank lines apart
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?"
+_NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[EeDd][+-]?\d++)?"
 _IS_NUMBER = re.compile(_NUMBER)
 # What no line of G code looks like.
 _SIGN = re.compile(
@@ -94,6 +96,11 @@ def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
         if seen >= HEAD_LINES:
             break
     return False
+
+
+def any_statement(lines: Iterable[str]) -> bool:
+    """Whether any of these lines is a statement that no other text looks like."""
+    return any(_SIGN.match(line) for line in lines)
 
 
 def plain_point(line: str) -> list[float] | None:
@@ -183,13 +190,13 @@ def _parse(pieces: list[tuple[int, int, str]], name: str) -> Statement | None:
     joined = "".join(text for _, _, text in pieces)
     if not joined.strip():
         return None
-    starts, offset = [], 0
+    starts, offset = list[tuple[int, int, int]](), 0
     for line, column, text in pieces:
         starts.append((offset, line, column))
         offset += len(text)
 
     def place(index: int) -> tuple[int, int]:
-        begin, line, column = next(start for start in reversed(starts) if start[0] <= index)
+        begin, line, column = starts[bisect_right(starts, index, key=itemgetter(0)) - 1]
         return line, column + index - begin
 
     line, column = place(len(joined) - len(joined.lstrip()))

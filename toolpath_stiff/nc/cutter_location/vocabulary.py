@@ -114,8 +114,7 @@ _DRIVE, _PROCESSOR = "is driven along surfaces", "give the file of points that A
 # What they do, what to do, source, words.
 _REFUSED = (
     ("changes where all that follows lies", _WHERE_CUT, APT, "TRACUT MIRROR SCALE"),
-    ("turns the work or the head of one machine", _ONE_SYSTEM, ISO, "ROTABL ROTHED PIVOTZ"),
-    ("turns the work or the head of one machine", _ONE_SYSTEM, MANUALS, "ROTATE TABLE INDEX TILT"),
+    ("turns the work or the head of one machine", _ONE_SYSTEM, ISO, "PIVOTZ"),
     ("repeats or calls a part of the file", _OUT, APT, "COPY CALL CALSUB DEFSUB ENDSUB MACRO TERMAC LOOPST JUMPTO"),
     ("repeats or calls a part of the file", _OUT, MANUALS, "CALLSUB"),
     (_DRIVE, _PROCESSOR, APT, "TLLFT TLRGT TLON TLONPS TLOFPS TLNDON"),
@@ -130,6 +129,22 @@ _REFUSED = (
     ("is a polynomial", _POINTS, MANUALS, "POLYNO"),
 )
 
+TURNS = "turns the work or the head of one machine"
+
+
+def turn(state: State, statement: Statement) -> None:
+    """A rotary axis: listed where it turns by nothing, or goes to 0; refused otherwise."""
+    numbers = [argument for argument in statement.arguments if is_number(argument.text)]
+    if not numbers or any(state.number(number) for number in numbers):
+        raise state.fail(f"{statement.shown} {TURNS}, which is not supported", GEOMETRY, _ONE_SYSTEM)
+    state.note(state.noted, "a rotary axis that stays at 0")
+
+
+TURN_WORDS = tuple(
+    Word(name, turn, TURNS, "", source, "/angle other than 0", REFUSED)
+    for names, source in (("ROTABL ROTHED", ISO), ("ROTATE TABLE INDEX TILT", MANUALS))
+    for name in names.split()
+)
 LISTED_WORDS = tuple(
     Word(name, listed(meaning), meaning, by, source, kind=LISTED)
     for meaning, by, source, names in _LISTED
@@ -160,7 +175,7 @@ def table(words: Iterable[Word]) -> dict[str, Word]:
     return found
 
 
-WORDS = table((*MOTION_WORDS, *CYCLE_WORDS, *MODE_WORDS, *LISTED_WORDS, *DOUBTFUL_WORDS, *REFUSED_WORDS))
+WORDS = table((*MOTION_WORDS, *CYCLE_WORDS, *MODE_WORDS, *TURN_WORDS, *LISTED_WORDS, *DOUBTFUL_WORDS, *REFUSED_WORDS))
 REFUSED_HEADS = table(REFUSED_WORDS)
 
 

@@ -12,6 +12,7 @@ from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
 from toolpath_stiff.nc.linuxcnc.canon import Follower
 from toolpath_stiff.nc.linuxcnc.inputs import (
+    Dropped,
     Line,
     first_offset,
     needs_tags,
@@ -22,6 +23,7 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
     tool_file,
     tool_numbers,
     unclosed,
+    without_others,
 )
 from toolpath_stiff.nc.linuxcnc.runner import Limits, Run, StoppedError, find_rs274, message_and_line, run_rs274
 from toolpath_stiff.nc.moves import Moves, ToolUse, Unsupported
@@ -36,6 +38,7 @@ HARMLESS_WORD = re.compile(r"([GM])([0-9]+\.?[0-9]*)")
 FILES = re.compile(r"\s*(logopen|logappend|probeopen)\b", re.IGNORECASE)
 LOOPS = re.compile(r"O(?:<[^<>]*>|\d+|[#\[].*)(?:WHILE|REPEAT|DO)")
 MOST_NAMED = 5  # loops, in a message
+TURNING = re.compile(r"G0*(33|76|95|96)(?![\d.])")  # what lathes' programs have, seldom those of mills
 WAITS = re.compile(r"M0*66(?!\d)")
 
 
@@ -50,6 +53,7 @@ class Reading:
     warnings: tuple[str, ...]
     assumptions: tuple[str, ...]
     tools: tuple[ToolUse, ...]
+    turning: dict[str, int]  # what makes the program look like a lathe's, with its line
 
 
 def read(
@@ -64,26 +68,39 @@ def read(
     rs274: str | None = None,
     limits: Limits | None = None,
     posted: bool = False,
+    feed: float | None = None,
 ) -> Reading:
     """Read a program (lines without line ends) with `rs274`; `origin`, `default_origin` in mm and degrees.
 
-    `posted`: it was posted for another machine, whose rotary axes have one zero for program and machine.
+    `posted`: it was posted for another machine, whose rotary axes have one zero for program and machine. `feed`: of
+    cuts before the first F, mm/min.
 
     Raises
     ------
     InputError
         The fence, or the interpreter, refuses the program, or a limit was exceeded.
     """
+    lines, dropped = _checked(source, name)
+    session = _Session(
+        source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted, feed, dropped
+    )
+    return session.read(origin, default_origin)
+
+
+def _checked(source: Sequence[str], name: str) -> tuple[list[Line], list[Dropped]]:
+    """The lines for rs274, which have passed the fence, and what was left out of them."""
     lines = split(source, name)
     refuse_other_programs(lines, name)
-    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted)
-    return session.read(origin, default_origin)
+    lines, dropped = without_others(lines)
+    if dropped:
+        refuse_other_programs(lines, name)
+    return lines, dropped
 
 
 def refusal(source: Sequence[str], name: str) -> InputError | None:
     """Why the second interpreter is not started on a program; None if it may be."""
     try:
-        refuse_other_programs(split(source, name), name)
+        _checked(source, name)
     except InputError as error:
         return error
     return None
@@ -100,6 +117,8 @@ class _Session:
     rs274: str
     limits: Limits | None
     posted: bool
+    feed: float | None = None
+    dropped: Sequence[Dropped] = ()
 
     def read(self, origin: ShopPose | None, default_origin: ShopPose) -> Reading:
         offsets = copying.deepcopy(self.offsets)
@@ -126,8 +145,9 @@ class _Session:
             source=says,
             unsupported=tuple(self._unsupported()),
             warnings=tuple(self._warnings(says, given, follower)),
-            assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
+            assumptions=(START, "LinuxCNC's interpreter (rs274) read the program", *self._left_out()),
             tools=tuple(self._tool_use(number) for number in follower.used_tools),
+            turning=self._turning(),
         )
 
     def _uses(self, codes: re.Pattern[str]) -> bool:
@@ -175,6 +195,8 @@ class _Session:
                 )
             active = plain[0]
             prefix.append("N0G54")
+        if self.feed is not None:
+            prefix.append(f"N0G21F{self.feed:.6f}")
         if any(shift):
             x, y, z = shift
             prefix += [f"N0G21G90G53G0X{x:.6f}Y{y:.6f}Z{z:.6f}", "N0G80"]
@@ -255,9 +277,34 @@ class _Session:
             entry.material,
         )
 
+    def _turning(self) -> dict[str, int]:
+        found: dict[str, int] = {}
+        for line in self.lines:
+            for number in TURNING.findall(line.plain) if "G" in line.words else ():
+                found.setdefault(f"G{number}", line.number)
+        return found
+
+    def _left_out(self) -> list[str]:
+        if not self.dropped:
+            return []
+        words = list(dict.fromkeys(word for _, word in self.dropped))
+        more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
+        return [
+            "left out for LinuxCNC's interpreter, which does not know it there, and which changes no path: "
+            f"{', '.join(words[:MOST_NAMED])}{more}"
+        ]
+
     def _unsupported(self) -> list[Unsupported]:
         """Words that change nothing in a path, and comments that would write files."""
-        found = []
+        found = [
+            Unsupported(
+                number,
+                self._column(self.lines[number - 1], word),
+                word,
+                "an M code of one control, not acted upon" if word[0] == "M" else "changes no path",
+            )
+            for number, word in self.dropped
+        ]
         for line in self.lines:
             if "G" in line.words or "M" in line.words:
                 for letter, digits in HARMLESS_WORD.findall(line.plain):
@@ -287,6 +334,11 @@ class _Session:
                 "the program or the offsets file sets G54; --origin overrides it, other offsets keep their distance "
                 "to it"
             )
+        warnings += [
+            f"line {number}: what {word} does on its control is not known"
+            for number, word in self.dropped
+            if word[0] == "M"
+        ]
         warnings += [
             f"line {line.number}: M66 waits for an input that is not there; what depends on it may differ"
             for line in self.lines

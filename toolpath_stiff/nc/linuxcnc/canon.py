@@ -12,10 +12,11 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line
+from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line, step_in_words
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Recorder
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES
@@ -33,6 +34,7 @@ DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 DIAMETER_WORD = re.compile(r"D0*(\d+)(?![\d.])")
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
+ROUNDING = 1e-6  # far less than one of them
 
 Vector = list[float]
 
@@ -318,7 +320,7 @@ class Follower:
         here = self._unrotated(start)
         there = self._unrotated(end)
         if max(abs(here[first] - there[first]), abs(here[second] - there[second])) < SAME_PLACE * self.scale:
-            there = here  # a full circle, up to the digits printed
+            there = self._end_in_words(here, there, (first, second))
         middle = list(here)
         g = self.g92
         middle[first], middle[second] = c1 * self.scale + g[first], c2 * self.scale + g[second]
@@ -336,6 +338,27 @@ class Follower:
         if self.rotation:
             vector[0], vector[1] = self._turn(vector[0], vector[1])
         return Arc((center[0], center[1], center[2]), (vector[0], vector[1], vector[2]), sweep)
+
+    def _end_in_words(self, here: Vector, there: Vector, axes: tuple[int, int]) -> Vector:
+        """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
+        step = None if self.incremental else step_in_words(self.lines, self.line, [AXES[axis] for axis in axes])
+        if step is None or max(map(abs, step)) > SAME_PLACE:  # computed, or compensated
+            if max(abs(here[axis] - there[axis]) for axis in axes) > ROUNDING * self.scale:
+                raise self.fail(
+                    self.line,
+                    "an arc that may be a full circle, or shorter than the digits that LinuxCNC's rs274 prints",
+                    "an end that differs from the start by nothing, or by more than 0.0002",
+                )
+            return here
+        end = list(here)
+        for axis, length in zip(axes, step, strict=True):
+            end[axis] += length * self.scale
+        return end
+
+    @cached_property
+    def incremental(self) -> bool:
+        """Whether the program uses G91 anywhere."""
+        return any("G" in line.words and "1" in DISTANCE_MODE.findall(line.plain) for line in self.lines)
 
     def _unrotated(self, control: Vector) -> Vector:
         """Control coordinates less the work offset, turned back: those to which G92 adds."""

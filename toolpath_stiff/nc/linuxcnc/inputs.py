@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.tables import FIRST_OFFSET, HOME_G28, HOME_G30, OFFSET_STRIDE, ROTATION, Offsets, ToolEntry
@@ -42,6 +42,13 @@ class Line:
     words: str
     comments: tuple[tuple[int, str], ...] = ()
     optional: bool = False
+    rest: int | None = None  # how many characters of the words stand before a slash in the middle
+
+    def left_by_switches(self) -> Line:
+        """What block delete leaves of it."""
+        if not self.optional and self.rest is None:
+            return self
+        return replace(self, words=self.words[: 0 if self.optional else self.rest])
 
     @property
     def plain(self) -> str:
@@ -73,25 +80,30 @@ def _split_line(text: str, number: int, name: str) -> Line:
     optional = compact.startswith("/")
     if optional:
         compact = compact[1:].lstrip("0123456789")
-    return Line(
-        number, LINE_NUMBER.sub("", compact, count=1) if compact.startswith("N") else compact, comments, optional
-    )
+    compact = LINE_NUMBER.sub("", compact, count=1) if compact.startswith("N") else compact
+    rest = None
+    if "/" in compact and TOKENS.fullmatch(compact.replace("/", "")):  # of a block, no quotient
+        before, _, behind = compact.partition("/")
+        rest, compact = len(before), before + behind.lstrip("0123456789")
+    return Line(number, compact, comments, optional, rest)
 
 
 def _cut_comments(text: str, number: int, name: str) -> tuple[str, tuple[tuple[int, str], ...]]:
-    """LinuxCNC's rule: `(` to the next `)`, and outside of that `;` to the end; comments become blanks."""
+    """`(` to its `)`, and outside of that `;` to the end; comments become blanks.
+
+    LinuxCNC refuses a comment within a comment, which Haas' controls have; the copy has neither.
+    """
     words, comments = [], []
-    start = 0
+    start = depth = 0
     for column, character in enumerate(text, 1):
         if start:
-            if character == "(":
-                raise ProgramError("a comment within a comment", expected="`)`", file=name, line=number, column=column)
-            if character == ")":
+            depth += (character == "(") - (character == ")")
+            if not depth:
                 comments.append((start, text[start : column - 1]))
                 start = 0
             words.append(" ")
         elif character == "(":
-            start = column
+            start, depth = column, 1
             words.append(" ")
         elif character == ")":
             raise ProgramError("`)` without `(`", file=name, line=number, column=column)
@@ -141,7 +153,7 @@ def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, tags: bool
             copy.append("")
             continue
         started = started or bool(line.words)
-        copy.append(_numbered_line(line, name, tags) if not (line.optional and block_delete) else "")
+        copy.append(_numbered_line(line.left_by_switches() if block_delete else line, name, tags))
     return "\n".join([*copy, "M2", ""])
 
 
@@ -168,6 +180,112 @@ def _numbered_line(line: Line, name: str, tags: bool) -> str:
             line=line.number,
         )
     return text
+
+
+# -- steps smaller than the digits that rs274 prints -------------------------------------------------------------------
+
+# A block that moves in program coordinates, in the modes in force, and says where by numbers alone.
+PLAIN_BLOCK = re.compile(r"(?:G0*[0-3](?![\d.])|[XYZABCIJKRFSP][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII)
+COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
+
+
+def step_in_words(lines: Sequence[Line], number: int, axes: Sequence[str]) -> list[float] | None:
+    """How far a line (from 1) moves along some axes in G90, by the words alone, in program units.
+
+    None where the words do not say it: they are computed, or other codes stand between the two numbers of an axis.
+    """
+    wanted: dict[str, str] = dict(COORDINATE.findall(lines[number - 1].words))
+    steps = {axis: 0.0 for axis in axes if axis not in wanted}
+    for line in reversed(lines[:number]):
+        if line.optional or PLAIN_BLOCK.fullmatch(line.words) is None:
+            return None
+        if line.number < number:
+            for axis, value in COORDINATE.findall(line.words):
+                if axis in axes and axis not in steps:
+                    steps[axis] = float(wanted[axis]) - float(value)
+        if len(steps) == len(axes):
+            return [steps[axis] for axis in axes]
+    return None
+
+
+# -- what only confuses rs274 ------------------------------------------------------------------------------------------
+
+TOKEN = re.compile(r"([A-Z])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
+TOKENS = re.compile(rf"(?:{TOKEN.pattern})++", re.ASCII)
+KNOWN_M = frozenset((*range(10), 19, 30, *range(48, 54), *range(60, 69), *range(70, 74), *range(96, 200)))
+# Codes of other controls that change no path, with their words (as in `codes.registry`); the first three are
+# LinuxCNC's own with any other word.
+OTHERS_CODES = {"G5": "P", "G5.1": "QR", "G8": "P", "G9": "", "G103": "P", "G187": "PE", "G254": "", "G255": ""}
+OWN_CODES = ("G5", "G5.1", "G8")
+ARC_CODES = frozenset(("G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G40", "G90", "G91", "G94"))
+Dropped = tuple[int, str]  # line, word
+
+
+def without_others(lines: Iterable[Line]) -> tuple[list[Line], list[Dropped]]:
+    """The lines without words of other controls that change no path and that rs274 refuses; and those words.
+
+    Blocks of plain words alone are looked at; what is left of one is a part of its words, each as it was.
+    """
+    kept, dropped = [], list[Dropped]()
+    for line in lines:
+        out = _others(line.words) if line.rest is None and TOKENS.fullmatch(line.words) else ()
+        if out:
+            found = [match for match in TOKEN.finditer(line.words) if match[0] not in out]
+            dropped += [(line.number, word) for word in out]
+            kept.append(replace(line, words="".join(match[0] for match in found)))
+        else:
+            kept.append(line)
+    return kept, dropped
+
+
+def _others(words: str) -> tuple[str, ...]:
+    """The words of a block that rs274 need not see."""
+    tokens = TOKEN.findall(words)
+    codes = {f"{letter}{float(number):g}" for letter, number in tokens if letter in "GM"}
+    letters = {letter for letter, _ in tokens}
+    out = _others_codes(codes, letters)
+    taken = _centres_of_no_plane(tokens, codes) | _numbers_of_tools(codes, letters)
+    taken |= {letter for code in out for letter in OTHERS_CODES.get(code, "")}
+    if out == codes and any(code[0] == "M" for code in out) and not letters & set("XYZABC"):
+        taken |= set("PQERS")  # parameters of the M code
+    return tuple(
+        letter + number
+        for letter, number in tokens
+        if letter in taken or (letter in "GM" and f"{letter}{float(number):g}" in out)
+    )
+
+
+def _others_codes(codes: set[str], letters: set[str]) -> set[str]:
+    """Codes of a block that are of other controls."""
+    out = {code for code in codes if code[0] == "M" and _is_foreign(float(code[1:]))}
+    for code in codes & OTHERS_CODES.keys():
+        words = set(OTHERS_CODES[code])
+        if code not in OWN_CODES or (letters & words and letters <= words | set("GMFST")):
+            out.add(code)
+    return out
+
+
+def _numbers_of_tools(codes: set[str], letters: set[str]) -> set[str]:
+    """D and H of a block that calls a tool or takes its length, and nothing that uses them."""
+    tool, taken = "T" in letters or "M6" in codes, set[str]()
+    if (tool or "G43" in codes) and not any(code.startswith(("G41", "G42", "G96")) for code in codes):
+        taken.add("D")
+    if tool and not any(code.startswith(("G43", "G76")) for code in codes):
+        taken.add("H")
+    return taken
+
+
+def _centres_of_no_plane(tokens: Sequence[tuple[str, str]], codes: set[str]) -> set[str]:
+    """Those of I, J and K that are 0, where all three are given and not all 0."""
+    centres = {letter: float(number) for letter, number in tokens if letter in "IJK"}
+    if len(centres) < 3 or not any(centres.values()) or any(code[0] == "G" for code in codes - ARC_CODES):
+        return set()
+    return {letter for letter, value in centres.items() if not value}
+
+
+def _is_foreign(number: float) -> bool:
+    """Whether rs274 has no such M code; those that it rounds to a user's are the fence's."""
+    return number == int(number) and int(number) not in KNOWN_M
 
 
 # -- the fence ---------------------------------------------------------------------------------------------------------
