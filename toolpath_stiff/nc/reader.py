@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -96,6 +97,7 @@ def read_program(
     interpreter: str = "builtin",
     rs274: str | None = None,
     controller: Controller = UNKNOWN_CONTROL,
+    subprograms: str | Path | None = None,
 ) -> Program:
     """Read an NC program file to its moves in the set-up frame.
 
@@ -121,6 +123,8 @@ def read_program(
     controller
         Dialect, block-delete switches, work offsets and tools of the control, and the kinematics that the program was
         posted for; the two files above win over its tables.
+    subprograms
+        Folder of the files that a parametric program calls (`o<name> call`, `M98 P1234`); None: it calls none.
 
     Raises
     ------
@@ -139,7 +143,7 @@ def read_program(
     lines, place = read_lines(path), None if origin is None else _six(origin)
     offsets = read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets()
     tools = read_tool_table(tool_table) if tool_table else controller.tools
-    options = (offsets, tools, block_delete, interpreter, rs274, controller)
+    options = (offsets, tools, block_delete, interpreter, rs274, controller, subprograms)
     return _read(_Request(lines, Path(path).name, str(path), place, _six(default_origin), *options))
 
 
@@ -155,6 +159,7 @@ def parse_program(
     interpreter: str = "builtin",
     rs274: str | None = None,
     controller: Controller = UNKNOWN_CONTROL,
+    subprograms: str | Path | None = None,
 ) -> Program:
     r"""Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`.
 
@@ -175,7 +180,7 @@ def parse_program(
     """
     lines, place = split_lines(text, name), None if origin is None else _six(origin)
     offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools
-    options = (offsets, tools, block_delete, interpreter, rs274, controller)
+    options = (offsets, tools, block_delete, interpreter, rs274, controller, subprograms)
     return _read(_Request(lines, name, "", place, _six(default_origin), *options))
 
 
@@ -194,6 +199,7 @@ class _Request:
     interpreter: str
     rs274: str | None
     controller: Controller
+    subprograms: str | Path | None = None
 
     @property
     def posted(self) -> PostedKinematics | None:
@@ -318,11 +324,24 @@ def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
 
 
 def _read_built_in(asked: _Request) -> Program:
+    try:
+        return _run_built_in(asked, ProgramRun)
+    except InputError:
+        from toolpath_stiff.nc.parametric.statements import uses_variables
+
+        if not uses_variables(asked.lines):
+            raise
+    from toolpath_stiff.nc.parametric.run import ParametricRun
+
+    return _run_built_in(asked, partial(ParametricRun, folder=asked.subprograms))
+
+
+def _run_built_in(asked: _Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]) -> Program:
     posted = asked.posted
     frames = Frames(copy.deepcopy(asked.offsets), *asked.zero, posted=posted)
     state = State(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)
     state.feed = asked.controller.feed
-    run = ProgramRun(state, asked.lines, asked.name, asked.switches)
+    run = begin(state, asked.lines, asked.name, asked.switches)
     warnings = run.run()
     if not state.recorder.cuts:
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=asked.name)
