@@ -336,7 +336,9 @@ def _read_built_in(asked: _Request) -> Program:
     return _run_built_in(asked, partial(ParametricRun, folder=asked.subprograms))
 
 
-def _run_built_in(asked: _Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]) -> Program:
+def _run_built_in(
+    asked: _Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
+) -> Program:
     posted = asked.posted
     frames = Frames(copy.deepcopy(asked.offsets), *asked.zero, posted=posted)
     state = State(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)

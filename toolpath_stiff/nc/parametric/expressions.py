@@ -2,8 +2,8 @@
 
 Two families of controls have variables (`#`). RS274/NGC is LinuxCNC's (manual, "O Codes" and "G-Code Overview",
 "Expressions", "Binary Operators", "Functions"). Macro B is Fanuc's (operator's manuals, "Custom macro", "Arithmetic
-and logic operation") and Haas' (mill operator's manual, "Macros"). A program that shows no sign of either is read as far
-as both agree, and refused beyond.
+and logic operation") and Haas' (mill operator's manual, "Macros"). A program that shows no sign of either is read as
+far as both agree, and refused beyond.
 
 What differs: a power `**` and `EXISTS` are NGC's; in Macro B an assignment takes a whole expression without brackets,
 AND binds as `*` does, OR and XOR as `+`, and all three work on the bits of whole numbers, where NGC's are logical and
@@ -35,14 +35,16 @@ OPERATOR = re.compile(r"\*\*|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE|[*/+-]")
 COMPARISONS = ("EQ", "NE", "GT", "GE", "LT", "LE")
 LOGIC = ("AND", "OR", "XOR")
 # How tightly an operator binds. All are left-associative, `**` too (LinuxCNC: 2**3**2 is 64).
+_SHARED = {"*": 4, "/": 4, "MOD": 4, "+": 3, "-": 3, **dict.fromkeys(COMPARISONS, 2)}
 BINDS = {
-    NGC: {"**": 5, "*": 4, "/": 4, "MOD": 4, "+": 3, "-": 3, **dict.fromkeys(COMPARISONS, 2), **dict.fromkeys(LOGIC, 1)},
-    MACRO_B: {"*": 4, "/": 4, "MOD": 4, "AND": 4, "+": 3, "-": 3, "OR": 3, "XOR": 3, **dict.fromkeys(COMPARISONS, 2)},
-}  # fmt: skip
-BINDS[EITHER] = {name: rank for name, rank in BINDS[NGC].items() if name not in LOGIC and name != "**"}
+    NGC: {"**": 5, **_SHARED, **dict.fromkeys(LOGIC, 1)},
+    MACRO_B: {**_SHARED, "AND": 4, "OR": 3, "XOR": 3},
+    EITHER: _SHARED,
+}
 EQUAL = 1e-4  # NGC's EQ and NE: LinuxCNC's rs274 takes 5 and 5.00009 for equal, 5 and 5.0002 not
 DEEPEST = 50  # brackets within each other
 LARGEST_BITS = 2**31
+NO_TANGENT_DEGREES = 1e-9
 
 
 @dataclass
@@ -76,6 +78,7 @@ class Scanner:
 
     @property
     def done(self) -> bool:
+        """Whether all of it is read."""
         return self.at >= len(self.text)
 
     @property
@@ -91,17 +94,20 @@ class Scanner:
         return True
 
     def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+        """What matches next, then read; None if nothing does."""
         found = pattern.match(self.text, self.at)
         if found is not None:
             self.at = found.end()
         return found
 
     def fail(self, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
+        """An error at a column, unless given that of the next character."""
         return ProgramError(
             found, expected=expected, hint=hint, file=self.name, line=self.line, column=column or self.column
         )
 
     def rest(self) -> str:
+        """The next few characters, for errors."""
         return repr(self.text[self.at : self.at + 12])
 
     # -- values ----------------------------------------------------------------------------------------------------
@@ -160,7 +166,9 @@ class Scanner:
         named = self.match(NAME)
         if named is not None:
             if self.family == MACRO_B:
-                raise self.fail(f"#<{named[1]}> is a named variable, which Macro B does not have", "#1 to #999", column=column)
+                raise self.fail(
+                    f"#<{named[1]}> is a named variable, which Macro B does not have", "#1 to #999", column=column
+                )
             word = named[1]
             return lambda variables: word
         inner: Value
@@ -171,9 +179,12 @@ class Scanner:
         else:
             literal = self.match(NUMBER)
             if literal is None:
-                raise self.fail(f"# before {self.rest()}" if not self.done else "# at the end", "the number of a variable")
+                raise self.fail(
+                    f"# before {self.rest()}" if not self.done else "# at the end", "the number of a variable"
+                )
             constant = float(literal[0])
             inner = lambda variables: constant  # noqa: E731
+
         def numbered(variables: Variables) -> int:
             found = number(inner(variables))
             if abs(found - round(found)) > EQUAL:
@@ -197,7 +208,8 @@ class Scanner:
                 if operator in LOGIC:
                     raise self.fail(
                         f"{operator} works on truth values on LinuxCNC and on bits on Fanuc's and Haas' controls",
-                        hint="name the control with --dialect", column=column,
+                        hint="name the control with --dialect",
+                        column=column,
                     )
                 raise self.fail(f"{operator} is no operator of {self.family}", column=column)
             if rank <= tightest:
@@ -252,7 +264,9 @@ class Scanner:
         elif name == "ATAN" and self.next("]") and self.next("/"):
             second = self.bracket()
         else:
-            raise self.fail(f"{name} with one value", "ATAN[y]/[x]" if name == "ATAN" else "POW[base,exponent]", column=column)
+            raise self.fail(
+                f"{name} with one value", "ATAN[y]/[x]" if name == "ATAN" else "POW[base,exponent]", column=column
+            )
         family = self.family
 
         def applied(variables: Variables) -> float:
@@ -285,6 +299,7 @@ def number(value: float | None) -> float:
 
 
 def finite(value: float) -> float:
+    """The value. Raises `ValueError` unless it is a finite real number."""
     if isinstance(value, complex) or not math.isfinite(value):
         raise ValueError("the result is no finite number")
     return float(value)
@@ -292,10 +307,7 @@ def finite(value: float) -> float:
 
 def equality(operator: str, left: float | None, right: float | None, family: str) -> float:
     """EQ and NE; empty is not 0 to Macro B ("Custom macro", "Handling of an empty variable")."""
-    if family == NGC:
-        same = abs(number(left) - number(right)) < EQUAL
-    else:
-        same = left == right
+    same = abs(number(left) - number(right)) < EQUAL if family == NGC else left == right
     return float(same == (operator == "EQ"))
 
 
@@ -303,6 +315,7 @@ def equality(operator: str, left: float | None, right: float | None, family: str
 
 
 def modulo(left: float, right: float, family: str) -> float:
+    """MOD; never negative in NGC."""
     if right == 0.0:
         raise ValueError("the divisor is 0")
     if family != NGC and (left < 0.0 or right < 0.0):
@@ -312,12 +325,15 @@ def modulo(left: float, right: float, family: str) -> float:
 
 
 def divided(left: float, right: float, family: str) -> float:
+    """The quotient. Raises `ValueError` for a divisor of 0."""
     if right == 0.0:
         raise ValueError("the divisor is 0")
     return left / right
 
 
 def logical(operator: str) -> Callable[[float, float, str], float]:
+    """AND, OR, XOR: of truth values in NGC, of bits in Macro B."""
+
     def act(left: float, right: float, family: str) -> float:
         if family == NGC:
             one, other = left != 0.0, right != 0.0
@@ -325,7 +341,9 @@ def logical(operator: str) -> Callable[[float, float, str], float]:
         bits = [round(value) for value in (left, right)]
         if any(bit != value or not 0 <= bit < LARGEST_BITS for bit, value in zip(bits, (left, right), strict=True)):
             raise ValueError("its values are not whole numbers from 0")
-        return float(bits[0] & bits[1] if operator == "AND" else bits[0] | bits[1] if operator == "OR" else bits[0] ^ bits[1])
+        return float(
+            bits[0] & bits[1] if operator == "AND" else bits[0] | bits[1] if operator == "OR" else bits[0] ^ bits[1]
+        )
 
     return act
 
@@ -364,17 +382,38 @@ def up(value: float, family: str) -> float:
     return float(math.ceil(value) if family == NGC else math.copysign(math.ceil(abs(value)), value))
 
 
+def trimmed(function: Callable[[float], float], degrees: bool = False) -> Callable[[float, str], float]:
+    """A function of angles in degrees (or, `degrees`, to them), to 14 digits.
+
+    LinuxCNC works these out in long double: ASIN[0.5] is 30 there, exactly; MOD and FIX make something else of
+    30.000000000000004.
+    """
+
+    def act(value: float, family: str) -> float:
+        result = math.degrees(function(value)) if degrees else function(math.radians(value))
+        return float(f"{result:.14g}")
+
+    return act
+
+
+def tangent(value: float, family: str) -> float:
+    """TAN, refused where it is infinite and digits that no control shares decide."""
+    if abs(abs(math.fmod(value, 180.0)) - 90.0) < NO_TANGENT_DEGREES:
+        raise ValueError("the angle is 90 degrees")
+    return trimmed(math.tan)(value, family)
+
+
 FUNCTIONS: dict[str, Callable[[float, str], float]] = {
     "ABS": lambda value, family: abs(value),
-    "ACOS": lambda value, family: math.degrees(math.acos(value)),
-    "ASIN": lambda value, family: math.degrees(math.asin(value)),
-    "COS": lambda value, family: math.cos(math.radians(value)),
+    "ACOS": trimmed(math.acos, degrees=True),
+    "ASIN": trimmed(math.asin, degrees=True),
+    "COS": trimmed(math.cos),
     "EXP": lambda value, family: math.exp(value),
     "FIX": down,
     "FUP": up,
     "LN": lambda value, family: math.log(value),
     "ROUND": rounded,
-    "SIN": lambda value, family: math.sin(math.radians(value)),
+    "SIN": trimmed(math.sin),
     "SQRT": lambda value, family: math.sqrt(value),
-    "TAN": lambda value, family: math.tan(math.radians(value)),
+    "TAN": tangent,
 }

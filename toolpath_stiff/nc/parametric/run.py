@@ -7,6 +7,7 @@ calls. Subprograms of other files are read from one folder that the caller names
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from toolpath_stiff.nc.parametric.statements import (
     plain_word,
     read_statement,
 )
+from toolpath_stiff.nc.parametric.structure import Structure, arguments_of, loops_of, structure_of
 from toolpath_stiff.nc.parametric.variables import Level, Variables
 from toolpath_stiff.nc.state import Call, Flow, State
 from toolpath_stiff.nc.words import Block, Word, read_lines
@@ -29,15 +31,6 @@ from toolpath_stiff.nc.words import Block, Word, read_lines
 MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
 MACRO_CALLS = ("G65", "G66", "G67")
-# Macro B, argument specification I and II ("Macro call", "Argument specification").
-ARGUMENTS = {
-    "A": 1, "B": 2, "C": 3, "D": 7, "E": 8, "F": 9, "H": 11, "I": 4, "J": 5, "K": 6, "M": 13, "Q": 17, "R": 18, "S": 19,
-    "T": 20, "U": 21, "V": 22, "W": 23, "X": 24, "Y": 25, "Z": 26,
-}  # fmt: skip
-SECOND_KIND = {"A": 1, "B": 2, "C": 3}  # then I, J, K up to ten times, from #4
-WHOLE_ARGUMENTS = frozenset("DHMST")  # numbers of tools, offsets and speeds: no decimal point belongs to them
-OPENERS = {"ENDSUB": ("SUB",), "ENDIF": ("IF",), "ENDWHILE": ("WHILE",), "ENDREPEAT": ("REPEAT",)}
-LOOPS = ("WHILE", "DO", "REPEAT")
 
 
 @dataclass(frozen=True)
@@ -55,35 +48,6 @@ class MacroLevel(Subprogram):
     arguments: dict[int, float | None] = field(default_factory=dict)
     modal: bool = False
     repeats: dict[int, int] = field(default_factory=dict)
-
-
-@dataclass
-class Structure:
-    """Where O words of RS274/NGC belong to each other; lines from 0.
-
-    Attributes
-    ----------
-    subs
-        Label -> line of `sub`.
-    end
-        Line of `sub`, `if`, `while`, `do`, `repeat` -> line that closes it.
-    start
-        The other way round.
-    branches
-        Line of `if` -> lines of its `elseif`, `else` and `endif`; each of those -> line of the `if`.
-    inside
-        Line of `break` or `continue` -> line that opens its loop.
-    faults
-        Line that fits nowhere -> what to say if the run comes to it.
-    """
-
-    subs: dict[str, int] = field(default_factory=dict)
-    end: dict[int, int] = field(default_factory=dict)
-    start: dict[int, int] = field(default_factory=dict)
-    branches: dict[int, list[int]] = field(default_factory=dict)
-    branch_of: dict[int, int] = field(default_factory=dict)
-    inside: dict[int, int] = field(default_factory=dict)
-    faults: dict[int, InputError] = field(default_factory=dict)
 
 
 class ParametricRun(ProgramRun):
@@ -184,7 +148,9 @@ class ParametricRun(ProgramRun):
     def _code(self, letter: str, value: float, at: int, column: int, written: str) -> float:
         code = round(value, 1)
         if abs(code - value) > EQUAL or code < 0.0:
-            raise self._fail(at, f"{written} is {letter}{value:g}", f"a code such as {letter}1 or {letter}59.3", column=column)
+            raise self._fail(
+                at, f"{written} is {letter}{value:g}", f"a code such as {letter}1 or {letter}59.3", column=column
+            )
         return code
 
     def _assign(self, assignments: tuple[Assignment, ...], at: int) -> None:
@@ -224,13 +190,14 @@ class ParametricRun(ProgramRun):
 
     def _macro_call(self, block: Block) -> tuple[MacroCall | None, Block]:
         """G65, G66 or G67 of a block, carried out but for G65's call; and the block without it."""
-        for place, word in enumerate(block.words):
-            if word.letter == "G" and code_name("G", word.value) in MACRO_CALLS:
-                break
-        else:
+        calls = [
+            (at, word)
+            for at, word in enumerate(block.words)
+            if word.letter == "G" and code_name("G", word.value) in MACRO_CALLS
+        ]
+        if not calls or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
             return None, block
-        if self.family == NGC:
-            return None, block  # LinuxCNC has none: refused where the codes are sorted
+        place, word = calls[0]
         code, before, after = code_name("G", word.value), block.words[:place], block.words[place + 1 :]
         if before:
             execute(self.state, replace(block, words=before))
@@ -241,7 +208,13 @@ class ParametricRun(ProgramRun):
         if "P" not in given:
             raise self._fail(block.line - 1, f"{code} without P", "P with the number of the macro", column=word.column)
         number_of, repeats = (self._count(given[k], block.line) if k in given else 1 for k in "PL")
-        call = MacroCall(number_of, repeats, word.column, arguments=self._arguments(after, block.line), modal=code == "G66")
+        call = MacroCall(
+            number_of,
+            repeats,
+            word.column,
+            arguments=arguments_of(after, self.state.dialect.increments, self._word_fault(block.line)),
+            modal=code == "G66",
+        )
         if call.modal:
             self._modal = call
         return call, replace(block, words=())
@@ -251,33 +224,8 @@ class ParametricRun(ProgramRun):
             raise self._fail(line - 1, f"{word.text} is not a count", "a whole number from 1", column=word.column)
         return int(word.value)
 
-    def _arguments(self, words: tuple[Word, ...], line: int) -> dict[int, float | None]:
-        """The local variables that the words of a call give."""
-        words = tuple(word for word in words if word.letter not in "PL")
-        letters = [word.letter for word in words]
-        second = any(letters.count(letter) > 1 for letter in "IJK")
-        found: dict[int, float | None] = {}
-        triple = -1
-        previous = "K"
-        for word in words:
-            if second and word.letter in "IJK":
-                triple += word.letter <= previous
-                previous = word.letter
-                place = 4 + 3 * triple + "IJK".index(word.letter)
-            else:
-                place = (SECOND_KIND if second else ARGUMENTS).get(word.letter, 0)
-            if not 1 <= place <= 33 or place in found:
-                raise self._fail(
-                    line - 1, f"{word.text} cannot be an argument of this call",
-                    "each letter once; with I, J, K repeated no other ones than A, B, C", column=word.column,
-                )
-            if self.state.dialect.increments and word.value and "." not in word.text and word.letter not in WHOLE_ARGUMENTS:
-                raise self._fail(
-                    line - 1, f"the argument {word.text} has no decimal point, and parameters of the control scale it",
-                    f"{word.text}.", column=word.column,
-                )
-            found[place] = word.value
-        return found
+    def _word_fault(self, line: int) -> Callable[[Word, str, str], InputError]:
+        return lambda word, found, expected: self._fail(line - 1, f"{word.text} {found}", expected, column=word.column)
 
     def _in_modal(self) -> bool:
         return any(isinstance(level, MacroLevel) and level.modal for level in self._levels)
@@ -453,7 +401,8 @@ class ParametricRun(ProgramRun):
         if label not in structure.subs:
             where = "" if self.folder is None else f", and {str(self.folder)!r} has no file of it"
             raise self._fail(
-                at, f"o{label.lower()} call: the program has no such sub{where}",
+                at,
+                f"o{label.lower()} call: the program has no such sub{where}",
                 hint="" if self.folder else "name the folder of its subprograms with --subprograms FOLDER",
                 column=steering.column,
             )
@@ -512,21 +461,8 @@ class ParametricRun(ProgramRun):
         return max(b for b in bounds if b <= at), min(b for b in bounds if b > at)
 
     def _macro_loops(self) -> dict[int, int]:
-        """Line of WHILE DO or DO -> line of its END, and back."""
         if self._loops is None:
-            self._loops = {}
-            opened: list[tuple[str, int]] = []
-            for at, steering in self._steerings():
-                if steering.kind in ("WHILE", "DO"):
-                    opened.append((steering.label.text, at))
-                elif steering.kind == "END":
-                    if not opened or opened[-1][0] != steering.label.text:
-                        raise self._fail(at, f"END{steering.label.text} without DO{steering.label.text}", column=steering.column)
-                    _, start = opened.pop()
-                    self._loops[at], self._loops[start] = start, at
-            if opened:
-                label, at = opened[-1]
-                raise self._fail(at, f"DO{label} has no END{label}")
+            self._loops = loops_of(self._steerings(), self._fail)
         return self._loops
 
     def _steerings(self) -> list[tuple[int, Steering]]:
@@ -543,67 +479,8 @@ class ParametricRun(ProgramRun):
 
     def _ngc(self) -> Structure:
         if self._structure is None:
-            self._structure = Structure()
-            opened: list[tuple[str, str, int]] = []  # kind, label, line
-            labels: list[dict[str, int]] = [{}]  # of each file, and of the sub that is open
-            for at, steering in self._steerings():
-                if any(at == first for first, *_ in self._files):
-                    labels = [{}]
-                try:
-                    self._pair(self._structure, opened, labels, at, steering)
-                except InputError as fault:
-                    self._structure.faults[at] = fault
-            for kind, label, at in opened:
-                self._structure.faults[at] = self._fail(at, f"o{label.lower()} {kind.lower()} has no end")
+            self._structure = structure_of(self._steerings(), {first for first, *_ in self._files}, self._fail)
         return self._structure
-
-    def _pair(
-        self,
-        structure: Structure,
-        opened: list[tuple[str, str, int]],
-        labels: list[dict[str, int]],
-        at: int,
-        steering: Steering,
-    ) -> None:
-        """Add one O word to the structure."""
-        kind, label, last = steering.kind, steering.label.text, opened[-1] if opened else ("", "", 0)
-        closes_do = kind == "WHILE" and last[:2] == ("DO", label)
-        if kind in ("SUB", "IF", "DO", "REPEAT") or (kind == "WHILE" and not closes_do):
-            if label in labels[-1] or not label:
-                where = f"is in line {labels[-1][label] + 1} already" if label else "is not known before it runs"
-                raise self._fail(at, f"the label o{label.lower()} {where}", "each label once", column=steering.column)
-            labels[-1][label] = at
-            opened.append((kind, label, at))
-            if kind == "SUB":
-                structure.subs[label] = at
-                labels.append({})
-            elif kind == "IF":
-                structure.branches[at] = []
-        elif kind in OPENERS or closes_do:
-            if last[1] != label or not (closes_do or last[0] in OPENERS[kind]):
-                raise self._unpaired(at, steering)
-            opened.pop()
-            if kind == "ENDSUB":
-                labels.pop()
-            structure.end[last[2]], structure.start[at] = at, last[2]
-            if kind == "ENDIF":
-                structure.branches[last[2]].append(at)
-        elif kind in ("ELSE", "ELSEIF"):
-            if last[:2] != ("IF", label):
-                raise self._unpaired(at, steering)
-            structure.branches[last[2]].append(at)
-            structure.branch_of[at] = last[2]
-        elif kind in ("BREAK", "CONTINUE"):
-            loops = [line for other, name, line in opened if name == label and other in LOOPS]
-            if not loops:
-                raise self._unpaired(at, steering)
-            structure.inside[at] = loops[-1]
-
-    def _unpaired(self, at: int, steering: Steering) -> InputError:
-        label = steering.label.text.lower()
-        return self._fail(
-            at, f"o{label} {steering.kind.lower()} does not belong to what is open before it", column=steering.column
-        )
 
     def _end(self, at: int, what: str, ended: bool = False) -> list[str]:
         """A warning if anything but subprograms follows the end."""
@@ -613,7 +490,8 @@ class ParametricRun(ProgramRun):
 
 
 NGC_STEPS = {
-    "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else, "ENDIF": ParametricRun._do_nothing,
+    "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else,
+    "ENDIF": ParametricRun._do_nothing,
     "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._end_while, "DO": ParametricRun._do_nothing,
     "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat, "BREAK": ParametricRun._break,
     "CONTINUE": ParametricRun._continue, "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return,

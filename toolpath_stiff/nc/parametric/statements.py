@@ -74,7 +74,8 @@ def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
     if len(signs) == 2:
         raise ProgramError(
             "the program shows signs of LinuxCNC's language (O words) and of Macro B (IF GOTO, WHILE DO, G65)",
-            hint="name the control with --dialect", file=name,
+            hint="name the control with --dialect",
+            file=name,
         )
     return signs[0] if signs else EITHER
 
@@ -245,7 +246,8 @@ def _o_word(block: Scanner) -> Steering:
     kind = block.match(_NGC_WORD)
     if kind is None:
         raise block.fail(
-            f"the O word {label.text or 'of a value'} without what it does: {block.rest()}", ", ".join(NGC_WORDS).lower()
+            f"the O word {label.text or 'of a value'} without what it does: {block.rest()}",
+            ", ".join(NGC_WORDS).lower(),
         )
     values = []
     if kind[0] == "CALL":
@@ -254,9 +256,7 @@ def _o_word(block: Scanner) -> Steering:
         most = 30
         if len(values) > most:
             raise block.fail(f"a call with {len(values)} values", f"at most {most}", column=column)
-    elif kind[0] in ("IF", "ELSEIF", "WHILE", "REPEAT"):
-        values.append(block.bracket())
-    elif kind[0] in ("ENDSUB", "RETURN") and not block.done:
+    elif kind[0] in ("IF", "ELSEIF", "WHILE", "REPEAT") or (kind[0] in ("ENDSUB", "RETURN") and not block.done):
         values.append(block.bracket())
     return _alone(block, Steering(kind[0], label, tuple(values), column=column))
 
@@ -275,9 +275,7 @@ def _label(block: Scanner, column: int) -> Label:
     return Label("", block.value())
 
 
-def _contents(
-    block: Scanner, text: str
-) -> tuple[list[tuple[str, Value | float, int, str]], list[Assignment]]:
+def _contents(block: Scanner, text: str) -> tuple[list[tuple[str, Value | float, int, str]], list[Assignment]]:
     """Words and assignments of a block."""
     words: list[tuple[str, Value | float, int, str]] = []
     assignments: list[Assignment] = []
@@ -304,7 +302,9 @@ def _contents(
             block.of_word = False
         written = text[column - 1 : block.columns[block.at - 1]]
         if letter == "N":
-            raise block.fail(f"line number {written!r} after another word", "N at the beginning of the line", column=column)
+            raise block.fail(
+                f"line number {written!r} after another word", "N at the beginning of the line", column=column
+            )
         words.append((letter, value, column, written))
     return words, assignments
 
@@ -328,7 +328,6 @@ def _assignment(block: Scanner) -> Assignment:
     return Assignment(place, value, column)
 
 
-
 def plain_word(letter: str, value: float, column: int, written: str, computed: bool) -> Word:
     """A word with its value; that of a computed one stands beside its text, always with a decimal point."""
     if not computed:
@@ -339,5 +338,3 @@ def plain_word(letter: str, value: float, column: int, written: str, computed: b
 def _decimal(value: float) -> str:
     text = f"{value:.6f}".rstrip("0")
     return text if not text.endswith(".") else text + "0"
-
-

@@ -13,7 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes.motion import know_height, know_place
+from toolpath_stiff.nc.codes.motion import know_height
+from toolpath_stiff.nc.codes.points import know_place
 from toolpath_stiff.nc.parametric.expressions import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, ToolEntry
@@ -88,7 +89,9 @@ class Variables:
             return own[name]
         if name in PREDEFINED:
             return PREDEFINED[name](self)
-        raise LookupError(f"the variable #<{name.lower()}> is read before it is set", "set it before, in the same subprogram")
+        raise LookupError(
+            f"the variable #<{name.lower()}> is read before it is set", "set it before, in the same subprogram"
+        )
 
     def _numbered(self, number: int, line: int, column: int, name: str) -> float | None:
         if number == 0 and self.family != NGC:
@@ -99,7 +102,8 @@ class Variables:
             found = self.common
         elif self.family == EITHER:
             raise LookupError(
-                f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls", "name it with --dialect"
+                f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls",
+                "name it with --dialect",
             )
         else:
             system = self._ngc_system if self.family == NGC else self._macro_system
@@ -160,7 +164,7 @@ class Variables:
 
     def angle(self, y: float, x: float) -> float:
         """ATAN[y]/[x], degrees: -180 to 180 on LinuxCNC, 0 to 360 on Fanuc's (parameter 6004, NAT = 0)."""
-        degrees = math.degrees(math.atan2(y, x))
+        degrees = float(f"{math.degrees(math.atan2(y, x)):.14g}")  # as `expressions.trimmed`
         if degrees >= 0.0 or self.family == NGC:
             return degrees
         if self.state.dialect.name == "fanuc":
@@ -177,7 +181,9 @@ class Variables:
         if axis < 2:
             know_place(state, block, word)
         if frames.from_machine[axis]:
-            raise block.fail(word, "depends on where program zero sits on the machine", "a move to program coordinates before")
+            raise block.fail(
+                word, "depends on where program zero sits on the machine", "a move to program coordinates before"
+            )
         value = frames.to_program(frames.position)[axis]
         return value / state.length_scale if axis < 3 else value
 
@@ -201,7 +207,9 @@ class Variables:
             axis = number - first
             if 0 <= axis < 6:
                 if first != MACRO_POSITIONS[0] and axis == 2 and state.frames.tool:
-                    raise LookupError(f"#{number} under a tool length, where controls differ", f"#{MACRO_POSITIONS[0] + axis}")
+                    raise LookupError(
+                        f"#{number} under a tool length, where controls differ", f"#{MACRO_POSITIONS[0] + axis}"
+                    )
                 return self.position(axis, word, line, name)
         if number in TOOL_LENGTHS:
             tool = (state.tools or {}).get(number - TOOL_LENGTHS.start + 1)
@@ -252,7 +260,9 @@ class Variables:
         state = self.state
         word = Word("#", float(number), column, f"#{number}")
         if number == 3000:
-            raise self._refused(f"the program stops with its alarm {value:g} (#3000)", "a program that runs through", line, column, name)
+            raise self._refused(
+                f"the program stops with its alarm {value:g} (#3000)", "a program that runs through", line, column, name
+            )
         if number in (3003, 3004, 3006):
             state.note(line, word, "single block, feed hold or a message: the path does not depend on it")
             return True
@@ -267,7 +277,11 @@ class Variables:
         index, axis = place
         if index == state.frames.active:
             raise self._refused(
-                f"#{number} changes the work offset in force", f"G10 L2 P{index + 1}, whose effect is defined", line, column, name
+                f"#{number} changes the work offset in force",
+                f"G10 L2 P{index + 1}, whose effect is defined",
+                line,
+                column,
+                name,
             )
         offset = state.frames.offsets.table[index]
         offset.axes[axis] = value * (state.length_scale if axis < 3 else 1.0)
@@ -313,5 +327,3 @@ PREDEFINED: dict[str, Callable[[Variables], float]] = {
     "_CURRENT_TOOL": _plain(lambda state: state.tool),
     "_SELECTED_TOOL": _plain(lambda state: state.selected),
 }
-
-
