@@ -81,7 +81,7 @@ CALLS_FILES = [
 
 
 def program_with(line: str) -> str:
-    return f"G21 G90\nG1 X5 F100\n#1 = 101\n{line}\nG1 X6\nM2\n"
+    return f"G21 G90\nG1 X5 F100\n#1 = 101 G33 K1 Z1\n{line}\nG1 X6\nM2\n"
 
 
 @pytest.fixture
@@ -140,7 +140,7 @@ def test_refused_before_anything_runs_with_its_line(line, interpreter, started):
 def test_spellings_of_other_editors_and_scripts_are_refused(text, interpreter, started):
     """Line ends of old Macs, NUL, byte-order marks, blanks and letters of other scripts, text after the end."""
     if interpreter == "auto":
-        text = "#1 = 1\n" + text
+        text = "G33 K1 Z1 (refused by the built-in reader)\n" + text
     with pytest.raises(InputError):
         parse_program(text, "part.nc", interpreter=interpreter)
     assert not started

@@ -246,7 +246,7 @@ class Variables:
             9: float((state.motion or "G80")[1:]) if cycle else 80.0,
             10: float(state.retract[1:]) if state.retract else None,
             14: 54.0 + state.frames.active if state.frames.active < LAST_WORK_OFFSET else None,
-            109: state.feed / state.feed_scale if state.feed is not None else None,
+            109: 0.0 if state.feed is None else state.feed / state.feed_scale,
             119: state.speed,
             120: float(state.selected),
         }
