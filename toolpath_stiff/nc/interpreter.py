@@ -242,6 +242,11 @@ class Subprogram:
     again: int
 
 
+def beyond_the_end(what: str, at: int, lines: int) -> str:
+    """The warning that lines follow what ends a program in line `at` (from 0)."""
+    return f"what follows {what} in line {at + 1} is not part of the program (lines: {lines})"
+
+
 class ProgramRun:
     """Runs the blocks of a file on a control.
 
@@ -376,7 +381,7 @@ class ProgramRun:
         ]
         if not rest:
             return []
-        return [f"what follows {what} in line {at + 1} is not part of the program (lines: {len(rest)})"]
+        return [beyond_the_end(what, at, len(rest))]
 
     # -- calls -----------------------------------------------------------------------------------------------------
 

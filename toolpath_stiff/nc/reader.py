@@ -333,7 +333,7 @@ def _read_built_in(asked: _Request) -> Program:
             raise
     from toolpath_stiff.nc.parametric.run import ParametricRun
 
-    return _run_built_in(asked, partial(ParametricRun, folder=asked.subprograms))
+    return replace(_run_built_in(asked, partial(ParametricRun, folder=asked.subprograms)), parametric=True)
 
 
 def _run_built_in(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes import code_name
-from toolpath_stiff.nc.interpreter import DEEPEST, HEAD, MOST_REPEATS, SEQUENCE, ProgramRun, Subprogram, execute
+from toolpath_stiff.nc.interpreter import DEEPEST, HEAD, MOST_REPEATS, SEQUENCE, ProgramRun, Subprogram, beyond_the_end, execute
 from toolpath_stiff.nc.parametric.expressions import EQUAL, NGC, number
 from toolpath_stiff.nc.parametric.statements import (
     Assignment,
@@ -483,10 +483,19 @@ class ParametricRun(ProgramRun):
         return self._structure
 
     def _end(self, at: int, what: str, ended: bool = False) -> list[str]:
-        """A warning if anything but subprograms follows the end."""
         if self._levels and not ended:
             raise self._unended(self._at)
-        return []
+        if at >= self._main_lines:
+            return []
+        subs = self._ngc() if self.family == NGC else Structure()
+        ends = [(start, subs.end[start]) for start in subs.subs.values() if start in subs.end]
+        heads = [index for index in range(at + 1, self._main_lines) if HEAD.match(self.lines[index])]
+        rest = [
+            index
+            for index in range(at + 1, min([*heads, self._main_lines]))
+            if self.lines[index].strip() not in ("", "%") and not any(a <= index <= b for a, b in ends)
+        ]
+        return [beyond_the_end(what, at, len(rest))] if rest else []
 
 
 NGC_STEPS = {
