@@ -136,6 +136,13 @@ class _CheckingRun(ProgramRun):
             self._add(error)
             return Block(at + 1, ())
 
+    def _steered(self, at: int) -> int | None:
+        try:
+            return super()._steered(at)
+        except InputError as error:
+            self._add(error)
+            return at + 1
+
     def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
         codes = [row[G_COLUMN] for row in rows]
         for number, count in Counter(code for code in codes if code).items():

@@ -278,7 +278,7 @@ FLOW_CODES = (
     ),
     Code("M98", M_SUBPROGRAM, call, "subprogram call", _CALLS),
     *(
-        Code(code, ONCE, macro_call, meaning, _MACROS, controls=("generic", "fanuc", "haas"), takes_axes=True)
+        Code(code, ONCE, macro_call, meaning, _MACROS, controls=("generic", "fanuc", "haas"))
         for code, meaning in (("G65", "macro call"), ("G66", "macro call after moves"), ("G67", "no such call"))
     ),
     Code("M99", M_SUBPROGRAM, end_of_subprogram, "subprogram end", _CALLS),

@@ -13,7 +13,16 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes import code_name
-from toolpath_stiff.nc.interpreter import DEEPEST, HEAD, MOST_REPEATS, SEQUENCE, ProgramRun, Subprogram, beyond_the_end, execute
+from toolpath_stiff.nc.interpreter import (
+    DEEPEST,
+    HEAD,
+    MOST_REPEATS,
+    SEQUENCE,
+    ProgramRun,
+    Subprogram,
+    beyond_the_end,
+    execute,
+)
 from toolpath_stiff.nc.parametric.expressions import EQUAL, NGC, number
 from toolpath_stiff.nc.parametric.statements import (
     Assignment,
