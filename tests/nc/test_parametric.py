@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -273,10 +274,10 @@ def test_a_variable_that_no_block_sets_is_an_assumption():
 def test_subprograms_of_a_folder(tmp_path):
     (tmp_path / "slot.ngc").write_text("o<slot> sub\nG1 X#1\nX[1/#2]\no<slot> endsub\n")
     text = "G21 F100\no<slot> call [5] [4]\nY2\n"
-    program = parse_program(text, controller=LINUXCNC, subprograms=tmp_path)
+    program = parse_program(text, controller=replace(LINUXCNC, subprograms=str(tmp_path)))
     assert (program.moves.end[:, :3] * 1e3).round(6).tolist() == [[5, 0, 0], [0.25, 0, 0], [0.25, 2, 0]]
     assert program.moves.line.tolist() == [2, 2, 3], "moves of the file are of the line that calls it"
-    error = refusal("G21 F100\no<slot> call [5] [0]\n", LINUXCNC, subprograms=tmp_path)
+    error = refusal("G21 F100\no<slot> call [5] [0]\n", replace(LINUXCNC, subprograms=str(tmp_path)))
     assert (error.file, error.line) == ("slot.ngc", 3)
 
 
@@ -284,7 +285,7 @@ def test_subprograms_of_a_folder(tmp_path):
 def test_no_file_outside_of_the_folder(name, tmp_path):
     (tmp_path / "in").mkdir()
     (tmp_path / "slot.ngc").write_text("o<slot> sub\no<slot> endsub\n")
-    error = refusal(f"o<{name}> call\nG1 X1 F9\n", LINUXCNC, subprograms=tmp_path / "in")
+    error = refusal(f"o<{name}> call\nG1 X1 F9\n", replace(LINUXCNC, subprograms=str(tmp_path / "in")))
     assert "is not the name of a file" in error.found
 
 

@@ -179,7 +179,6 @@ def check_lines(
     default_origin: Iterable[float] = ZERO,
     block_delete: Switches = False,
     controller: Controller = UNKNOWN_CONTROL,
-    subprograms: str | Path | None = None,
 ) -> Checked:
     """Check a program; parameters as in `read_program`. Raises `InputError` for an empty program alone.
 
@@ -206,7 +205,9 @@ def check_lines(
     first = State(name, frames, copy.deepcopy(controller.tools), controller.dialect)
     first.feed = controller.feed
     start = modal_state(first)
-    run, errors, warnings = _checked_run(first, lines, name, switches_on(block_delete, controller), subprograms)
+    run, errors, warnings = _checked_run(
+        first, lines, name, switches_on(block_delete, controller), controller.subprograms
+    )
     state, frames = run.state, run.state.frames
     warnings, assumptions = [*warnings, *state.warnings], list(state.assumptions)
     moves = state.recorder.moves() if len(state.recorder) else None

@@ -97,7 +97,6 @@ def read_program(
     interpreter: str = "builtin",
     rs274: str | None = None,
     controller: Controller = UNKNOWN_CONTROL,
-    subprograms: str | Path | None = None,
 ) -> Program:
     """Read an NC program file to its moves in the set-up frame.
 
@@ -123,8 +122,6 @@ def read_program(
     controller
         Dialect, block-delete switches, work offsets and tools of the control, and the kinematics that the program was
         posted for; the two files above win over its tables.
-    subprograms
-        Folder of the files that a parametric program calls (`o<name> call`, `M98 P1234`); None: it calls none.
 
     Raises
     ------
@@ -143,7 +140,7 @@ def read_program(
     lines, place = read_lines(path), None if origin is None else _six(origin)
     offsets = read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets()
     tools = read_tool_table(tool_table) if tool_table else controller.tools
-    options = (offsets, tools, block_delete, interpreter, rs274, controller, subprograms)
+    options = (offsets, tools, block_delete, interpreter, rs274, controller)
     return _read(_Request(lines, Path(path).name, str(path), place, _six(default_origin), *options))
 
 
@@ -159,7 +156,6 @@ def parse_program(
     interpreter: str = "builtin",
     rs274: str | None = None,
     controller: Controller = UNKNOWN_CONTROL,
-    subprograms: str | Path | None = None,
 ) -> Program:
     r"""Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`.
 
@@ -180,7 +176,7 @@ def parse_program(
     """
     lines, place = split_lines(text, name), None if origin is None else _six(origin)
     offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools
-    options = (offsets, tools, block_delete, interpreter, rs274, controller, subprograms)
+    options = (offsets, tools, block_delete, interpreter, rs274, controller)
     return _read(_Request(lines, name, "", place, _six(default_origin), *options))
 
 
@@ -199,7 +195,6 @@ class _Request:
     interpreter: str
     rs274: str | None
     controller: Controller
-    subprograms: str | Path | None = None
 
     @property
     def posted(self) -> PostedKinematics | None:
@@ -333,7 +328,7 @@ def _read_built_in(asked: _Request) -> Program:
             raise
     from toolpath_stiff.nc.parametric.run import ParametricRun
 
-    return replace(_run_built_in(asked, partial(ParametricRun, folder=asked.subprograms)), parametric=True)
+    return replace(_run_built_in(asked, partial(ParametricRun, folder=asked.controller.subprograms)), parametric=True)
 
 
 def _run_built_in(

@@ -166,7 +166,7 @@ def without_comments(text: str, line: int, name: str, semicolon: bool) -> tuple[
         elif depth:
             depth -= character == ")"
         elif character == ";":
-            if not semicolon and _strip(text[column:].replace(";", " "), line, name, semicolon)[0]:
+            if not semicolon and without_comments(text[column:].replace(";", " "), line, name, semicolon)[0]:
                 raise ProgramError(
                     f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect",
                     expected="comments in parentheses, one block a line",

@@ -34,7 +34,7 @@ from toolpath_stiff.nc.parametric.statements import (
 )
 from toolpath_stiff.nc.parametric.structure import Structure, arguments_of, loops_of, structure_of
 from toolpath_stiff.nc.parametric.variables import Level, Variables
-from toolpath_stiff.nc.state import Call, Flow, State
+from toolpath_stiff.nc.state import Call, Flow, GoTo, State, Then
 from toolpath_stiff.nc.words import Block, Word, read_lines
 
 MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
@@ -75,7 +75,7 @@ class ParametricRun(ProgramRun):
         lines: tuple[str, ...],
         name: str,
         switches: frozenset[int],
-        folder: str | Path | None = None,
+        folder: str | Path | None,
     ) -> None:
         super().__init__(state, lines, name, switches, fast=False)
         self.family = family_of(lines, state.dialect, name)
@@ -89,7 +89,6 @@ class ParametricRun(ProgramRun):
         self._counts: list[dict[int, int]] = [{}]  # repeats left, by line, of each call
         self._steps = 0
         self._modal: MacroCall | None = None
-        self._return_to: int | None = None
         self._at = 0
 
     # -- blocks ----------------------------------------------------------------------------------------------------
@@ -175,7 +174,7 @@ class ParametricRun(ProgramRun):
     def _jump(self, at: int, to: int) -> int:
         return super()._jump(at, to) if max(at, to) < self._main_lines else to
 
-    def _execute(self, block: Block) -> Flow | Call:
+    def _execute(self, block: Block) -> Then:
         try:
             return self._act(block)
         except InputError as error:
@@ -183,11 +182,10 @@ class ParametricRun(ProgramRun):
                 error.line = self._at + 1
             raise
 
-    def _act(self, block: Block) -> Flow | Call:
+    def _act(self, block: Block) -> Then:
         call, block = self._macro_call(block)
         if call is not None and not call.modal:
             return call
-        block = self._with_return(block)
         moves = len(self.state.recorder)
         flow = execute(self.state, block) if block.words else Flow.NEXT
         modal = self._modal
@@ -239,17 +237,6 @@ class ParametricRun(ProgramRun):
     def _in_modal(self) -> bool:
         return any(isinstance(level, MacroLevel) and level.modal for level in self._levels)
 
-    def _with_return(self, block: Block) -> Block:
-        """M99 P10 returns to N10 of the caller: the P is noted, and the block goes on without it."""
-        codes = {code_name("M", word.value) for word in block.words if word.letter == "M"}
-        if self.family == NGC or "M99" not in codes or not self._levels:
-            return block
-        target = next((word for word in block.words if word.letter == "P"), None)
-        if target is None:
-            return block
-        self._return_to = self._count(target, block.line)
-        return replace(block, words=tuple(word for word in block.words if word is not target))
-
     # -- calls -----------------------------------------------------------------------------------------------------
 
     def _enter(self, at: int, call: Call) -> int:
@@ -296,10 +283,14 @@ class ParametricRun(ProgramRun):
             self._counts[-1] = {}
             return back
         self._counts.pop()
-        if self._return_to is not None:
-            target, self._return_to = self._return_to, None
-            return self._numbered(back - 1, target, 1)
         return back
+
+    def _return(self, at: int, flow: Flow | GoTo) -> int | None:
+        """M99; with P it goes on at that block of the caller, wherever that is."""
+        if not isinstance(flow, GoTo) or not self._levels:
+            return super()._return(at, flow)
+        self._levels[-1].again = 0
+        return self._numbered(self._leave() - 1, flow.number, flow.column)
 
     def _target(self, at: int, call: Call) -> tuple[int, int]:
         heads = self._heads()
@@ -389,7 +380,7 @@ class ParametricRun(ProgramRun):
     def _sub(self, at: int, steering: Steering) -> int | None:
         return self._ngc().end[at] + 1
 
-    def _return(self, at: int, steering: Steering) -> int | None:
+    def _return_sub(self, at: int, steering: Steering) -> int | None:
         if not self._levels:
             raise self._fail(at, f"{steering.kind.lower()} outside any subprogram", column=steering.column)
         value = number(steering.values[0](self.variables)) if steering.values else None
@@ -512,8 +503,8 @@ NGC_STEPS = {
     "ENDIF": ParametricRun._do_nothing,
     "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._end_while, "DO": ParametricRun._do_nothing,
     "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat, "BREAK": ParametricRun._break,
-    "CONTINUE": ParametricRun._continue, "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return,
-    "RETURN": ParametricRun._return, "CALL": ParametricRun._call_sub,
+    "CONTINUE": ParametricRun._continue, "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return_sub,
+    "RETURN": ParametricRun._return_sub, "CALL": ParametricRun._call_sub,
 }  # fmt: skip
 MACRO_STEPS = {
     "IF": ParametricRun._if_goto, "THEN": ParametricRun._then, "GOTO": ParametricRun._goto,
