@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.hunt_programs import Cam, Harsh, Zeros
+from benchmarks.hunt_programs import Cam, Harsh, Parametric, Zeros
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
@@ -171,8 +171,8 @@ def main() -> int:
 
 
 def program_of(seed: int) -> str:
-    """The program of a seed, of the three kinds in turn, the harsh one twice."""
-    return (Harsh, Zeros, Harsh, Cam)[seed % 4](seed).program()
+    """The program of a seed, of the four kinds in turn, the harsh one twice."""
+    return (Harsh, Zeros, Harsh, Cam, Parametric)[seed % 5](seed).program()
 
 
 if __name__ == "__main__":

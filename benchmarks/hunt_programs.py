@@ -347,3 +347,137 @@ class Zeros(Harsh):
         lines = ["G21 F100", self.one("", "G0 X1 Y2 Z3", "T1 M6\nG43 H1\nG0 Z9")]
         lines += [r.choice(few)() for _ in range(r.randint(3, 14))]
         return "\n".join([*lines, "G80", "G1 X50 Y50 Z50", "M2", ""])
+
+
+class Parametric(Harsh):
+    """Programs of LinuxCNC's language: variables, expressions, branches, loops and subprograms around plain moves."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        self.labels = 0
+        self.subs: list[str] = []
+
+    def label(self) -> str:
+        """A label that no other O word has."""
+        self.labels += 1
+        return f"{self.labels}" if self.often(0.7) else f"<part {self.labels}>"
+
+    def variable(self) -> str:
+        """A variable that has been set, or the control's."""
+        return self.one(
+            "#1", "#2", "#3", "#31", "#[2+1]", "##4", "#<a>", "#<_B>", "#< a >", "#5420", "#5421", "#5422", "#<_x>",
+            "#<_metric>", "#<_motion_mode>", "#5220", "#<_absolute>", "#7", "#4000",
+        )  # fmt: skip
+
+    def value(self, depth: int = 2) -> str:
+        """What may follow a letter."""
+        kind = self.random.random()
+        if kind < 0.3:
+            return self.one("1", "2", "0.5", "3.25", "-2", "7.", ".25", "+4", "-.5")
+        if kind < 0.5 or depth == 0:
+            return self.one("", "", "-") + self.variable()
+        return self.one("", "", "", "-") + f"[{self.expression(depth)}]"
+
+    def expression(self, depth: int) -> str:
+        """Inside of brackets."""
+        inner = depth - 1
+        kind = self.random.random()
+        if kind < 0.25:
+            function = self.one("ABS", "COS", "SIN", "FIX", "FUP", "ROUND", "TAN")
+            return f"{function}[{self.value(inner)}]"
+        if kind < 0.3:
+            return f"ATAN[{self.value(inner)}]/[{self.value(inner)}]"
+        if kind < 0.34:
+            return f"SQRT[ABS[{self.value(inner)}]]"
+        if kind < 0.36:
+            return self.one("EXISTS[#<a>]", "EXISTS[#<nothing>]", "EXP[1]", "LN[2]", "ACOS[0.5]", "ASIN[-.5]")
+        count = self.random.choice([1, 2, 2, 3, 4])
+        text = self.value(inner)
+        for _ in range(count - 1):
+            text += self.one(
+                *[
+                    " + ",
+                    "-",
+                    "*",
+                    " * ",
+                    "/",
+                    " MOD ",
+                    "**",
+                    " EQ ",
+                    " NE ",
+                    " GT ",
+                    "GE",
+                    " LT ",
+                    "LE",
+                    " AND ",
+                    " OR ",
+                ],
+                *[" XOR "],
+            ) + self.value(inner)
+        return text
+
+    def bounded(self) -> str:
+        """A number between -30 and 30."""
+        return f"[[{self.expression(2)}] MOD 30]" if self.often(0.7) else self.value(1)
+
+    def line(self) -> list[str]:
+        """A block or two."""
+        r = self.random
+        kind = r.random()
+        if kind < 0.3:
+            return [f"{self.one('#1', '#2', '#3', '#31', '#<a>', '#<_b>', '#[1+1]')}={self.bounded()}"]
+        if kind < 0.36:
+            return [f"#1={self.bounded()} #2=#1 {self.one('', 'X#1', 'G1 Y#2')}"]
+        if kind < 0.75:
+            words = " ".join(f"{axis}{self.bounded()}" for axis in r.sample("XYZ", r.randint(1, 3)))
+            return [f"{self.one('G1', 'G0', '', 'G[1]', 'G#6')} {words}"]
+        if kind < 0.8:
+            return [
+                self.one(
+                    "G91 G3 X[#2-#2+6] R[2+3] G90", "G90", "G17", "F[100+#6]", "G2 I[1+1] X#5420", "N10 (#1)", "G90"
+                )
+            ]
+        if kind < 0.86 and self.subs:
+            values = " ".join(f"[{self.expression(1)}]" for _ in range(r.randint(0, 3)))
+            return [f"o{r.choice(self.subs)} call {values}"]
+        return self.structure()
+
+    def structure(self) -> list[str]:
+        """A branch or a loop."""
+        label = self.label()
+        count = f"#{100 + self.labels}"
+        body = self.body(2)
+        kind = self.random.randrange(5)
+        out = self.one("", "", f"o{label} break", f"o{label} continue")
+        if kind == 0:
+            return [f"o{label} if [{self.expression(1)}]", *body, f"o{label} endif"]
+        if kind == 1:
+            return [
+                f"o{label} if [{self.expression(1)}]", *body, f"o{label} elseif [{self.expression(1)}]",
+                *self.body(1), f"O{label} else", *self.body(1), f"o{label} ENDIF",
+            ]  # fmt: skip
+        if kind == 2:
+            return [f"o{label} repeat [{self.random.randint(0, 3)}]", *body, out, f"o{label} endrepeat"]
+        more = f"{count} LT {self.random.randint(0, 3)}"
+        if kind == 3:
+            return [f"{count}=0", f"o{label} while [{more}]", f"{count}=[{count}+1]", *body, out, f"o{label} endwhile"]
+        return [f"{count}=0", f"o{label} do", f"{count}=[{count}+1]", *body, out, f"o{label} while [{more}]"]
+
+    def body(self, most: int) -> list[str]:
+        """Blocks within a structure."""
+        if self.labels > 8:
+            return ["X[#5420+1]"]
+        return [line for _ in range(self.random.randint(1, most)) for line in self.line()]
+
+    def program(self) -> str:
+        """Subprograms, then a main part."""
+        lines = ["G21 G90 F100", "#1=1 #2=2 #3=3 #4=2 #6=1 #31=5 #<a>=4 #<_b>=6", "G1 X1 Y2 Z3"]
+        for _ in range(self.random.randint(0, 2)):
+            label = self.label()
+            end = self.one("endsub", "endsub [#1+1]", "endsub [5]")
+            inside = ["#<a>=2 #4=1", *self.body(3), *([f"o{label} return [#2]"] if self.often(0.2) else [])]
+            lines += [f"o{label} sub", *inside, f"o{label} {end}"]
+            self.subs.append(label)
+        for _ in range(self.random.randint(3, 10)):
+            lines += [self.mangled(line) if self.often(0.1) else line for line in self.line()]
+        return "\n".join([*lines, "G1 X#1 Y#2 Z#3", "M2", ""])

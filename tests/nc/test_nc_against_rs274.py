@@ -270,9 +270,10 @@ def test_programs_of_others(tmp_path):
         own = tmp_path / f"home{index}"  # it keeps its parameters from run to run
         own.mkdir(exist_ok=True)
         canon = rs274.run(file, own, for_rs274)
-        if canon.error:  # it refuses user M codes above 199, which do not concern us
-            assert "M-code greater than 199" in canon.error, (file, canon.error)
+        said = [line for line in canon.error.splitlines() if not line.strip().startswith(("executing", "link"))]
+        if said:  # it refuses user M codes above 199, which do not concern us
+            assert any("M-code greater than 199" in line for line in said), (file, canon.error)
             continue
         assert_same_path(program, canon)
         same += 1
-    assert same >= 10
+    assert same >= 20

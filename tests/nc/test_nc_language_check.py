@@ -54,10 +54,10 @@ def test_figures_of_a_program_by_hand():
 
 
 def test_findings_go_on_after_an_error():
-    text = "G21 M8\nG0 X1 Y1 Z5\nG41 D1 X5\n#1=5\nG1 F100 X9\nG77\nG64 P0.1\nM150\nG1 X20\nM99\n"
+    text = "G21 M8\nG0 X1 Y1 Z5\nG41 D1 X5\n#1=\nG1 F100 X9\nG77\nG64 P0.1\nM150\nG1 X20\nM99\n"
     found = checked(text)
     errors = [(f.line, f.column) for f in found.findings if f.severity == "error"]
-    assert errors == [(3, 1), (4, 1), (6, 1)]
+    assert errors == [(3, 1), (4, 3), (6, 1)]
     assert "tool's radius" in found.findings[0].text and "--interpreter linuxcnc" in found.findings[0].text
     assert not found.complete and found.moves is not None and found.moves.end[-1, 0] == pytest.approx(0.02)
     assert any(f.line == 10 and "read once" in f.text for f in found.findings)

@@ -72,6 +72,7 @@ class Reading(TypedDict, total=False):
     interpreter: str
     rs274: str | None
     feed_mm_per_min: float | None
+    subprograms: str | Path | None
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,7 @@ class Program:
         interpreter: str = "builtin",
         rs274: str | None = None,
         feed_mm_per_min: float | None = None,
+        subprograms: str | Path | None = None,
     ) -> Program:
         """A program in a file.
 
@@ -134,6 +136,8 @@ class Program:
             LinuxCNC's interpreter, if it is not on PATH.
         feed_mm_per_min
             Feed of cuts before the program's first F (a cutter-location file's first FEDRAT), mm/min.
+        subprograms
+            Folder of the files that the program calls (`o<name> call`, `M98 P1234`); without it none is opened.
 
         Raises
         ------
@@ -144,7 +148,9 @@ class Program:
 
         if not Path(file).is_file():
             read_lines(file)  # says what is wrong with it
-        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274, feed_mm_per_min)
+        said = _said(
+            dialect, controller, offsets, tools, block_delete, interpreter, rs274, feed_mm_per_min, subprograms
+        )
         return cls(Path(file).name, str(file), *_control(said, block_delete), said=said)
 
     @classmethod
@@ -223,6 +229,7 @@ def _said(
     interpreter: str = "builtin",
     rs274: str | None = None,
     feed_mm_per_min: float | None = None,
+    subprograms: str | Path | None = None,
 ) -> dict[str, Any]:
     """What was said of the reading, as options have it; None for what was not."""
     switches = block_delete if isinstance(block_delete, bool) else sorted(block_delete)
@@ -236,6 +243,7 @@ def _said(
         "interpreter": interpreter if interpreter != "builtin" else None,
         "rs274": rs274,
         "feed": None if feed_mm_per_min is None else positive("feed", feed_mm_per_min, "mm/min", FASTEST_MM_PER_MIN),
+        "subprograms": str(subprograms) if subprograms else None,
     }
 
 
@@ -252,6 +260,10 @@ def _control(said: Mapping[str, Any], block_delete: bool | Iterable[int]) -> tup
         found = replace(found, tools=read_tool_table(said["tools"]))
     if said["feed"]:
         found = replace(found, feed=said["feed"])
+    if said["subprograms"]:
+        if not Path(said["subprograms"]).is_dir():
+            raise InputError(f"{said['subprograms']!r} is no folder", expected="the folder of subprograms")
+        found = replace(found, subprograms=said["subprograms"])
     switches = block_delete if isinstance(block_delete, bool) else frozenset(block_delete)
     interpreter = said["interpreter"] or "builtin"
     return found, {"block_delete": switches, "interpreter": interpreter, "rs274": said["rs274"]}

@@ -156,7 +156,7 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
         "--interpreter",
         choices=("builtin", "linuxcnc", "auto"),
         default="builtin",
-        help="who reads the program: ours; LinuxCNC's rs274, which knows variables, O words and cutter compensation; "
+        help="who reads the program: ours; LinuxCNC's rs274, which knows cutter compensation; "
         "auto: the second where the first refuses (default: builtin)",
     )
     group.add_argument(
@@ -164,6 +164,11 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
         type=positive_number("mm/min", 1e6),
         metavar="MM_PER_MIN",
         help="feed of cuts before the program's first F (a cutter-location file's first FEDRAT)",
+    )
+    group.add_argument(
+        "--subprograms",
+        metavar="FOLDER",
+        help="folder of the files that programs call: name.ngc for o<name> call, O1234.nc for M98 and G65 P1234",
     )
     group.add_argument("--rs274", metavar="PATH", help="LinuxCNC's interpreter, if it is not on PATH")
 
@@ -251,6 +256,7 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
         "interpreter": args.interpreter,
         "rs274": args.rs274,
         "feed_mm_per_min": args.feed,
+        "subprograms": args.subprograms,
     }
 
 

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -122,8 +123,8 @@ class Checked:
 class _CheckingRun(ProgramRun):
     """A run that notes the codes of each block, and notes an error and goes on with the next block."""
 
-    def __init__(self, state: State, lines: tuple[str, ...], name: str, switches: frozenset[int]) -> None:
-        super().__init__(state, lines, name, switches)
+    def __init__(self, state: State, lines: tuple[str, ...], name: str, switches: frozenset[int], **more: Any) -> None:
+        super().__init__(state, lines, name, switches, **more)
         self.errors: list[InputError] = []
         self.first: dict[str, tuple[int, int]] = {}
         self.count: dict[str, int] = {}
@@ -134,6 +135,13 @@ class _CheckingRun(ProgramRun):
         except InputError as error:
             self._add(error)
             return Block(at + 1, ())
+
+    def _steered(self, at: int) -> int | None:
+        try:
+            return super()._steered(at)
+        except InputError as error:
+            self._add(error)
+            return at + 1
 
     def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
         codes = [row[G_COLUMN] for row in rows]
@@ -194,11 +202,13 @@ def check_lines(
         frames = Frames(copy.deepcopy(controller.offsets or Offsets()), place, default)
     else:  # first in the coordinates of the machine that the program was posted for
         frames = Frames(copy.deepcopy(controller.offsets or Offsets()), None, ZERO, posted=posted)
-    state = State(name, frames, copy.deepcopy(controller.tools), controller.dialect)
-    state.feed = controller.feed
-    run = _CheckingRun(state, lines, name, switches_on(block_delete, controller))
-    start = modal_state(state)
-    errors, warnings = _run_to_the_end(run)
+    first = State(name, frames, copy.deepcopy(controller.tools), controller.dialect)
+    first.feed = controller.feed
+    start = modal_state(first)
+    run, errors, warnings = _checked_run(
+        first, lines, name, switches_on(block_delete, controller), controller.subprograms
+    )
+    state, frames = run.state, run.state.frames
     warnings, assumptions = [*warnings, *state.warnings], list(state.assumptions)
     moves = state.recorder.moves() if len(state.recorder) else None
     warnings += lathe_warning(state.turning, moves)
@@ -220,6 +230,33 @@ def check_lines(
         remarks={tool.number: tool.remark for tool in state.used_tools.values()},
         jumps=tuple(run.jumps) if posted is None else None,
     )
+
+
+def _checked_run(
+    state: State, lines: tuple[str, ...], name: str, switches: frozenset[int], subprograms: str | Path | None
+) -> tuple[_CheckingRun, list[InputError], list[str]]:
+    """The run, its errors and warnings; a program with variables is run again with their values, from the start."""
+    again = copy.deepcopy(state)
+    run = _CheckingRun(state, lines, name, switches)
+    errors, warnings = _run_to_the_end(run)
+    if errors:
+        from toolpath_stiff.nc.parametric.statements import uses_variables
+
+        if uses_variables(lines):
+            run = _parametric_run(again, lines, name, switches, subprograms)
+            errors, warnings = _run_to_the_end(run)
+    return run, errors, warnings
+
+
+def _parametric_run(
+    state: State, lines: tuple[str, ...], name: str, switches: frozenset[int], subprograms: str | Path | None
+) -> _CheckingRun:
+    from toolpath_stiff.nc.parametric.run import ParametricRun
+
+    class CheckingParametricRun(_CheckingRun, ParametricRun):
+        """Both: `super()` in the first is the second."""
+
+    return CheckingParametricRun(state, lines, name, switches, folder=subprograms)
 
 
 def _run_to_the_end(run: _CheckingRun) -> tuple[list[InputError], list[str]]:

@@ -169,6 +169,7 @@ KEYS = (
     "kinematics",
     "setup",
     "feed_mm_per_min",
+    "subprograms",
 )
 G70_UNITS, G20_UNITS = "G70 G71", "G20 G21"
 
@@ -191,6 +192,8 @@ class Controller:
         Name of the clamping arrangement; None where the file has none.
     feed
         Feed of cuts before the first F of a program, mm/min; None: such a cut is refused.
+    subprograms
+        Folder of the files that programs call (`o<name> call`, `M98 P1234`); None: they call none.
     """
 
     dialect: Dialect = GENERIC
@@ -200,6 +203,7 @@ class Controller:
     kinematics: PostedKinematics | None = None
     setup: str | None = None
     feed: float | None = None
+    subprograms: str | None = None
 
     @property
     def plain(self) -> bool:
@@ -285,6 +289,7 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
         read_kinematics(toml),
         _setup(toml),
         _feed(toml),
+        _subprograms(toml),
     )
 
 
@@ -317,6 +322,17 @@ def _feed(toml: TomlReader) -> float | None:
     if value <= 0.0:
         raise toml.error(f"feed_mm_per_min = {value:g}", "more than 0", where="feed_mm_per_min")
     return value
+
+
+def _subprograms(toml: TomlReader) -> str | None:
+    """The folder, as a path beside the controller file."""
+    value = toml.data.get("subprograms")
+    if value is None:
+        return None
+    folder = Path(toml.file).parent / value if is_text(value) else None
+    if folder is None or not folder.is_dir():
+        raise toml.error(f"subprograms = {value!r}", "a folder beside this file", where="subprograms")
+    return str(folder)
 
 
 def _switches(toml: TomlReader) -> frozenset[int]:

@@ -233,13 +233,18 @@ REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before t
 
 
 @dataclass
-class _Level:
+class Subprogram:
     """A subprogram that runs: its name, first line (from 0), where to go on, and how often it runs again."""
 
     name: str
     first: int
     back: int
     again: int
+
+
+def beyond_the_end(what: str, at: int, lines: int) -> str:
+    """The warning that lines follow what ends a program in line `at` (from 0)."""
+    return f"what follows {what} in line {at + 1} is not part of the program (lines: {lines})"
 
 
 class ProgramRun:
@@ -267,7 +272,7 @@ class ProgramRun:
 
             self._plain = PlainRun(state, lines, name)
         self.switches = switches
-        self._levels: list[_Level] = []
+        self._levels: list[Subprogram] = []
         self._programs: dict[int, int] | None = None
         self._sequence: dict[int, list[int]] | None = None
         self._called: dict[int, Block] = {}  # blocks of subprograms by line, from 0: each is read once
@@ -287,6 +292,10 @@ class ProgramRun:
                     percent = percent or any(any(row) for row in rows)
                     at += len(rows)
                     continue
+            steered = self._steered(at)
+            if steered is not None:
+                at = steered
+                continue
             block = self._block(at)
             if block.percent:
                 if percent:
@@ -316,6 +325,10 @@ class ProgramRun:
                         continue
             at += 1
         return self._end(len(self.lines) - 1, "the file")
+
+    def _steered(self, at: int) -> int | None:
+        """Where the run goes on, of a line that only says that; None: its words act."""
+        return None
 
     def _block(self, at: int) -> Block:
         if not self._levels:
@@ -368,7 +381,7 @@ class ProgramRun:
         ]
         if not rest:
             return []
-        return [f"what follows {what} in line {at + 1} is not part of the program (lines: {len(rest)})"]
+        return [beyond_the_end(what, at, len(rest))]
 
     # -- calls -----------------------------------------------------------------------------------------------------
 
@@ -388,7 +401,7 @@ class ProgramRun:
             raise self._fail(at, f"more than {DEEPEST} subprograms within each other", column=call.column)
         if not call.local and first == self._main + 1:
             raise self._fail(at, f"M98 calls {name}, the main program itself", column=call.column)
-        self._levels.append(_Level(name, first, at + 1, repeats - 1))
+        self._levels.append(Subprogram(name, first, at + 1, repeats - 1))
         return first
 
     def _jump(self, at: int, to: int) -> int:

@@ -193,6 +193,8 @@ class Program:
         lines; None: the comment lines of `source` mark them.
     jumps
         Where the run left the order of the lines, for a subprogram or back from it; None: not known.
+    parametric
+        Whether variables, expressions or loops made the moves.
 
     Examples
     --------
@@ -219,6 +221,7 @@ class Program:
     kinematics: str = ""
     marks: tuple[tuple[int, str], ...] | None = None
     jumps: tuple[Jump, ...] | None = None
+    parametric: bool = False
 
     def __repr__(self) -> str:
         return f"<Program {self.name}: {len(self.moves)} moves, read as {self.dialect}>"

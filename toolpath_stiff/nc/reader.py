@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -318,11 +319,26 @@ def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
 
 
 def _read_built_in(asked: _Request) -> Program:
+    try:
+        return _run_built_in(asked, ProgramRun)
+    except InputError:
+        from toolpath_stiff.nc.parametric.statements import uses_variables
+
+        if not uses_variables(asked.lines):
+            raise
+    from toolpath_stiff.nc.parametric.run import ParametricRun
+
+    return replace(_run_built_in(asked, partial(ParametricRun, folder=asked.controller.subprograms)), parametric=True)
+
+
+def _run_built_in(
+    asked: _Request, begin: Callable[[State, tuple[str, ...], str, frozenset[int]], ProgramRun]
+) -> Program:
     posted = asked.posted
     frames = Frames(copy.deepcopy(asked.offsets), *asked.zero, posted=posted)
     state = State(asked.name, frames, copy.deepcopy(asked.tools), asked.controller.dialect)
     state.feed = asked.controller.feed
-    run = ProgramRun(state, asked.lines, asked.name, asked.switches)
+    run = begin(state, asked.lines, asked.name, asked.switches)
     warnings = run.run()
     if not state.recorder.cuts:
         raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=asked.name)

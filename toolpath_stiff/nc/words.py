@@ -83,7 +83,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     >>> [(word.letter, word.value, word.column) for word in block.words]
     [('G', 1.0, 5), ('X', 1.5, 9), ('Y', -2.0, 29)]
     """
-    compact, columns = _strip(text, line, name, semicolon)
+    compact, columns = without_comments(text, line, name, semicolon)
     if not compact:
         return Block(line, ())
     if compact == "%":
@@ -99,7 +99,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     if slash > 0 and EXPRESSION.search(compact):  # a quotient
         slash = -1
     if slash >= 0:
-        behind, switch = _slash(compact, slash, columns, line, name)
+        behind, switch = block_delete(compact, slash, columns, line, name)
         start = 0 if slash else behind
     if compact.startswith(("O", ":"), start):  # `:` is O on ISO tape
         return _program_number(compact[start:], columns[start], line, name)
@@ -110,7 +110,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     return Block(line, _through_pygcode(words, line, name), optional=slash == 0, switch=switch, rest=rest)
 
 
-def _slash(compact: str, at: int, columns: Sequence[int], line: int, name: str) -> tuple[int, int]:
+def block_delete(compact: str, at: int, columns: Sequence[int], line: int, name: str) -> tuple[int, int]:
     """Where a block-delete slash and its number end, and which switch it names."""
     end = at + 1
     while end < len(compact) and "0" <= compact[end] <= "9":
@@ -149,7 +149,7 @@ def _program_number(compact: str, column: int, line: int, name: str) -> Block:
     )
 
 
-def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Sequence[int]]:
+def without_comments(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Sequence[int]]:
     """Upper-case text without comments and blanks, and the column of each of its characters."""
     if text.isascii() and not COMMENT.search(text):  # the bulk of a big program
         compact = "".join(text.split()).upper()
@@ -166,7 +166,7 @@ def _strip(text: str, line: int, name: str, semicolon: bool) -> tuple[str, Seque
         elif depth:
             depth -= character == ")"
         elif character == ";":
-            if not semicolon and _strip(text[column:].replace(";", " "), line, name, semicolon)[0]:
+            if not semicolon and without_comments(text[column:].replace(";", " "), line, name, semicolon)[0]:
                 raise ProgramError(
                     f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect",
                     expected="comments in parentheses, one block a line",

@@ -142,6 +142,12 @@ def check_rewritable(program: Program) -> None:
             hint="place it without --write, set the work so in the CAM system, and post it for this machine",
             file=program.name,
         )
+    if program.parametric:
+        raise ProgramError(
+            "a program with variables cannot be rewritten: its numbers are worked out as it runs",
+            hint="place it without --write, and set the work offset that is printed (G10)",
+            file=program.name,
+        )
     if program.dialect == CUTTER_LOCATION:
         raise ProgramError(
             "a cutter-location file is not rewritten: it is not a program that a control runs",
@@ -334,7 +340,7 @@ def _codes(text: str, number: int, program: Program) -> list[str]:
     try:
         words = read_block(text, number, program.name).words
     except InputError:
-        if program.interpreter == "builtin":
+        if program.interpreter == "builtin" and not program.parametric:
             raise
         return [code_name("G", float(digits)) for digits in re.findall(r"[Gg]\s*(\d+(?:\.\d)?)", text)]
     return [code_name(word.letter, word.value) for word in words]

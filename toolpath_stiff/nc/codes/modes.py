@@ -246,6 +246,13 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
     block.flow = Call(number, repeats, word.column, local=code == "M97")
 
 
+def macro_call(state: State, block: CurrentBlock, code: str) -> None:
+    """G65, G66, G67: `parametric.run` carries them out; what comes here is of a control that has none."""
+    raise block.fail(
+        block.codes[code], "is a macro call of Fanuc's and Haas' controls", hint="name the control with --dialect"
+    )
+
+
 def end_of_subprogram(state: State, block: CurrentBlock, code: str) -> None:
     """M99: back to the block after the call; with P, to the block of the caller with that N number."""
     number = block.whole("P", block.codes[code])
@@ -258,6 +265,7 @@ def end_of_program(state: State, block: CurrentBlock, code: str) -> None:
 
 
 _CALLS = "LinuxCNC, O Codes, Fanuc-Style Programs; Fanuc, operator's manuals, Subprogram (M98, M99)"
+_MACROS = "Fanuc, operator's manuals, Custom macro, Macro call (G65, G66, G67)"
 FLOW_CODES = (
     Code("M0", M_STOP, holds_anyway, "stop", m_codes("M0 M1")),
     Code("M1", M_STOP, holds_anyway, "optional stop", m_codes("M0 M1")),
@@ -269,5 +277,9 @@ FLOW_CODES = (
         controls=("haas",),
     ),
     Code("M98", M_SUBPROGRAM, call, "subprogram call", _CALLS),
+    *(
+        Code(code, ONCE, macro_call, meaning, _MACROS, controls=("generic", "fanuc", "haas"))
+        for code, meaning in (("G65", "macro call"), ("G66", "macro call after moves"), ("G67", "no such call"))
+    ),
     Code("M99", M_SUBPROGRAM, end_of_subprogram, "subprogram end", _CALLS),
 )  # fmt: skip

@@ -153,7 +153,6 @@ _OTHER_PLANE = ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, 
 _PROBING = ("probing", "leave probing out", g_codes("G38.2 - G38.5"))
 _CUTTER = ("cutter compensation", _CENTRE_PATH)
 _POCKET = ("a pocket cycle of one control", "post the program with arcs", f"{_HAAS}, G12 and G13")
-_MACRO = ("a macro call", "expand macros before analyzing", f"{_FANUC}, Custom macro (G65, G66)")
 _MOVES = "post the moves of the cycle"
 _SAVED = ("saved modal state", "post the program without M70 to M73")
 REFUSED_CODES = (
@@ -177,8 +176,6 @@ REFUSED_CODES = (
     Refused("G42.1", *_CUTTER, g_codes("G41.1 G42.1")),
     Refused("G43.2", "an added tool length", "put the whole length into the tool table", g_codes("G43.2")),
     Refused("G51", "scaling", "post the program at its size", f"{_FANUC}, Scaling (G50, G51)"),
-    Refused("G65", *_MACRO),
-    Refused("G66", *_MACRO),
     Refused(
         "G68.2", "a tilted work plane", "post X, Y, Z, A, B, C of the tool tip",
         f"{_FANUC}, Tilted working plane indexing (G68.2)",
@@ -222,7 +219,7 @@ CHANGES = {
     "G43.2": "the height of the tip",
     "G51": "the size of the path",
     "G68.2": "the whole path: it is turned in space",
-    "G65 G66 M97 M98": "the path by whatever is called",
+    "M97 M98": "the path by whatever is called",
     "G33 G33.1 G76": "the path by the thread's moves",
     "G87 G88 G12 G13 G70 G71 G72": "the path by the cycle's moves",
     "G38.2 G38.3 G38.4 G38.5": "where the tool stops, which only the machine knows",

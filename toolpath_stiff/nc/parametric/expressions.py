@@ -1,0 +1,419 @@
+"""Expressions of parametric programs: text to functions of the variables.
+
+Two families of controls have variables (`#`). RS274/NGC is LinuxCNC's (manual, "O Codes" and "G-Code Overview",
+"Expressions", "Binary Operators", "Functions"). Macro B is Fanuc's (operator's manuals, "Custom macro", "Arithmetic
+and logic operation") and Haas' (mill operator's manual, "Macros"). A program that shows no sign of either is read as
+far as both agree, and refused beyond.
+
+What differs: a power `**` and `EXISTS` are NGC's; in Macro B an assignment takes a whole expression without brackets,
+AND binds as `*` does, OR and XOR as `+`, and all three work on the bits of whole numbers, where NGC's are logical and
+bind last; FIX and FUP round towards and from zero in Macro B, down and up in NGC; NGC's MOD is never negative, and its
+EQ allows for 0.0001. A variable that nothing has set is 0 in NGC and empty in Macro B.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from toolpath_stiff.errors import InputError, ProgramError
+
+if TYPE_CHECKING:
+    from toolpath_stiff.nc.parametric.variables import Variables
+
+NGC, MACRO_B, EITHER = "RS274/NGC", "Macro B", "either family"
+Value = Callable[["Variables"], "float | None"]  # None: an empty variable of Macro B
+
+NUMBER = re.compile(r"\d+\.?\d*|\.\d+", re.ASCII)
+NAME = re.compile(r"<([^<>]*)>")
+FUNCTION = re.compile(r"ABS|ACOS|ASIN|ATAN|COS|EXISTS|EXP|FIX|FUP|LN|POW|ROUND|SIN|SQRT|TAN")
+SHORT = {"RND": "ROUND", "SQR": "SQRT"}  # Fanuc's short forms
+OPERATOR = re.compile(r"\*\*|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE|[*/+-]")
+COMPARISONS = ("EQ", "NE", "GT", "GE", "LT", "LE")
+LOGIC = ("AND", "OR", "XOR")
+# How tightly an operator binds. All are left-associative, `**` too (LinuxCNC: 2**3**2 is 64).
+_SHARED = {"*": 4, "/": 4, "MOD": 4, "+": 3, "-": 3, **dict.fromkeys(COMPARISONS, 2)}
+BINDS = {
+    NGC: {"**": 5, **_SHARED, **dict.fromkeys(LOGIC, 1)},
+    MACRO_B: {**_SHARED, "AND": 4, "OR": 3, "XOR": 3},
+    EITHER: _SHARED,
+}
+EQUAL = 1e-4  # NGC's EQ and NE: LinuxCNC's rs274 takes 5 and 5.00009 for equal, 5 and 5.0002 not
+DEEPEST = 50  # brackets within each other
+LARGEST_BITS = 2**31
+NO_TANGENT_DEGREES = 1e-9
+
+
+@dataclass
+class Scanner:
+    """A block without blanks and comments, in upper case, and how far it is read.
+
+    Attributes
+    ----------
+    text, columns
+        The block, and the column of each of its characters in the line.
+    line, name
+        Where it stands, for errors.
+    family
+        `NGC`, `MACRO_B` or `EITHER`.
+    of_word
+        Whether a word's value is read, not an assignment's or a condition's.
+    at
+        The next character.
+    depth
+        Brackets that are open.
+    """
+
+    text: str
+    columns: Sequence[int]
+    line: int
+    name: str
+    family: str
+    of_word: bool = False
+    at: int = 0
+    depth: int = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether all of it is read."""
+        return self.at >= len(self.text)
+
+    @property
+    def column(self) -> int:
+        """The column of the next character."""
+        return self.columns[min(self.at, len(self.columns) - 1)]
+
+    def next(self, what: str) -> bool:
+        """Whether `what` comes next; it is then read."""
+        if not self.text.startswith(what, self.at):
+            return False
+        self.at += len(what)
+        return True
+
+    def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+        """What matches next, then read; None if nothing does."""
+        found = pattern.match(self.text, self.at)
+        if found is not None:
+            self.at = found.end()
+        return found
+
+    def fail(self, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
+        """An error at a column, unless given that of the next character."""
+        return ProgramError(
+            found, expected=expected, hint=hint, file=self.name, line=self.line, column=column or self.column
+        )
+
+    def rest(self) -> str:
+        """The next few characters, for errors."""
+        return repr(self.text[self.at : self.at + 12])
+
+    # -- values ----------------------------------------------------------------------------------------------------
+
+    def value(self) -> Value:
+        """The value after a letter or an operator: a number, a variable, a function, an expression in brackets."""
+        negative = False
+        while not self.done and self.text[self.at] in "+-":
+            negative ^= self.text[self.at] == "-"
+            self.at += 1
+        value = self._unsigned()
+        return (lambda variables: -number(value(variables))) if negative else value
+
+    def _unsigned(self) -> Value:
+        literal = self.match(NUMBER)
+        if literal is not None:
+            constant = float(literal[0])
+            if not math.isfinite(constant):
+                raise self.fail(f"{literal[0][:20]!r} is not a finite number")
+            return lambda variables: constant
+        if self.next("#"):
+            return self.variable()
+        if not self.done and self.text[self.at] == "[":
+            return self.bracket()
+        name = self.match(FUNCTION)
+        if name is not None:
+            return self._function(name[0])
+        for short, long in SHORT.items():
+            if self.next(short):
+                return self._function(long)
+        raise self.fail(f"{self.rest()} is not a value" if not self.done else "the block ends here", "a value")
+
+    def bracket(self) -> Value:
+        """An expression in brackets."""
+        column = self.column
+        if not self.next("["):
+            raise self.fail(f"{self.rest()} is not a bracket" if not self.done else "the block ends here", "[")
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise self.fail(f"more than {DEEPEST} brackets within each other", column=column)
+        value = self.expression()
+        if not self.next("]"):
+            raise self.fail("a bracket that is not closed", "]", column=column)
+        self.depth -= 1
+        return value
+
+    def variable(self) -> Value:
+        """The variable after a `#`."""
+        column, line, name = self.column, self.line, self.name
+        place = self.place()
+        return lambda variables: variables.get(place(variables), line, column, name)
+
+    def place(self) -> Callable[[Variables], str | int]:
+        """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
+        column = self.column
+        named = self.match(NAME)
+        if named is not None:
+            if self.family == MACRO_B:
+                raise self.fail(
+                    f"#<{named[1]}> is a named variable, which Macro B does not have", "#1 to #999", column=column
+                )
+            word = named[1]
+            return lambda variables: word
+        inner: Value
+        if self.next("#"):
+            inner = self.variable()
+        elif not self.done and self.text[self.at] == "[":
+            inner = self.bracket()
+        else:
+            literal = self.match(NUMBER)
+            if literal is None:
+                raise self.fail(
+                    f"# before {self.rest()}" if not self.done else "# at the end", "the number of a variable"
+                )
+            constant = float(literal[0])
+            inner = lambda variables: constant  # noqa: E731
+
+        def numbered(variables: Variables) -> int:
+            found = number(inner(variables))
+            if abs(found - round(found)) > EQUAL:
+                raise self.fail(f"#{found:g}", "a whole number", column=column)
+            return round(found)
+
+        return numbered
+
+    def expression(self, tightest: int = 0) -> Value:
+        """Values and operators that bind tighter than `tightest`."""
+        left = self.value()
+        while True:
+            begin = self.at
+            column = self.column if not self.done else 0
+            found = self.match(OPERATOR)
+            if found is None:
+                return left
+            operator = found[0]
+            rank = BINDS[self.family].get(operator)
+            if rank is None:
+                if operator in LOGIC:
+                    raise self.fail(
+                        f"{operator} works on truth values on LinuxCNC and on bits on Fanuc's and Haas' controls",
+                        hint="name the control with --dialect",
+                        column=column,
+                    )
+                raise self.fail(f"{operator} is no operator of {self.family}", column=column)
+            if rank <= tightest:
+                self.at = begin
+                return left
+            left = self._operation(operator, left, self.expression(rank), column)
+
+    def _operation(self, operator: str, left: Value, right: Value, column: int) -> Value:
+        family = self.family
+        if operator in ("EQ", "NE"):
+            return lambda variables: equality(operator, left(variables), right(variables), family)
+        act = OPERATIONS[operator]
+
+        def operated(variables: Variables) -> float:
+            try:
+                return finite(act(number(left(variables)), number(right(variables)), family))
+            except (ArithmeticError, ValueError) as error:
+                raise self.fail(f"{operator} cannot be worked out: {error}", column=column) from None
+
+        return operated
+
+    def _function(self, name: str) -> Value:
+        column = self.column
+        if name == "EXISTS":
+            return self._exists()
+        if name == "ROUND" and self.of_word and self.family == MACRO_B:
+            raise self.fail(
+                "ROUND in a word, where it rounds to the least increment of the control", hint="round in an assignment"
+            )
+        if name in ("ATAN", "POW"):
+            return self._of_two(name, column)
+        argument, act, family = self.bracket(), FUNCTIONS[name], self.family
+
+        def applied(variables: Variables) -> float:
+            try:
+                return finite(act(number(argument(variables)), family))
+            except (ArithmeticError, ValueError) as error:
+                raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
+
+        return applied
+
+    def _of_two(self, name: str, column: int) -> Value:
+        """ATAN[y]/[x]; Macro B's ATAN[y,x] and POW[base,exponent] too."""
+        start = self.at
+        if not self.next("["):
+            raise self.fail(f"{name} without its bracket", "[", column=column)
+        first = self.expression()
+        if self.family != NGC and self.next(","):
+            second = self.expression()
+            if not self.next("]"):
+                raise self.fail("a bracket that is not closed", "]", column=self.columns[start])
+        elif name == "ATAN" and self.next("]") and self.next("/"):
+            second = self.bracket()
+        else:
+            raise self.fail(
+                f"{name} with one value", "ATAN[y]/[x]" if name == "ATAN" else "POW[base,exponent]", column=column
+            )
+        family = self.family
+
+        def applied(variables: Variables) -> float:
+            one, other = number(first(variables)), number(second(variables))
+            try:
+                return finite(one**other if name == "POW" else variables.angle(one, other))
+            except (ArithmeticError, ValueError, TypeError) as error:
+                raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
+
+        return applied if family != NGC or name == "ATAN" else self._refused(name, column)
+
+    def _refused(self, name: str, column: int) -> Value:
+        raise self.fail(f"{name} is no function of {self.family}", column=column)
+
+    def _exists(self) -> Value:
+        """EXISTS[#<name>]: 1 if the variable has been set."""
+        if self.family != NGC:
+            return self._refused("EXISTS", self.column)
+        if not self.next("[#"):
+            raise self.fail("EXISTS without a named variable", "EXISTS[#<name>]")
+        named = self.match(NAME)
+        if named is None or not self.next("]"):
+            raise self.fail("EXISTS without a named variable", "EXISTS[#<name>]")
+        return lambda variables: float(variables.exists(named[1]))
+
+
+def number(value: float | None) -> float:
+    """A value as operators take it: an empty variable counts as 0."""
+    return 0.0 if value is None else value
+
+
+def finite(value: float) -> float:
+    """The value. Raises `ValueError` unless it is a finite real number."""
+    if isinstance(value, complex) or not math.isfinite(value):
+        raise ValueError("the result is no finite number")
+    return float(value)
+
+
+def equality(operator: str, left: float | None, right: float | None, family: str) -> float:
+    """EQ and NE; empty is not 0 to Macro B ("Custom macro", "Handling of an empty variable")."""
+    same = abs(number(left) - number(right)) < EQUAL if family == NGC else left == right
+    return float(same == (operator == "EQ"))
+
+
+# -- what operators and functions do -----------------------------------------------------------------------------------
+
+
+def modulo(left: float, right: float, family: str) -> float:
+    """MOD; never negative in NGC."""
+    if right == 0.0:
+        raise ValueError("the divisor is 0")
+    if family != NGC and (left < 0.0 or right < 0.0):
+        raise ValueError("controls differ in the remainder of negative numbers")
+    rest = math.fmod(left, right)
+    return rest + abs(right) if rest < 0.0 else rest
+
+
+def divided(left: float, right: float, family: str) -> float:
+    """The quotient. Raises `ValueError` for a divisor of 0."""
+    if right == 0.0:
+        raise ValueError("the divisor is 0")
+    return left / right
+
+
+def logical(operator: str) -> Callable[[float, float, str], float]:
+    """AND, OR, XOR: of truth values in NGC, of bits in Macro B."""
+
+    def act(left: float, right: float, family: str) -> float:
+        if family == NGC:
+            one, other = left != 0.0, right != 0.0
+            return float((one and other) if operator == "AND" else (one or other) if operator == "OR" else one != other)
+        bits = [round(value) for value in (left, right)]
+        if any(bit != value or not 0 <= bit < LARGEST_BITS for bit, value in zip(bits, (left, right), strict=True)):
+            raise ValueError("its values are not whole numbers from 0")
+        return float(
+            bits[0] & bits[1] if operator == "AND" else bits[0] | bits[1] if operator == "OR" else bits[0] ^ bits[1]
+        )
+
+    return act
+
+
+OPERATIONS: dict[str, Callable[[float, float, str], float]] = {
+    "**": lambda left, right, family: left**right,
+    "*": lambda left, right, family: left * right,
+    "/": divided,
+    "+": lambda left, right, family: left + right,
+    "-": lambda left, right, family: left - right,
+    "MOD": modulo,
+    "GT": lambda left, right, family: float(left > right),
+    "GE": lambda left, right, family: float(left >= right),
+    "LT": lambda left, right, family: float(left < right),
+    "LE": lambda left, right, family: float(left <= right),
+    **{operator: logical(operator) for operator in LOGIC},
+}
+
+
+def rounded(value: float, family: str) -> float:
+    """ROUND: half away from zero."""
+    return math.copysign(math.floor(abs(value) + 0.5), value)
+
+
+def down(value: float, family: str) -> float:
+    """FIX: towards zero in Macro B, down in NGC."""
+    if family == EITHER and value < 0.0:
+        raise ValueError("controls differ in FIX of a negative number")
+    return float(math.floor(value) if family == NGC else math.trunc(value))
+
+
+def up(value: float, family: str) -> float:
+    """FUP: from zero in Macro B, up in NGC."""
+    if family == EITHER and value < 0.0:
+        raise ValueError("controls differ in FUP of a negative number")
+    return float(math.ceil(value) if family == NGC else math.copysign(math.ceil(abs(value)), value))
+
+
+def trimmed(function: Callable[[float], float], degrees: bool = False) -> Callable[[float, str], float]:
+    """A function of angles in degrees (or, `degrees`, to them), to 14 digits.
+
+    LinuxCNC works these out in long double: ASIN[0.5] is 30 there, exactly; MOD and FIX make something else of
+    30.000000000000004.
+    """
+
+    def act(value: float, family: str) -> float:
+        result = math.degrees(function(value)) if degrees else function(math.radians(value))
+        return float(f"{result:.14g}")
+
+    return act
+
+
+def tangent(value: float, family: str) -> float:
+    """TAN, refused where it is infinite and digits that no control shares decide."""
+    if abs(abs(math.fmod(value, 180.0)) - 90.0) < NO_TANGENT_DEGREES:
+        raise ValueError("the angle is 90 degrees")
+    return trimmed(math.tan)(value, family)
+
+
+FUNCTIONS: dict[str, Callable[[float, str], float]] = {
+    "ABS": lambda value, family: abs(value),
+    "ACOS": trimmed(math.acos, degrees=True),
+    "ASIN": trimmed(math.asin, degrees=True),
+    "COS": trimmed(math.cos),
+    "EXP": lambda value, family: math.exp(value),
+    "FIX": down,
+    "FUP": up,
+    "LN": lambda value, family: math.log(value),
+    "ROUND": rounded,
+    "SIN": trimmed(math.sin),
+    "SQRT": lambda value, family: math.sqrt(value),
+    "TAN": tangent,
+}

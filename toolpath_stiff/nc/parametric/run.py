@@ -1,0 +1,512 @@
+"""Runs a parametric program: works out the values of each block, and goes where O words, GOTO, WHILE and G65 lead.
+
+LinuxCNC's manual, "O Codes"; Fanuc's operator's manuals, "Custom macro" ("Macro call", "Branch and repetition"). Each
+block's words then act as those of any program (`interpreter.execute`). Bounded: the blocks that run, and calls within
+calls. Subprograms of other files are read from one folder that the caller names, and from nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes import code_name
+from toolpath_stiff.nc.interpreter import (
+    DEEPEST,
+    HEAD,
+    MOST_REPEATS,
+    SEQUENCE,
+    ProgramRun,
+    Subprogram,
+    beyond_the_end,
+    execute,
+)
+from toolpath_stiff.nc.parametric.expressions import EQUAL, NGC, number
+from toolpath_stiff.nc.parametric.statements import (
+    Assignment,
+    Statement,
+    Steering,
+    family_of,
+    plain_word,
+    read_statement,
+)
+from toolpath_stiff.nc.parametric.structure import Structure, arguments_of, loops_of, structure_of
+from toolpath_stiff.nc.parametric.variables import Level, Variables
+from toolpath_stiff.nc.state import Call, Flow, GoTo, State, Then
+from toolpath_stiff.nc.words import Block, Word, read_lines
+
+MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
+SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
+MACRO_CALLS = ("G65", "G66", "G67")
+
+
+@dataclass(frozen=True)
+class MacroCall(Call):
+    """G65, or a call by G66: P, L, and the local variables that it gives."""
+
+    arguments: dict[int, float | None] = field(default_factory=dict)
+    modal: bool = False
+
+
+@dataclass
+class MacroLevel(Subprogram):
+    """A subprogram with variables of its own; `arguments` begin each of its runs."""
+
+    arguments: dict[int, float | None] = field(default_factory=dict)
+    modal: bool = False
+    repeats: dict[int, int] = field(default_factory=dict)
+
+
+class ParametricRun(ProgramRun):
+    """A run of a program with variables; parameters as in `ProgramRun`.
+
+    Parameters
+    ----------
+    folder
+        Where files of subprograms are: `name.ngc` for `o<name> call`, `O1234.nc` or `1234.nc` for M98 and G65 P1234.
+        None: there are none.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        lines: tuple[str, ...],
+        name: str,
+        switches: frozenset[int],
+        folder: str | Path | None,
+    ) -> None:
+        super().__init__(state, lines, name, switches, fast=False)
+        self.family = family_of(lines, state.dialect, name)
+        self.variables = Variables(self.family, state)
+        self.folder = None if folder is None else Path(folder)
+        self._main_lines = len(lines)
+        self._files: list[tuple[int, int, str, int]] = []  # first line, line after the last, name, line of the call
+        self._statements: dict[int, Statement] = {}
+        self._structure: Structure | None = None
+        self._loops: dict[int, int] | None = None
+        self._counts: list[dict[int, int]] = [{}]  # repeats left, by line, of each call
+        self._steps = 0
+        self._modal: MacroCall | None = None
+        self._at = 0
+
+    # -- blocks ----------------------------------------------------------------------------------------------------
+
+    def run(self) -> list[str]:
+        """Run to the program's end; returns warnings. Raises `InputError` with the line, of a subprogram's file too."""
+        try:
+            return super().run()
+        except InputError as error:
+            raise self._placed(error) from None
+
+    def _placed(self, error: InputError) -> InputError:
+        """An error with its place in the file of a subprogram, if that is where it is."""
+        if error.line is not None and error.line > self._main_lines:
+            for first, stop, name, _ in self._files:
+                if first < error.line <= stop:
+                    error.file, error.line = name, error.line - first
+        return error
+
+    def _steered(self, at: int) -> int | None:
+        """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
+        self._at = at
+        if any(at == first for first, *_ in self._files):  # the end of the file before it
+            return len(self.lines)
+        self._steps += 1
+        if self._steps > MOST_STEPS:
+            raise self._fail(at, f"more than {MOST_STEPS:,} blocks have run", "a loop that ends")
+        statement = self._statement(at)
+        self.variables.line = statement.line
+        if statement.optional and statement.switch in self.switches:
+            return at + 1
+        if statement.steering is None:
+            return None
+        to = self._steer(at, statement.steering)
+        if to is None:
+            return at + 1
+        return to if to == at + 1 else self._jump(at, to)
+
+    def _statement(self, at: int) -> Statement:
+        found = self._statements.get(at)
+        if found is None:
+            found = read_statement(self.lines[at], at + 1, self.name, self.family, self.state.dialect)
+            self._statements[at] = found
+        return found
+
+    def _block(self, at: int) -> Block:
+        return self._read(at)
+
+    def _read(self, at: int) -> Block:
+        """The block with its values; its variables are set."""
+        statement = self._statement(at)
+        words = []
+        for letter, value, column, written in statement.words:
+            computed = not isinstance(value, float)
+            worked = value(self.variables) if callable(value) else value
+            if worked is None:  # an empty variable: the word is as if it were not there (Macro B)
+                continue
+            if computed and letter in "GM":
+                worked = self._code(letter, worked, at, column, written)
+            words.append(plain_word(letter, worked, column, written, computed))
+        self._assign(statement.assignments, at)
+        line = statement.line if at < self._main_lines else self._line_of_call()
+        return Block(line, tuple(words), statement.optional, statement.percent, statement.switch)
+
+    def _code(self, letter: str, value: float, at: int, column: int, written: str) -> float:
+        code = round(value, 1)
+        if abs(code - value) > EQUAL or code < 0.0:
+            raise self._fail(
+                at, f"{written} is {letter}{value:g}", f"a code such as {letter}1 or {letter}59.3", column=column
+            )
+        return code
+
+    def _assign(self, assignments: tuple[Assignment, ...], at: int) -> None:
+        """Set variables, once all values are known (LinuxCNC, "Numbered Parameters")."""
+        known = [(a.place(self.variables), a.value(self.variables), a.column) for a in assignments]
+        for place, value, column in known:
+            self.variables.set(place, value, at + 1, column, self.name)
+
+    def _line_of_call(self) -> int:
+        """The line of the main file from which a subprogram's file is called: its moves are of that line."""
+        return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
+
+    def _jump(self, at: int, to: int) -> int:
+        return super()._jump(at, to) if max(at, to) < self._main_lines else to
+
+    def _execute(self, block: Block) -> Then:
+        try:
+            return self._act(block)
+        except InputError as error:
+            if self._at >= self._main_lines:
+                error.line = self._at + 1
+            raise
+
+    def _act(self, block: Block) -> Then:
+        call, block = self._macro_call(block)
+        if call is not None and not call.modal:
+            return call
+        moves = len(self.state.recorder)
+        flow = execute(self.state, block) if block.words else Flow.NEXT
+        modal = self._modal
+        if flow is Flow.NEXT and modal is not None and len(self.state.recorder) > moves and not self._in_modal():
+            return modal
+        return flow
+
+    # -- macro calls of Macro B ------------------------------------------------------------------------------------
+
+    def _macro_call(self, block: Block) -> tuple[MacroCall | None, Block]:
+        """G65, G66 or G67 of a block, carried out but for G65's call; and the block without it."""
+        calls = [
+            (at, word)
+            for at, word in enumerate(block.words)
+            if word.letter == "G" and code_name("G", word.value) in MACRO_CALLS
+        ]
+        if not calls or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
+            return None, block
+        place, word = calls[0]
+        code, before, after = code_name("G", word.value), block.words[:place], block.words[place + 1 :]
+        if before:
+            execute(self.state, replace(block, words=before))
+        if code == "G67":
+            self._modal = None
+            return None, replace(block, words=after)
+        given = {w.letter: w for w in after if w.letter in "PL"}
+        if "P" not in given:
+            raise self._fail(block.line - 1, f"{code} without P", "P with the number of the macro", column=word.column)
+        number_of, repeats = (self._count(given[k], block.line) if k in given else 1 for k in "PL")
+        call = MacroCall(
+            number_of,
+            repeats,
+            word.column,
+            arguments=arguments_of(after, self.state.dialect.increments, self._word_fault(block.line)),
+            modal=code == "G66",
+        )
+        if call.modal:
+            self._modal = call
+        return call, replace(block, words=())
+
+    def _count(self, word: Word, line: int) -> int:
+        if word.value != round(word.value) or not 1 <= word.value <= 99_999_999:
+            raise self._fail(line - 1, f"{word.text} is not a count", "a whole number from 1", column=word.column)
+        return int(word.value)
+
+    def _word_fault(self, line: int) -> Callable[[Word, str, str], InputError]:
+        return lambda word, found, expected: self._fail(line - 1, f"{word.text} {found}", expected, column=word.column)
+
+    def _in_modal(self) -> bool:
+        return any(isinstance(level, MacroLevel) and level.modal for level in self._levels)
+
+    # -- calls -----------------------------------------------------------------------------------------------------
+
+    def _enter(self, at: int, call: Call) -> int:
+        if call.local:
+            self._counts.append({})
+            return super()._enter(at, call)
+        known, repeats = self._target(at, call)
+        heads = self._heads()
+        if isinstance(call, MacroCall):
+            known, repeats = call.number, call.repeats or 1
+        if known not in heads:
+            raise self._fail(at, f"the file has no program O{known}", column=call.column)
+        if not 1 <= repeats <= MOST_REPEATS:
+            raise self._fail(at, f"a call with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
+        if isinstance(call, MacroCall):
+            level: Subprogram = MacroLevel(
+                f"O{known}", heads[known] + 1, at + 1, repeats - 1, arguments=call.arguments, modal=call.modal
+            )
+            self._push(Level(dict(call.arguments)))
+        else:
+            level = Subprogram(f"O{known}", heads[known] + 1, at + 1, repeats - 1)
+            self._counts.append({})
+        return self._call(level, at, call.column)
+
+    def _call(self, level: Subprogram, at: int, column: int) -> int:
+        if len(self._levels) == DEEPEST:
+            raise self._fail(at, f"more than {DEEPEST} subprograms within each other", column=column)
+        self._levels.append(level)
+        return level.first
+
+    def _push(self, level: Level) -> None:
+        self.variables.levels.append(level)
+        self._counts.append({})
+
+    def _leave(self) -> int:
+        level = self._levels[-1]
+        back = super()._leave()
+        left = not self._levels or self._levels[-1] is not level
+        if isinstance(level, MacroLevel):
+            self.variables.levels.pop()
+            if not left:
+                self.variables.levels.append(Level(dict(level.arguments)))
+        if not left:
+            self._counts[-1] = {}
+            return back
+        self._counts.pop()
+        return back
+
+    def _return(self, at: int, flow: Flow | GoTo) -> int | None:
+        """M99; with P it goes on at that block of the caller, wherever that is."""
+        if not isinstance(flow, GoTo) or not self._levels:
+            return super()._return(at, flow)
+        self._levels[-1].again = 0
+        return self._numbered(self._leave() - 1, flow.number, flow.column)
+
+    def _target(self, at: int, call: Call) -> tuple[int, int]:
+        heads = self._heads()
+        if call.number not in heads and self.folder is not None and call.number < 10_000:
+            self._load(at, (f"O{call.number:04d}", f"O{call.number}", f"{call.number}", f"{call.number:04d}"))
+        if isinstance(call, MacroCall):
+            return call.number, call.repeats or 1
+        return super()._target(at, call)
+
+    def _load(self, at: int, names: tuple[str, ...]) -> bool:
+        """Read a subprogram's file from the folder, if it is there; its lines follow those that are read."""
+        assert self.folder is not None
+        for name in names:
+            for suffix in SUFFIXES:
+                file = self.folder / (name + suffix)
+                if file.is_file():
+                    first = len(self.lines)
+                    self.lines = (*self.lines, *read_lines(file))
+                    self._files.append((first, len(self.lines), file.name, at + 1))
+                    self._programs = self._structure = self._loops = self._sequence = None
+                    return True
+        return False
+
+    # -- steering --------------------------------------------------------------------------------------------------
+
+    def _steer(self, at: int, steering: Steering) -> int | None:
+        """The line (from 0) at which the run goes on; None: the next one."""
+        if self.family == NGC and at in self._ngc().faults:
+            raise self._ngc().faults[at]
+        act = NGC_STEPS[steering.kind] if self.family == NGC else MACRO_STEPS[steering.kind]
+        return act(self, at, steering)
+
+    def _true(self, steering: Steering) -> bool:
+        return number(steering.values[0](self.variables)) != 0.0
+
+    def _if(self, at: int, steering: Steering) -> int | None:
+        if self._true(steering):
+            return None
+        for branch in self._ngc().branches[at]:
+            other = self._statement(branch).steering
+            assert other is not None
+            if other.kind != "ELSEIF" or self._true(other):
+                return branch + 1
+        raise AssertionError("every if has its endif")
+
+    def _else(self, at: int, steering: Steering) -> int | None:
+        """Reached from the branch before: the rest is passed over."""
+        return self._ngc().branches[self._ngc().branch_of[at]][-1] + 1
+
+    def _while(self, at: int, steering: Steering) -> int | None:
+        structure = self._ngc()
+        if at in structure.start:  # the end of a do
+            return structure.start[at] + 1 if self._true(steering) else None
+        return None if self._true(steering) else structure.end[at] + 1
+
+    def _end_while(self, at: int, steering: Steering) -> int | None:
+        return self._ngc().start[at]
+
+    def _repeat(self, at: int, steering: Steering) -> int | None:
+        count = number(steering.values[0](self.variables))
+        if abs(count - round(count)) > EQUAL:
+            raise self._fail(at, f"repeat [{count:g}]", "a whole number", column=steering.column)
+        if round(count) <= 0:
+            return self._ngc().end[at] + 1
+        self._counts[-1][at] = round(count)
+        return None
+
+    def _end_repeat(self, at: int, steering: Steering) -> int | None:
+        start = self._ngc().start[at]
+        self._counts[-1][start] = self._counts[-1].get(start, 1) - 1
+        return start + 1 if self._counts[-1][start] > 0 else None
+
+    def _break(self, at: int, steering: Steering) -> int | None:
+        structure = self._ngc()
+        return structure.end[structure.inside[at]] + 1
+
+    def _continue(self, at: int, steering: Steering) -> int | None:
+        structure = self._ngc()
+        start = structure.inside[at]
+        opener = self._statement(start).steering
+        assert opener is not None
+        return start if opener.kind == "WHILE" else structure.end[start]
+
+    def _do_nothing(self, at: int, steering: Steering) -> int | None:
+        return None
+
+    def _sub(self, at: int, steering: Steering) -> int | None:
+        return self._ngc().end[at] + 1
+
+    def _return_sub(self, at: int, steering: Steering) -> int | None:
+        if not self._levels:
+            raise self._fail(at, f"{steering.kind.lower()} outside any subprogram", column=steering.column)
+        value = number(steering.values[0](self.variables)) if steering.values else None
+        self.variables.named["_VALUE_RETURNED"] = float(value is not None)
+        if value is not None:
+            self.variables.named["_VALUE"] = value
+        return self._leave()
+
+    def _call_sub(self, at: int, steering: Steering) -> int | None:
+        label = steering.label.known(self.variables)
+        structure = self._ngc()
+        if label not in structure.subs and self.folder is not None:
+            name = label.strip("<>")
+            if Path(name).name != name:
+                raise self._fail(at, f"o{label.lower()} is not the name of a file", column=steering.column)
+            self._load(at, (name.lower(), name, *(() if label.startswith("<") else (f"o{name}",))))
+            structure = self._ngc()
+        if label not in structure.subs:
+            where = "" if self.folder is None else f", and {str(self.folder)!r} has no file of it"
+            raise self._fail(
+                at,
+                f"o{label.lower()} call: the program has no such sub{where}",
+                hint="" if self.folder else "name the folder of its subprograms with --subprograms FOLDER",
+                column=steering.column,
+            )
+        first = structure.subs[label] + 1
+        values = {place: number(value(self.variables)) for place, value in enumerate(steering.values, 1)}
+        to = self._call(MacroLevel(f"o{label.lower()}", first, at + 1, 0), at, steering.column)
+        self._push(Level(dict(values)))
+        return to
+
+    def _goto(self, at: int, steering: Steering) -> int | None:
+        return self._numbered(at, number(steering.values[-1](self.variables)), steering.column)
+
+    def _if_goto(self, at: int, steering: Steering) -> int | None:
+        return self._goto(at, steering) if self._true(steering) else None
+
+    def _then(self, at: int, steering: Steering) -> int | None:
+        if self._true(steering):
+            self._assign(steering.then, at)
+        return None
+
+    def _while_do(self, at: int, steering: Steering) -> int | None:
+        return None if self._true(steering) else self._macro_loops()[at] + 1
+
+    def _do(self, at: int, steering: Steering) -> int | None:
+        self._macro_loops()
+        return None
+
+    def _end_do(self, at: int, steering: Steering) -> int | None:
+        loops = self._macro_loops()
+        if at not in loops:
+            raise self._fail(at, f"END{steering.label.text} without DO{steering.label.text}", column=steering.column)
+        return loops[at]
+
+    def _numbered(self, at: int, target: float, column: int) -> int:
+        """The block with an N number in the program that runs. Raises `InputError` unless there is one."""
+        first, stop = self._program_of(at)
+        found = [
+            index
+            for index in range(first, stop)
+            if (match := SEQUENCE.match(self.lines[index])) and int(match[1][:9]) == target
+        ]
+        if len(found) != 1:
+            places = ", ".join(str(index + 1) for index in found)
+            raise self._fail(
+                at,
+                f"the run goes on at N{target:g}, which " + (f"is in the lines {places}" if found else "no block has"),
+                "one block with that N number in the program",
+                column=column,
+            )
+        return found[0]
+
+    def _program_of(self, at: int) -> tuple[int, int]:
+        """First line and line after the last of the program (O number to O number) that holds a line."""
+        heads = [index for index, line in enumerate(self.lines) if HEAD.match(line)]
+        bounds = [0, *heads, *(first for first, *_ in self._files), len(self.lines)]
+        return max(b for b in bounds if b <= at), min(b for b in bounds if b > at)
+
+    def _macro_loops(self) -> dict[int, int]:
+        if self._loops is None:
+            self._loops = loops_of(self._steerings(), self._fail)
+        return self._loops
+
+    def _steerings(self) -> list[tuple[int, Steering]]:
+        """The lines that steer; one that cannot be read is an error where it runs, if it does."""
+        found = []
+        for at in range(len(self.lines)):
+            try:
+                steering = self._statement(at).steering
+            except InputError:
+                continue
+            if steering is not None:
+                found.append((at, steering))
+        return found
+
+    def _ngc(self) -> Structure:
+        if self._structure is None:
+            self._structure = structure_of(self._steerings(), {first for first, *_ in self._files}, self._fail)
+        return self._structure
+
+    def _end(self, at: int, what: str, ended: bool = False) -> list[str]:
+        if self._levels and not ended:
+            raise self._unended(self._at)
+        if at >= self._main_lines:
+            return []
+        subs = self._ngc() if self.family == NGC else Structure()
+        ends = [(start, subs.end[start]) for start in subs.subs.values() if start in subs.end]
+        heads = [index for index in range(at + 1, self._main_lines) if HEAD.match(self.lines[index])]
+        rest = [
+            index
+            for index in range(at + 1, min([*heads, self._main_lines]))
+            if self.lines[index].strip() not in ("", "%") and not any(a <= index <= b for a, b in ends)
+        ]
+        return [beyond_the_end(what, at, len(rest))] if rest else []
+
+
+NGC_STEPS = {
+    "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else,
+    "ENDIF": ParametricRun._do_nothing,
+    "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._end_while, "DO": ParametricRun._do_nothing,
+    "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat, "BREAK": ParametricRun._break,
+    "CONTINUE": ParametricRun._continue, "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return_sub,
+    "RETURN": ParametricRun._return_sub, "CALL": ParametricRun._call_sub,
+}  # fmt: skip
+MACRO_STEPS = {
+    "IF": ParametricRun._if_goto, "THEN": ParametricRun._then, "GOTO": ParametricRun._goto,
+    "WHILE": ParametricRun._while_do, "DO": ParametricRun._do, "END": ParametricRun._end_do,
+}  # fmt: skip

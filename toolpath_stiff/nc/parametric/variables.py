@@ -1,0 +1,329 @@
+"""Variables of parametric programs: local, common and named ones, and what the control keeps in numbered ones.
+
+RS274/NGC: LinuxCNC's manual, "Parameters" ("Numbered Parameters", "Subroutine Parameters", "Named Parameters",
+"Predefined Named Parameters"). Macro B: Fanuc's operator's manuals, "Custom macro" ("Variables", "System variables");
+Haas, mill operator's manual, "Macros". Variables on which a path can depend are read: the position, the modal state,
+work offsets and tool lengths where they are in units that the program states. The others are refused by number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.nc.codes.motion import know_height
+from toolpath_stiff.nc.codes.points import know_place
+from toolpath_stiff.nc.parametric.expressions import EITHER, MACRO_B, NGC
+from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, ToolEntry
+from toolpath_stiff.nc.words import AXES, Block, Word
+
+# What a program may set: NGC's numbered parameters below those of the control; Macro B's locals and commons.
+LOCALS = {NGC: 30, MACRO_B: 33, EITHER: 30}
+NGC_LAST = 5000
+DEBUG_SWITCH = 5599  # whether (DEBUG,...) comments print
+COMMON = (range(100, 200), range(500, 1000))  # Fanuc's series 16 to 31i, Haas; the second survive power-off
+NGC_POSITION, NGC_TOOL, NGC_OFFSET = 5420, 5400, 5220
+MACRO_POSITIONS = (5001, 5041)  # block end; present position, with the tool length: the same without one
+TOOL_LENGTHS = range(2001, 2201)  # Fanuc's memory A and Haas: geometry of the length of H1 to H200
+LAST_WORK_OFFSET = 6  # G54 to G59 in Macro B's numbers, which are those of LinuxCNC's parameters
+MODAL = range(4001, 4121)
+
+
+@dataclass
+class Level:
+    """The variables of one call: numbered from 1, and named ones."""
+
+    numbered: dict[int, float | None] = field(default_factory=dict)
+    named: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Variables:
+    """All variables of a run.
+
+    Attributes
+    ----------
+    family
+        `expressions.NGC`, `MACRO_B`, or `EITHER` where the program shows no sign of one.
+    state
+        Of the control.
+    levels
+        Local variables, the running call's last.
+    common, named
+        Those of all calls.
+    line
+        Of the block that runs, for `#<_line>`.
+    """
+
+    family: str
+    state: State
+    levels: list[Level] = field(default_factory=lambda: [Level()])
+    common: dict[int, float | None] = field(default_factory=dict)
+    named: dict[str, float] = field(default_factory=dict)
+    line: int = 0
+
+    # -- reading ---------------------------------------------------------------------------------------------------
+
+    def get(self, place: str | int, line: int, column: int, name: str) -> float | None:
+        """The value of a variable; None: empty. Raises `InputError` for one that is not known."""
+        try:
+            return self._named(place) if isinstance(place, str) else self._numbered(place, line, column, name)
+        except LookupError as error:
+            found, hint = error.args
+            raise ProgramError(found, hint=hint, file=name, line=line, column=column) from None
+
+    def exists(self, name: str) -> bool:
+        """Whether a named variable has a value."""
+        try:
+            self._named(name)
+        except LookupError:
+            return False
+        return True
+
+    def _named(self, name: str) -> float:
+        own = self.named if name.startswith("_") else self.levels[-1].named
+        if name in own:
+            return own[name]
+        if name in PREDEFINED:
+            return PREDEFINED[name](self)
+        raise LookupError(
+            f"the variable #<{name.lower()}> is read before it is set", "set it before, in the same subprogram"
+        )
+
+    def _numbered(self, number: int, line: int, column: int, name: str) -> float | None:
+        if number == 0 and self.family != NGC:
+            return None
+        if 1 <= number <= LOCALS[self.family]:
+            found = self.levels[-1].numbered
+        elif self._settable(number):
+            found = self.common
+        elif self.family == EITHER:
+            raise LookupError(
+                f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls",
+                "name it with --dialect",
+            )
+        else:
+            system = self._ngc_system if self.family == NGC else self._macro_system
+            return system(number, Word("#", float(number), column, f"#{number}"), line, name)
+        if number in found:
+            return found[number]
+        return self._unset(number)
+
+    def _settable(self, number: int) -> bool:
+        """Whether a program may set a numbered variable beyond the local ones."""
+        macro = any(number in numbers for numbers in COMMON)
+        ngc = LOCALS[NGC] < number <= NGC_LAST or number == DEBUG_SWITCH
+        if self.family == EITHER:
+            return (ngc and macro) or number == DEBUG_SWITCH
+        return ngc if self.family == NGC else macro
+
+    def _unset(self, number: int) -> float | None:
+        """A variable that nothing has set: 0 in NGC, empty in Macro B, where those from #500 keep their values."""
+        if self.family == EITHER:
+            raise LookupError(
+                f"#{number} is read before it is set: it is 0 on LinuxCNC and empty on Fanuc's and Haas' controls",
+                "set it before, or name the control with --dialect",
+            )
+        if self.family == NGC:
+            if number > LOCALS[NGC]:
+                self.state.assume(f"#{number} is read before it is set: 0, as in an empty parameter file")
+            return 0.0
+        if number in COMMON[1]:
+            raise LookupError(
+                f"#{number} is read before it is set: the control keeps its value from earlier programs",
+                f"set it at the beginning of the program: #{number}=...",
+            )
+        return None
+
+    # -- writing ---------------------------------------------------------------------------------------------------
+
+    def set(self, place: str | int, value: float | None, line: int, column: int, name: str) -> None:
+        """Set a variable. Raises `InputError` for one that a program cannot set."""
+        if isinstance(place, str):
+            assert value is not None
+            if place in PREDEFINED:
+                raise self._refused(f"#<{place.lower()}> is the control's own", "another name", line, column, name)
+            (self.named if place.startswith("_") else self.levels[-1].named)[place] = value
+        elif 1 <= place <= LOCALS[self.family]:
+            self.levels[-1].numbered[place] = value
+        elif self._settable(place):
+            self.common[place] = value
+        elif self.family == MACRO_B and value is not None and self._set_macro_system(place, value, line, column, name):
+            pass
+        else:
+            known = f"#31 to #{NGC_LAST}" if self.family == NGC else "#1 to #33, #100 to #199, #500 to #999"
+            raise self._refused(f"#{place} cannot be set here", known, line, column, name)
+
+    def _refused(self, found: str, expected: str, line: int, column: int, name: str) -> InputError:
+        return ProgramError(found, expected=expected, file=name, line=line, column=column)
+
+    # -- what the control keeps ------------------------------------------------------------------------------------
+
+    def angle(self, y: float, x: float) -> float:
+        """ATAN[y]/[x], degrees: -180 to 180 on LinuxCNC, 0 to 360 on Fanuc's (parameter 6004, NAT = 0)."""
+        degrees = float(f"{math.degrees(math.atan2(y, x)):.14g}")  # as `expressions.trimmed`
+        if degrees >= 0.0 or self.family == NGC:
+            return degrees
+        if self.state.dialect.name == "fanuc":
+            self.state.assume("ATAN gives 0 to 360 degrees (parameter 6004, bit 0, is 0)")
+            return degrees + 360.0
+        raise ValueError("controls differ in angles below 0: name the control with --dialect")
+
+    def position(self, axis: int, word: Word, line: int, name: str) -> float:
+        """The present point in program coordinates and units; refused where controls may have another one."""
+        state, frames = self.state, self.state.frames
+        block = CurrentBlock(name, Block(line, (word,)))
+        if axis == 2:
+            know_height(state, block, word)
+        if axis < 2:
+            know_place(state, block, word)
+        if frames.from_machine[axis]:
+            raise block.fail(
+                word, "depends on where program zero sits on the machine", "a move to program coordinates before"
+            )
+        value = frames.to_program(frames.position)[axis]
+        return value / state.length_scale if axis < 3 else value
+
+    def _ngc_system(self, number: int, word: Word, line: int, name: str) -> float:
+        if NGC_POSITION <= number < NGC_POSITION + 6:
+            return self.position(number - NGC_POSITION, word, line, name)
+        if NGC_POSITION + 6 <= number < NGC_POSITION + 9:
+            return 0.0  # U, V, W, which this machine does not have
+        if number == NGC_TOOL:
+            return float(self.state.tool)
+        if number == NGC_OFFSET:
+            return float(self.state.frames.active + 1)
+        raise LookupError(
+            f"#{number} is a parameter of the control that is not read here: its unit or its value is the machine's",
+            "put the number into the program",
+        )
+
+    def _macro_system(self, number: int, word: Word, line: int, name: str) -> float:
+        state = self.state
+        for first in MACRO_POSITIONS:
+            axis = number - first
+            if 0 <= axis < 6:
+                if first != MACRO_POSITIONS[0] and axis == 2 and state.frames.tool:
+                    raise LookupError(
+                        f"#{number} under a tool length, where controls differ", f"#{MACRO_POSITIONS[0] + axis}"
+                    )
+                return self.position(axis, word, line, name)
+        if number in TOOL_LENGTHS:
+            tool = (state.tools or {}).get(number - TOOL_LENGTHS.start + 1)
+            if tool is None or math.isnan(tool.length):
+                raise LookupError(f"#{number} is the length of a tool that no table has", "give one with --tools FILE")
+            return tool.length / state.length_scale
+        offset = self._offset_place(number)
+        if offset is not None:
+            index, axis = offset
+            if not state.frames.offsets.table[index].given:
+                raise LookupError(f"#{number} is of a work offset that nothing sets", "give it with --offsets FILE")
+            value = state.frames.offsets.table[index].axes[axis]
+            return value / state.length_scale if axis < 3 else value
+        if number in MODAL:
+            return self._modal(number)
+        raise LookupError(f"the system variable #{number} is not read here", "put the number into the program")
+
+    def _offset_place(self, number: int) -> tuple[int, int] | None:
+        """The work offset (from 0) and axis of #5221 to #5326."""
+        index, axis = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)
+        return (index, axis) if 0 <= index < LAST_WORK_OFFSET and axis < len(AXES) else None
+
+    def _modal(self, number: int) -> float:
+        """#4001 to #4120: what was in force before this block, by Fanuc's groups of G codes; then by letters."""
+        state = self.state
+        cycle = state.motion is not None and state.motion not in ("G0", "G1", "G2", "G3")
+        found: dict[int, float | None] = {
+            1: None if cycle or state.motion is None else float(state.motion[1:]),
+            2: float(state.plane[1:]),
+            3: 90.0 if state.absolute else 91.0,
+            5: float(state.feed_mode[1:]),
+            6: 20.0 if state.inch else 21.0,
+            7: 40.0,
+            9: float((state.motion or "G80")[1:]) if cycle else 80.0,
+            10: float(state.retract[1:]) if state.retract else None,
+            14: 54.0 + state.frames.active if state.frames.active < LAST_WORK_OFFSET else None,
+            109: 0.0 if state.feed is None else state.feed / state.feed_scale,
+            119: state.speed,
+            120: float(state.selected),
+        }
+        value = found.get(number - 4000)
+        if value is None:
+            raise LookupError(f"the modal state #{number} is not known here", "put the number into the program")
+        return value
+
+    def _set_macro_system(self, number: int, value: float, line: int, column: int, name: str) -> bool:
+        """Set a system variable of Macro B; whether it is one."""
+        state = self.state
+        word = Word("#", float(number), column, f"#{number}")
+        if number == 3000:
+            raise self._refused(
+                f"the program stops with its alarm {value:g} (#3000)", "a program that runs through", line, column, name
+            )
+        if number in (3003, 3004, 3006):
+            state.note(line, word, "single block, feed hold or a message: the path does not depend on it")
+            return True
+        if number in TOOL_LENGTHS:
+            state.tools = {} if state.tools is None else state.tools
+            tool = number - TOOL_LENGTHS.start + 1
+            state.tools.setdefault(tool, ToolEntry(tool)).length = value * state.length_scale
+            return True
+        place = self._offset_place(number)
+        if place is None:
+            return False
+        index, axis = place
+        if index == state.frames.active:
+            raise self._refused(
+                f"#{number} changes the work offset in force",
+                f"G10 L2 P{index + 1}, whose effect is defined",
+                line,
+                column,
+                name,
+            )
+        offset = state.frames.offsets.table[index]
+        offset.axes[axis] = value * (state.length_scale if axis < 3 else 1.0)
+        offset.given = True
+        return True
+
+
+def _axis(axis: int) -> Callable[[Variables], float]:
+    letter = AXES[axis]
+    return lambda variables: variables.position(
+        axis, Word("#", 0.0, 1, f"#<_{letter.lower()}>"), variables.line, variables.state.name
+    )
+
+
+def _motion_mode(variables: Variables) -> float:
+    """LinuxCNC's G codes times ten; -10 without a motion mode."""
+    motion = variables.state.motion
+    return -10.0 if motion is None else round(10.0 * float(motion[1:]))
+
+
+def _plain(read: Callable[[State], float]) -> Callable[[Variables], float]:
+    return lambda variables: float(read(variables.state))
+
+
+# LinuxCNC's predefined named parameters that a path can depend on.
+PREDEFINED: dict[str, Callable[[Variables], float]] = {
+    **{f"_{letter}": _axis(axis) for axis, letter in enumerate(AXES)},
+    "_LINE": lambda variables: float(variables.line),
+    "_CALL_LEVEL": lambda variables: float(len(variables.levels) - 1),
+    "_REMAP_LEVEL": lambda variables: 0.0,
+    "_MOTION_MODE": _motion_mode,
+    "_PLANE": _plain(lambda state: 10.0 * float(state.plane[1:])),
+    "_METRIC": _plain(lambda state: not state.inch),
+    "_IMPERIAL": _plain(lambda state: state.inch),
+    "_ABSOLUTE": _plain(lambda state: state.absolute),
+    "_INCREMENTAL": _plain(lambda state: not state.absolute),
+    "_INVERSE_TIME": _plain(lambda state: state.feed_mode == "G93"),
+    "_UNITS_PER_MINUTE": _plain(lambda state: state.feed_mode == "G94"),
+    "_UNITS_PER_REV": _plain(lambda state: state.feed_mode == "G95"),
+    "_IJK_ABSOLUTE_MODE": _plain(lambda state: state.arc_absolute),
+    "_FEED": _plain(lambda state: (state.feed or 0.0) / state.feed_scale),
+    "_RPM": _plain(lambda state: state.speed),
+    "_CURRENT_TOOL": _plain(lambda state: state.tool),
+    "_SELECTED_TOOL": _plain(lambda state: state.selected),
+}
