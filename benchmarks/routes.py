@@ -105,7 +105,7 @@ def methods(tilted: bool) -> list[Method]:
         (
             "closed form (numpy), one direction and lengths",
             FAST_POSES,
-            lambda: closed_form.compliance_along(kernel, position, direction, rotation),
+            lambda: closed_form.compliance_along_columns(kernel, columns, loads, turned),
         ),
         ("compiled (numba), whole call", FAST_POSES, route("compiled")),
         ("compiled (numba), poses last", FAST_POSES, lambda: compiled.tip_compliance_columns(kernel, columns, turned)),

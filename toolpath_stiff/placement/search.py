@@ -119,7 +119,7 @@ class _Search:
         """Evaluators of a path."""
         self.path = path
         parts = {"whole": path, "middle": telling_path(path, POLISH_SAMPLES), "few": telling_path(path, SCOUT_SAMPLES)}
-        arguments = (self.load, self.force, self.asked.keepouts, len(path))
+        arguments = (self.load, self.force, self.asked.keepouts)
         before = self.poses
         self.evaluators = {name: Evaluator(self.model, part, *arguments) for name, part in parts.items()}
         self.evaluators["whole"].poses = before
