@@ -26,6 +26,8 @@ SMALLEST_GAIN = 1e-9  # of the mean stiffness
 WORTH_A_RESTART = 1e-5  # of the mean stiffness: with a region as wide as at first, which kinks may have closed early
 SIMPLEX = 0.01  # of each range, size of the first simplex
 SLACKEST = 1e3
+PERTURBATION, TOLERANCE = 1e-10, 1e-10  # of costs and of rows, both of the order of one
+MOST_PIVOTS = 500  # some thirty are usual
 
 
 @dataclass(frozen=True)
@@ -245,8 +247,6 @@ class Climber:
 
     def _step(self, here: FloatArray, rows: PlacedRows, gradient: PlacedRows, goal: Goal, region: float) -> FloatArray:
         """(free,) the linear programme's step within the region; variables step, L, H, t, slack."""
-        from scipy.optimize import linprog
-
         d = len(self.free)
         matrix, right = self._constraints(rows, gradient, goal, region)
         cost = np.zeros(d + 4)
@@ -265,9 +265,9 @@ class Climber:
             (-region, region) if self.bounds.round[i] else (max(-region, -below / s), min(region, above / s))
             for i, s, (below, above) in zip(self.free, span, room, strict=True)
         ]
-        limits = [*box, (None, None), (None, None), (None, None), (0.0, SLACKEST)]
-        found = linprog(cost, matrix, right, bounds=limits, method="highs")
-        return np.asarray(found.x[:d]) if found.x is not None else np.zeros(d)
+        low, high = np.array([*box, *[(-SLACKEST, SLACKEST)] * 3, (0.0, SLACKEST)]).T
+        found = least_cost(cost, matrix, right, low, high)
+        return np.zeros(d) if found is None else found[:d]
 
     def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray]:
         """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean."""
@@ -323,6 +323,38 @@ class Climber:
             if np.mean(~inside) >= 0.98 * self.rules.extrapolated:
                 kept.append((law[inside], gradient.law[:, cutting][:, inside], 0.0))
         return kept
+
+
+def least_cost(
+    cost: FloatArray, matrix: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray | None:
+    """The x (n,) of least `cost` . x with `matrix` x <= `right` (m rows) and `low` <= x <= `high`, all finite.
+
+    The dual simplex method in the form of a working set: n rows that hold as equations, at first the bounds that the
+    cost leans on; the row that is broken most comes in, the one whose multiplier reaches zero first goes out (Nocedal
+    and Wright, Numerical Optimization, 2006, chapter 13, problem 13.6; Lemke 1954). For some ten unknowns and a
+    thousand rows it takes a tenth of the time of a general solver, most of which sets up. None where nothing keeps all
+    rows, or no end is found.
+    """
+    n = len(cost)
+    leaning = cost + PERTURBATION * np.arange(1, n + 1)  # equal multipliers could go round in a circle
+    rows = np.concatenate([matrix, np.eye(n), -np.eye(n)])
+    bounds = np.concatenate([right, high, -low])
+    working = len(matrix) + np.where(leaning < 0.0, np.arange(n), np.arange(n, 2 * n))
+    for _ in range(MOST_PIVOTS):
+        inverse = np.linalg.inv(rows[working])
+        x = inverse @ bounds[working]
+        broken = rows @ x - bounds
+        worst = int(broken.argmax())
+        if broken[worst] <= TOLERANCE:
+            return np.asarray(x)
+        multipliers, share = -leaning @ inverse, rows[worst] @ inverse
+        ratio = np.where(share > TOLERANCE, np.maximum(multipliers, 0.0) / np.maximum(share, TOLERANCE), np.inf)
+        out = int(ratio.argmin())
+        if not np.isfinite(ratio[out]):
+            return None
+        working[out] = worst
+    return None
 
 
 def _block(slopes: FloatArray, rest: list[float]) -> FloatArray:
