@@ -93,6 +93,23 @@ class PlacedRows:
     margin: FloatArray
     clearance: FloatArray
 
+    def take(self, rows: int | slice) -> PlacedRows:
+        """Some of the placements; of a single one arrays with one row."""
+        some = slice(rows, rows + 1) if isinstance(rows, int) else rows
+        return PlacedRows(*(getattr(self, f.name)[some] for f in fields(self)))
+
+    def slopes(self, here: PlacedRows, steps: FloatArray) -> PlacedRows:
+        """Derivatives by differences: these less those of one placement, over the steps (k,) that lie between."""
+        with np.errstate(invalid="ignore"):
+            return PlacedRows(
+                *((getattr(self, f.name) - getattr(here, f.name)) / steps[:, None] for f in fields(PlacedRows))
+            )
+
+    def less(self, slopes: PlacedRows, step: FloatArray) -> PlacedRows:
+        """These less what derivatives (d rows) make of a step (d,)."""
+        with np.errstate(invalid="ignore"):
+            return PlacedRows(*(getattr(self, f.name) - step @ getattr(slopes, f.name) for f in fields(PlacedRows)))
+
 
 class Evaluator:
     """Evaluates placements of one path and counts the poses that this took."""
@@ -185,6 +202,16 @@ class Evaluator:
             clearance=rows.clearance.min(axis=1, initial=np.inf),
             extrapolated=outside,
         )
+
+    def deciding_rows(self, placement: FloatArray, stretches: int) -> IntArray:
+        """Rising samples that decide at a placement (6,): of each of so many stretches the extremes of what counts."""
+        path, placed = self.path, self.rows(placement[None])
+        head, cuts, everything = np.flatnonzero(path.headline), np.flatnonzero(path.cutting), np.arange(len(path))
+        counts = [(head, placed.stiffness), (head, -placed.stiffness), (everything, placed.margin), (cuts, placed.law)]
+        if self.keepouts:
+            counts.append((everything, placed.clearance))
+        parts = [(part, values[0]) for rows, values in counts for part in np.array_split(rows, stretches) if len(part)]
+        return np.unique([part[int(np.argmin(values[part]))] for part, values in parts])
 
     def _orientations(self, placements: FloatArray, turn: FloatArray) -> FloatArray | None:
         """(9, k, m + q) rows of R' = Q R Rz(-C), the rule of `path`; None: all vertical."""
