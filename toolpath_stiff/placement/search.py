@@ -33,6 +33,7 @@ WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last g
 # Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
 STARTS, FINALISTS = 5, 4
 CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 12, 10, 6
+APART = 0.1  # of each range, where they start
 BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
 FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
 SHORT = 3000  # samples of a path that is climbed on as a whole; of a longer one, on what stands for it
@@ -191,7 +192,7 @@ def search_placements(
     report(1, 4)
     candidates = _evolved(search, scouts, rng)
     report(2, 4)
-    ends = _climbed(search, candidates, now)
+    ends = _climbed(search, np.vstack([candidates, scouts]), now)
     report(3, 4)
     candidates = np.vstack(
         [_for_the_front(search, candidates), ends] + ([present[None]] if present is not None and held else [])
@@ -327,39 +328,43 @@ def _survivors(
 def _climbed(search: _Search, candidates: FloatArray, now: PlacementFigures | None) -> FloatArray:
     """The recommendation and the ends of the front, climbed to from several of the candidates."""
     asked = defaults.OBJECTIVES[search.asked.objective]
+    figures = search.evaluators["few"].figures(candidates)
     ends = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
     if now is not None and now.margin[0] >= 0.0:
         goal = Goal(asked, now.objectives[0])
-        found = _climbed_to(search, candidates, goal)
+        found = _climbed_to(search, candidates, figures, goal)
         if goal.worsening(search.evaluators["whole"].figures(found)).min() > 0.0:
-            found = np.vstack([found, _climbed_to(search, candidates, Goal(None, goal.floors))])
+            found = np.vstack([found, _climbed_to(search, candidates, figures, Goal(None, goal.floors))])
     else:
-        found = _climbed_to(search, candidates, Goal(asked, NO_FLOORS))
-    return np.vstack([found, *(_climbed_to(search, candidates, goal, end=True) for goal in ends)])
+        found = _climbed_to(search, candidates, figures, Goal(asked, NO_FLOORS))
+    return np.vstack([found, *(_climbed_to(search, candidates, figures, goal, end=True) for goal in ends)])
 
 
-def _climbed_to(search: _Search, candidates: FloatArray, goal: Goal, end: bool = False) -> FloatArray:
+def _climbed_to(
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, goal: Goal, end: bool = False
+) -> FloatArray:
     """Where climbs from the best candidates end: many on few samples, few on more, one on the whole path.
 
-    There are several hills, and a slope that few samples show is not always the whole path's. An `end` of the front is
-    worth fewer climbs than the recommendation.
+    `figures` are those of the candidates on few samples. There are several hills, and a slope that few samples show is
+    not always the whole path's. An `end` of the front is worth fewer climbs than the recommendation.
     """
     few, middle, whole = (search.climber(name) for name in ("few", "middle", "whole"))
     free = len(search.bounds.free)
-    starts, finalists = (free, 2) if end else (STARTS * free, FINALISTS)
-    first = _best_apart(search, few, candidates, goal, starts, 0.1)
+    starts, finalists = (2 * free, 3) if end else (STARTS * free, FINALISTS)
+    first = _best_apart(search, candidates, figures, goal, starts, APART)
     found = few.climb(first, goal, CLIMB_STEPS)
-    first = _best_apart(search, middle, np.vstack([first, found]), goal, finalists, BASIN)
+    found = np.vstack([first, found])
+    first = _best_apart(search, found, middle.evaluator.figures(found), goal, finalists, BASIN)
     found = middle.climb(first, goal, POLISH_STEPS)
     best = found[_ranked(search, goal, whole.evaluator.figures(found))[0]]
     return np.vstack([found, _finished(search, best, goal)])
 
 
 def _best_apart(
-    search: _Search, climber: Climber, placements: FloatArray, goal: Goal, count: int, distance: float
+    search: _Search, placements: FloatArray, figures: PlacementFigures, goal: Goal, count: int, distance: float
 ) -> FloatArray:
-    """The best of some placements for a goal that are not beside each other, on a climber's samples."""
-    ranked = placements[_ranked(search, goal, climber.evaluator.figures(placements))]
+    """The best of some placements for a goal that are not beside each other."""
+    ranked = placements[_ranked(search, goal, figures)]
     return ranked[apart(search.bounds, ranked, count, distance)]
 
 
