@@ -13,6 +13,7 @@ A front holds what nothing beats in mean, range and weakest place.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -43,12 +44,12 @@ class Bounds:
     high: FloatArray
     heights: tuple[float, ...] = ()
 
-    @property
+    @cached_property
     def free(self) -> IntArray:
         """Columns of a placement that vary."""
         return np.flatnonzero(self.high > self.low)
 
-    @property
+    @cached_property
     def round(self) -> BoolArray:
         """(6,) turns that go all the way round, and so have no end."""
         angle = np.arange(6) == 5
@@ -180,7 +181,7 @@ class Climber:
     bounds: Bounds
     rules: Rules
 
-    @property
+    @cached_property
     def free(self) -> IntArray:
         """Columns that a climb may vary: a height from a list stays."""
         free = self.bounds.free
@@ -272,10 +273,11 @@ class Climber:
         here, region, gradient = climb.here, climb.region, climb.gradient
         assert gradient is not None
         d = len(self.free)
-        matrix, right = self._constraints(rows, gradient, goal, region)
+        k, g, scale = self._stiffness(rows, gradient)
+        matrix, right = self._constraints(rows, gradient, k, g, scale, goal, region)
         cost = np.zeros(d + 4)
         weight = self.evaluator.path.weight[self.evaluator.path.headline]
-        slope = self._stiffness(rows, gradient)[1] @ weight / weight.sum()
+        slope = g @ weight / weight.sum()
         if goal.weights is None:
             cost[d + 2] = -1.0
         else:
@@ -293,21 +295,27 @@ class Climber:
         found = least_cost(cost, matrix, right, low, high)
         return np.zeros(d) if found is None else found[:d]
 
-    def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray]:
-        """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean."""
+    def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray, float]:
+        """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean, N/m."""
         head = self.evaluator.path.headline
         values = rows.stiffness[0, head]
         scale = float(np.mean(values))
         if not np.isfinite(scale):  # a cut out of reach: no figures, the limits alone guide
-            return np.ones(len(values)), np.zeros((len(self.free), len(values)))
-        return values / scale, np.nan_to_num(gradient.stiffness[:, head] / scale)
+            return np.ones(len(values)), np.zeros((len(self.free), len(values))), scale
+        return values / scale, np.nan_to_num(gradient.stiffness[:, head] / scale), scale
 
     def _constraints(
-        self, rows: PlacedRows, gradient: PlacedRows, goal: Goal, region: float
+        self,
+        rows: PlacedRows,
+        gradient: PlacedRows,
+        k: FloatArray,
+        g: FloatArray,
+        scale: float,
+        goal: Goal,
+        region: float,
     ) -> tuple[FloatArray, FloatArray]:
         """A x <= b in the variables step, L, H, t, slack; rows that cannot bind within the region are left out."""
         d = len(self.free)
-        k, g = self._stiffness(rows, gradient)
         reach = region * np.abs(g).sum(axis=0)
         low, high = (k - reach <= (k + reach).min()), (k + reach >= (k - reach).max())
         blocks = [_block(-g[:, low], [1.0, 0.0, 0.0, 0.0]), _block(g[:, high], [0.0, -1.0, 0.0, 0.0])]
@@ -318,7 +326,6 @@ class Climber:
             rights.append(values[near] - least - INSIDE)
         raw = self.evaluator.path.weight[self.evaluator.path.headline]
         weight = raw / raw.sum()
-        scale = float(np.nanmean(rows.stiffness))
         floors = (goal.floors / scale) + (0.0 if goal.weights is None else INSIDE)
         soft = (1.0, 0.0) if goal.weights is None else (0.0, -1.0)  # the common surplus t, or the slack
         if np.isfinite(scale):
