@@ -31,8 +31,8 @@ SCOUTS = 250  # placements tried at random before the evolution, for each that i
 GENERATIONS, CHILDREN, ARCHIVE = 36, 60, 120
 WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last generation
 # Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
-STARTS, FINALISTS = 5, 4
-CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 12, 10, 6
+STARTS, FINALISTS = 6, 4
+HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 10, 6
 APART = 0.1  # of each range, where they start
 BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
 FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
@@ -123,10 +123,14 @@ class _Search:
     def sampled(self, path: WorkPath) -> None:
         """Evaluators of a path."""
         self.path = path
-        parts = {"whole": path, "middle": telling_path(path, POLISH_SAMPLES), "few": telling_path(path, SCOUT_SAMPLES)}
         before = self.poses
-        self.evaluators = {name: self.evaluator(part) for name, part in parts.items()}
-        self.evaluators["whole"].poses = before
+        whole = self.evaluator(path)
+        whole.poses = before
+        middle, few = (
+            self.evaluator(telling_path(path, count)) if len(path) > count else whole
+            for count in (POLISH_SAMPLES, SCOUT_SAMPLES)
+        )
+        self.evaluators = {"whole": whole, "middle": middle, "few": few}
 
     def evaluator(self, path: WorkPath) -> Evaluator:
         """An evaluator of a part of the path."""
@@ -134,7 +138,7 @@ class _Search:
 
     @property
     def poses(self) -> int:
-        return sum(evaluator.poses for evaluator in self.evaluators.values())
+        return sum(evaluator.poses for evaluator in set(self.evaluators.values()))
 
     def climber(self, name: str) -> Climber:
         return Climber(self.evaluators[name], self.bounds, self.rules)
@@ -350,12 +354,14 @@ def _climbed_to(
     """
     few, middle, whole = (search.climber(name) for name in ("few", "middle", "whole"))
     free = len(search.bounds.free)
-    starts, finalists = (2 * free, 3) if end else (STARTS * free, FINALISTS)
-    first = _best_apart(search, candidates, figures, goal, starts, APART)
-    found = few.climb(first, goal, CLIMB_STEPS)
-    found = np.vstack([first, found])
-    first = _best_apart(search, found, middle.evaluator.figures(found), goal, finalists, BASIN)
-    found = middle.climb(first, goal, POLISH_STEPS)
+    starts, finalists = (free, 2) if end else (STARTS * free, FINALISTS)
+    found = _best_apart(search, candidates, figures, goal, starts, APART)
+    for _ in range(HEATS):  # the better half of the climbs, those up the same hill counted once, goes on
+        climbed = few.climb(found, goal, CLIMB_STEPS)
+        starts = max((len(found) + 1) // 2, finalists)
+        found = _best_apart(search, climbed, few.evaluator.figures(climbed), goal, starts, BASIN)
+    if middle.evaluator is not few.evaluator:
+        found = middle.climb(found[:finalists], goal, POLISH_STEPS)
     best = found[_ranked(search, goal, whole.evaluator.figures(found))[0]]
     return np.vstack([found, _finished(search, best, goal)])
 
