@@ -3,9 +3,9 @@
 Every program of `programs/` and 50 random ones (seeded) are placed; bars: none of mean, range and weakest place worse
 than at the present placement, unless it is said; no rapid out of reach. Some are held against a grid of 20,000
 placements whose best are polished by scipy's simplex search, which shares nothing with the linear programmes; bars: no
-placement of the grid dominates the recommended one (no worse in all three, better by more than 1 % in one);
-`programs/pocket.nc` in the README's bounds takes at most 6 s of CPU and at least 4 times fewer evaluations than 6.3
-million, which it took before.
+placement of the grid dominates the recommended one (no worse in all three, better by more than 0.2 % in one);
+`programs/pocket.nc` in the README's bounds takes at most 3 s of CPU and at least 3 times fewer evaluations than 6.3
+million, which it took before; and a search takes at most 3 times what its kernel takes for the poses that it evaluates.
 """
 
 from __future__ import annotations
@@ -28,14 +28,17 @@ from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import telling_path, work_path
 from toolpath_stiff.placement.placing import Placed, Task, place_program
 from toolpath_stiff.placement.search import SearchRules
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness import closed_form
 from toolpath_stiff.stiffness.model import build_model
 
 PROGRAMS = Path(__file__).parent.parent / "programs"
 BOUNDS = Bounds(np.array([-0.3, -0.3, 0.4, 0.0, 0.0, 0.0]), np.array([0.3, 0.3, 1.25, 0.0, 0.0, 2.0 * np.pi]))
 GRID = (11, 11, 11, 15)  # 19,965 placements
 GRID_SAMPLES, POLISHED, POLISH_EVALUATIONS = 200, 12, 300
-AGAINST_GRID = ("pocket.nc", "case_study.nc", "inch_bracket.nc", "arcs_in_planes.nc")
-DOMINATED, CPU_SECONDS, POSES_BEFORE, FEWER = 0.01, 6.0, 6_300_000, 4.0
+AGAINST_GRID = ("pocket.nc", "case_study.nc", "inch_bracket.nc", "arcs_in_planes.nc", "tilted_five_axis.nc")
+DOMINATED, CPU_SECONDS, POSES_BEFORE, FEWER, TIMES_KERNEL = 0.002, 3.0, 6_300_000, 3.0, 3.0
+KERNEL_POSES = 50_000
 MODEL, LOAD = build_model(load_machine("nist")), parse_load("tangential")
 
 
@@ -108,6 +111,19 @@ def dominance(objectives: np.ndarray, ours: np.ndarray) -> np.ndarray:
     return np.where(no_worse, ((objectives - ours) / np.abs(ours)).max(axis=1), 0.0)
 
 
+def kernel_seconds(tilted: bool) -> float:
+    """CPU seconds a pose of the kernel that searches ask, the median of five calls."""
+    rng = np.random.default_rng(0)
+    position = np.ascontiguousarray(rng.uniform(BOUNDS.low[:3], BOUNDS.high[:3], (KERNEL_POSES, 3)).T)
+    turns = rotation_matrices(rng.uniform(-0.2, 0.2, (KERNEL_POSES, 3))).reshape(-1, 9).T.copy() if tilted else None
+    seconds = []
+    for _ in range(5):
+        start = time.process_time()
+        closed_form.compliance_along_columns(closed_form.prepare(MODEL.machine), position, position, turns)
+        seconds.append((time.process_time() - start) / KERNEL_POSES)
+    return float(np.median(seconds))
+
+
 def against_grid(name: str) -> tuple[str, bool]:
     """A row of the second table."""
     from scipy.optimize import minimize
@@ -144,10 +160,20 @@ def against_grid(name: str) -> tuple[str, bool]:
     allowed = rules.violation(final) == 0.0
     by = float(np.where(allowed, dominance(final.objectives, ours), 0.0).max())
     poses = found.summary["search"]["pose_evaluations"]
-    passed = by <= DOMINATED
+    times = cpu / (poses * kernel_seconds(bool(path.abc.any())))
+    passed = by <= DOMINATED and times <= TIMES_KERNEL
     if name == "pocket.nc":
         passed &= cpu <= CPU_SECONDS and poses * FEWER <= POSES_BEFORE
-    row = f"| {name} | {len(path)} | {100.0 * by:.3f} % | {poses:,} | {cpu:.1f} | {'yes' if passed else 'NO'} |"
+    cells = [
+        name,
+        len(path),
+        f"{100.0 * by:.3f} %",
+        f"{poses:,}",
+        f"{cpu:.1f}",
+        f"{times:.1f}",
+        "yes" if passed else "NO",
+    ]
+    row = f"| {' | '.join(map(str, cells))} |"
     return row, passed
 
 
@@ -162,8 +188,8 @@ def main() -> int:
         "Bounds: `--x -300:300 --y -300:300 --z 400:1250`, objective `balanced`. Changes in per cent of the present",
         "figure; a narrower range is better. Polished are the grid's placements that come nearest to dominating.",
         "",
-        "| program | samples | dominated by | poses | CPU s | bars cleared |",
-        "| --- | ---: | ---: | ---: | ---: | --- |",
+        "| program | samples | dominated by | poses | CPU s | times its kernel | bars cleared |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | --- |",
     ]
     passed = True
     for name in AGAINST_GRID:

@@ -186,3 +186,25 @@ def test_assumptions_are_said():
     text = " ".join(str(a) for a in analyse_text(SQUARE).summary()["assumptions"])
     for words in ("default (--origin)", "reference_tool assumed", "limits.strut_length assumed", "recovered", "rigid"):
         assert words in text
+
+
+@pytest.mark.parametrize("load", ["tangential", "normal", "radial", "axial", "1,0,-0.5", "softest"])
+def test_a_pose_is_the_same_alone_and_among_many(load):
+    """Alone it takes the exact route with `reach`, among many the closed form, which has the margins on its way."""
+    rng = np.random.default_rng(3)
+    n = 400
+    position = np.column_stack([rng.uniform(-0.55, 0.55, (n, 2)), rng.uniform(0.2, 1.5, n)])
+    abc, tangent = rng.uniform(-0.2, 0.2, (n, 3)), rng.normal(size=(n, 3))
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    tangent[5], tangent[6], abc[6] = 0.0, [0.0, 0.0, 1.0], 0.0  # no motion; a plunge
+    tool = np.where(np.arange(n) % 3 == 0, np.nan, np.where(np.arange(n) % 3 == 1, 0.12, 0.25))
+    model, load = build_model(load_machine("nist")), parse_load(load)
+    many = evaluate(model, position, abc, tangent, tool, load)
+    parts = [slice(start, start + 100) for start in range(0, n, 100)]
+    few = [evaluate(model, position[p], abc[p], tangent[p], tool[p], load) for p in parts]
+    assert 0.5 < many.reachable.mean() < 1.0
+    for name in ("stiffness", "direction", "strut_lengths", "margin", "limit_value"):
+        alone = np.concatenate([getattr(part, name) for part in few])
+        np.testing.assert_allclose(getattr(many, name), alone, rtol=1e-9, atol=1e-12, err_msg=name)
+    for name in ("substituted", "extrapolated", "limit"):
+        np.testing.assert_array_equal(getattr(many, name), np.concatenate([getattr(part, name) for part in few]))

@@ -81,3 +81,9 @@ def test_linuxcnc_itself_places_it_there(tmp_path):
     found = np.array([end[:3] for _, _, end, _ in canon.moves])
     # rs274 prints four decimals, and its coordinates pass through the offset once more.
     np.testing.assert_allclose(found[-len(wanted) + 1 :], wanted[1:], atol=2e-4)
+
+
+@pytest.mark.parametrize("word", ["G55", "g 5 5", "G(second)055", "G59.1", "G10 L2 P2 X1"])
+def test_another_offset_is_found_however_it_is_written(word):
+    program = parse_program(f"G21 G90 F100\nG1 X5 (G54 and 55)\n{word}\nG1 X7\nM2\n", "part.nc")
+    assert "line 3" in offset_blocks(program, PLACEMENT).linuxcnc_reason

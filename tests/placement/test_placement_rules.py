@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import shutil
 import subprocess
@@ -9,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tests.placement.test_placement_search import MODEL, TANGENTIAL, headline_figures, program_of
 from toolpath_stiff.analysis import analyze
@@ -18,7 +22,7 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, least_cost
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import telling_path, work_path
 from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
@@ -208,6 +212,90 @@ def test_no_larger_share_outside_the_strut_law_unless_allowed():
     assert allowed.figures.mean.max() > kept.figures.mean.max()
 
 
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6), st.integers(2, 9), st.integers(1, 60))
+def test_the_linear_programmes_are_those_of_highs(seed, n, m):
+    from scipy.optimize import linprog
+
+    rng = np.random.default_rng(seed)
+    cost, matrix = rng.normal(size=n) * (rng.uniform(size=n) < 0.7), rng.normal(size=(m, n)).round(1)
+    low, high = -rng.uniform(0.0, 2.0, n), rng.uniform(0.0, 2.0, n)
+    right = matrix @ rng.uniform(low, high) + rng.choice([0.0, 0.3, -0.2], m)  # degenerate, and now and then impossible
+    ours = least_cost(cost, matrix, right, low, high)
+    theirs = linprog(cost, matrix, right, bounds=np.stack([low, high], axis=1), method="highs")
+    assert (ours is None) == (theirs.x is None)
+    if ours is not None:
+        assert cost @ ours == pytest.approx(theirs.fun, abs=1e-7)
+        assert (matrix @ ours <= right + 1e-8).all() and (low - 1e-8 <= ours).all() and (ours <= high + 1e-8).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "objective", "tilt"),
+    [("tilted_five_axis", "mean", 0), ("arcs_in_planes", "range", 0), ("pocket", "mean", 15)],
+)
+def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt):
+    """6,000 placements at random, of which the best in several places are polished by scipy's simplex search."""
+    from scipy.optimize import minimize
+
+    path = telling_path(work_path(program_of(name), 5e-3, TANGENTIAL, PRESENT), 60)
+    lean = np.radians(tilt)
+    bounds = Bounds(np.array([-0.3, -0.3, 0.4, -lean, -lean, 0]), np.array([0.3, 0.3, 1.25, lean, lean, 2 * np.pi]))
+    evaluator, rules, goal = (
+        Evaluator(MODEL, path, TANGENTIAL, 1000.0),
+        Rules(0.01),
+        Goal(OBJECTIVES[objective], NO_FLOORS),
+    )
+
+    def worth(placements):
+        figures = evaluator.figures(placements)
+        return goal.value(figures) - 1e10 * rules.violation(figures)
+
+    tried = np.random.default_rng(21).uniform(size=(6000, len(bounds.free)))
+    value = worth(bounds.placements(tried))
+    ranked = tried[np.argsort(-np.nan_to_num(value, neginf=-1e12), kind="stable")]
+    firsts = ranked[apart(bounds, bounds.placements(ranked), 3)]
+    polished = [
+        -minimize(
+            lambda u: -worth(bounds.placements(u[None]))[0] / 1e6, first, method="Nelder-Mead", options={"maxfev": 150}
+        ).fun
+        * 1e6
+        for first in firsts
+    ]
+    found = search_placements(
+        MODEL, path, TANGENTIAL, bounds, SearchRules(objective=objective, allow_extrapolation=True)
+    )
+    best = max(np.nanmax(value), *polished)
+    assert goal.value(found.best_figures)[0] >= best - 2e-3 * abs(best)
+
+
+def test_a_long_path_is_climbed_on_what_decides(monkeypatch):
+    """With every path long, the recommendation is that of the climb on all samples, within two thousandths."""
+    from toolpath_stiff.placement import search
+
+    program, goal = program_of("pocket"), Goal(OBJECTIVES["balanced"], NO_FLOORS)
+    bounds = Bounds(np.array([-0.1, -0.1, 0.9, 0, 0, 0.3]), np.array([0.1, 0.1, 1.2, 0, 0, 0.3]))
+    whole = searched(program, bounds, step=2e-3)
+    monkeypatch.setattr(search, "SHORT", 0)
+    monkeypatch.setattr(search, "WHOLE_POSES", 0)
+    long = searched(program, bounds, step=2e-3)
+    value, wanted = (float(goal.value(found.best_figures)[0]) for found in (long, whole))
+    assert value >= wanted - 2e-3 * abs(wanted)
+    assert (long.best_figures.objectives >= long.present.objectives).all()
+
+
+def test_a_search_asks_no_compiled_kernel(monkeypatch):
+    """It amplifies the last digit: with and without numba it has to be the same kernel."""
+    from toolpath_stiff.stiffness import compiled
+
+    def never(*_, **__):
+        raise AssertionError("compiled")
+
+    monkeypatch.setattr(compiled, "compliance_along_columns", never)
+    monkeypatch.setattr("toolpath_stiff.stiffness.core.COMPILED_FROM", 200)
+    here = np.array(PRESENT)
+    searched(program_of("inch_bracket"), Bounds(here, here + 0.1 * np.eye(6)[2]))
+
+
 def test_a_climb_ends_no_lower_than_nelder_mead():
     """An independent way up, scipy's simplex search from the same place: each may end on another kink, within 1 %."""
     from scipy.optimize import minimize
@@ -217,7 +305,7 @@ def test_a_climb_ends_no_lower_than_nelder_mead():
     climber = Climber(evaluator, README_BOUNDS, Rules(0.01))
     goal = Goal(OBJECTIVES["balanced"], NO_FLOORS)
     for first in ([0.1, 0.05, 0.9, 0, 0, 1.0], [-0.05, 0.1, 1.0, 0, 0, 4.0]):
-        ours = climber.climb(np.array(first, dtype=float), goal, 40, evaluations=100)
+        ours = climber.climb(np.array([first], dtype=float), goal, 40)[0]
 
         def loss(unit):
             return -float(goal.value(evaluator.figures(README_BOUNDS.placements(unit[None])))[0]) / 1e6
@@ -230,12 +318,20 @@ def test_a_climb_ends_no_lower_than_nelder_mead():
 SEARCH = ["--x=-100:100", "--y=-100:100", "--z", "700:1100", "--step", "5", "--points", "12", "--no-plots"]
 
 
+@pytest.fixture(scope="module")
+def searched_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("earlier")
+    shutil.copy(ROOT / "programs/pocket.nc", folder / "part.nc")
+    with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()):
+        assert main(["place", "part.nc", *SEARCH, "--out", "out"]) == 0
+    return folder
+
+
 @pytest.fixture
-def earlier(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(ROOT / "programs/pocket.nc", "part.nc")
-    assert main(["place", "part.nc", *SEARCH, "--out", "out"]) == 0
-    capsys.readouterr()
+def earlier(searched_folder, tmp_path, monkeypatch):
+    """A folder of one's own with the search in it; the search is made once."""
+    shutil.copytree(searched_folder, tmp_path / "copy")
+    monkeypatch.chdir(tmp_path / "copy")
     return json.loads(Path("out/placement.json").read_text())
 
 

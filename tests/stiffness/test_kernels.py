@@ -135,11 +135,10 @@ def test_a_block_with_singular_poses_keeps_the_good_ones(route):
 
 def along(route, kernel, position, direction, rotation):
     """`compliance_along` of a route with poses first: compliance, determinant, lengths (n, 6), good."""
-    if route == "closed_form":
-        return closed_form.compliance_along(kernel, position, direction, rotation)
     columns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
     p, d = np.ascontiguousarray(position.T), np.ascontiguousarray(direction.T)
-    compliance, determinant, lengths, good = compiled.compliance_along_columns(kernel, p, d, columns)
+    kernels = {"closed_form": closed_form, "compiled": compiled}
+    compliance, determinant, lengths, good = kernels[route].compliance_along_columns(kernel, p, d, columns)
     return compliance, determinant, lengths.T, good
 
 
@@ -259,11 +258,12 @@ def test_memory_does_not_grow_with_the_poses(entry):
 
     def peak_above_output(n: int) -> float:
         (position, rotation), direction = poses(n), unit_vectors(n)
+        columns = [np.ascontiguousarray(a.reshape(n, -1).T) for a in (position, direction, rotation)]
         tracemalloc.start()
         if entry == "tensor":
             outputs = closed_form.tip_compliance(kernel, position, rotation)
         else:
-            outputs = closed_form.compliance_along(kernel, position, direction, rotation)
+            outputs = closed_form.compliance_along_columns(kernel, *columns)
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return peak - sum(output.nbytes for output in outputs)

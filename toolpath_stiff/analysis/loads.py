@@ -107,27 +107,44 @@ def load_directions(
     directions, substituted
         (n, 3) and (n,): `substituted` where the asked direction does not exist.
     """
-    n = len(position)
-    nowhere = np.zeros(n, dtype=bool)
-    if load.vector is not None:
-        return np.broadcast_to(np.array(load.vector), (n, 3)), nowhere
-    if load.kind in AXES:
-        return np.broadcast_to(np.array(AXES[load.kind]), (n, 3)), nowhere
+    directions, known = geometric_directions(load, position, rotation, tangent)
+    if known.all():
+        return directions, ~known
     softest = softest or partial(_softest_of, compliance)
     if load.kind == "softest":
-        return softest(np.ones(n, dtype=bool), None), nowhere
-    if load.kind == "radial":
-        return _radial(position), nowhere
-    axis = np.broadcast_to(np.array(AXES["z"]), (n, 3)) if rotation is None else rotation[:, :, 2]
-    if load.kind == "axial":
-        return axis, nowhere
-    still = ~np.any(tangent != 0.0, axis=1)
-    if load.kind == "normal":
-        return _normal(softest, axis, tangent, still)
-    directions = tangent.copy()
+        return softest(~known, None), known
+    directions, still = directions.copy(), ~known & ~np.any(tangent != 0.0, axis=1)
+    plunge = ~known & ~still
+    if plunge.any():
+        axis = np.broadcast_to(np.array(AXES["z"]), directions.shape) if rotation is None else rotation[:, :, 2]
+        directions[plunge] = softest(plunge, axis[plunge])
     if still.any():
         directions[still] = softest(still, None)
-    return directions, still
+    return directions, ~known
+
+
+def geometric_directions(
+    load: Load, position: FloatArray, rotation: FloatArray | None, tangent: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Unit vectors (n, 3) of the load, and where they are known (n,) without the compliance; as `load_directions`."""
+    n = len(position)
+    everywhere = np.ones(n, dtype=bool)
+    if load.vector is not None:
+        return np.broadcast_to(np.array(load.vector), (n, 3)), everywhere
+    if load.kind in AXES:
+        return np.broadcast_to(np.array(AXES[load.kind]), (n, 3)), everywhere
+    if load.kind == "softest":
+        return np.full((n, 3), np.nan), ~everywhere
+    if load.kind == "radial":
+        return _radial(position), everywhere
+    axis = np.broadcast_to(np.array(AXES["z"]), (n, 3)) if rotation is None else rotation[:, :, 2]
+    if load.kind == "axial":
+        return axis, everywhere
+    if load.kind == "normal":
+        sideways = np.cross(axis, tangent)
+        sine = np.linalg.norm(sideways, axis=1)
+        return sideways / np.where(sine > 0.0, sine, 1.0)[:, None], sine >= ALONG_AXIS
+    return tangent, np.any(tangent != 0.0, axis=1)
 
 
 def _radial(position: FloatArray) -> FloatArray:
@@ -138,18 +155,6 @@ def _radial(position: FloatArray) -> FloatArray:
     directions[:, 0] = np.where(on_axis, 1.0, -position[:, 0] / safe)
     directions[:, 1] = np.where(on_axis, 0.0, -position[:, 1] / safe)
     return directions
-
-
-def _normal(softest: Softest, axis: FloatArray, tangent: FloatArray, still: BoolArray) -> tuple[FloatArray, BoolArray]:
-    sideways = np.cross(axis, tangent)
-    sine = np.linalg.norm(sideways, axis=1)
-    plunge = ~still & (sine < ALONG_AXIS)
-    directions = sideways / np.where(sine > 0.0, sine, 1.0)[:, None]
-    if plunge.any():
-        directions[plunge] = softest(plunge, axis[plunge])
-    if still.any():
-        directions[still] = softest(still, None)
-    return directions, still | plunge
 
 
 def _softest_of(compliance: FloatArray, rows: BoolArray, axis: FloatArray | None) -> FloatArray:

@@ -12,11 +12,17 @@ from functools import partial
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.loads import Load, load_directions, softest_directions, stiffest_directions
+from toolpath_stiff.analysis.loads import (
+    Load,
+    geometric_directions,
+    load_directions,
+    softest_directions,
+    stiffest_directions,
+)
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError, PoseError, UnreachableError
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Limit, Reach, machine_limits, reach
+from toolpath_stiff.machine.limits import Limit, Reach, gauge_of, machine_limits, reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
@@ -128,15 +134,67 @@ def evaluate(
     )
     for start in range(0, n, BLOCK):
         rows = slice(start, min(start + BLOCK, n))
-        _evaluate_block(model, rows, position, abc, tangent, lengths, load, force, route, result)
+        left: slice | IntArray = rows
+        if route != "exact" and load.kind != "softest":
+            left = _evaluate_fast(model.machine, rows, position, abc, tangent, lengths, load, route, result)
+        if isinstance(left, slice) or len(left):
+            _evaluate_rows(model, left, position, abc, tangent, lengths, load, force, route, result)
         if progress:
             progress(rows.stop, n)
     return result
 
 
-def _evaluate_block(
-    model: StiffnessModel,
+def _evaluate_fast(
+    machine: Machine,
     rows: slice,
+    position: FloatArray,
+    abc: FloatArray,
+    tangent: FloatArray,
+    tool_length: FloatArray,
+    load: Load,
+    route: str,
+    result: PoseStiffness,
+) -> IntArray:
+    """Poses of linear struts on a rigid platform along loads that the geometry directs: margins and stiffness at once.
+
+    Returns the rows that are left: other directions, poses near singular ones, and where an angle near zero decides.
+    """
+    left = []
+    rotation = rotation_matrices(abc[rows]) if np.any(abc[rows] != 0.0) else None
+    direction, known = geometric_directions(load, position[rows], rotation, tangent[rows])
+    turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
+    tip, towards = (np.ascontiguousarray(values.T) for values in (position[rows], direction))
+    for tool, some in _of_one_tool(tool_length[rows]):
+        into = rows if isinstance(some, slice) else rows.start + some
+        turn = None if turns is None else turns[:, some]
+        there = tip[:, some]
+        along, determinant, lengths, good = core.compliance_along_columns(
+            machine, there, towards[:, some], turn, tool, route
+        )
+        stand, sure = gauge_of(machine).reach(there, lengths, determinant, turn, tool)
+        sure &= good & known[some] & (along > 0.0) & (along < np.inf)  # the others are looked at one by one
+        along[~(stand.reachable & known[some])] = np.nan
+        result.stiffness[into] = 1.0 / along
+        result.direction[into] = direction[some]
+        result.strut_lengths[into] = lengths.T
+        result.extrapolated[into] = machine.strut_law.room(lengths).min(axis=0) < 0.0
+        result.margin[into], result.limit[into], result.limit_value[into] = stand.margin, stand.limit, stand.value
+        left.append(np.arange(rows.start, rows.stop)[some][~sure])
+    return np.concatenate(left)
+
+
+def _of_one_tool(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:
+    """Each tool length, nan counts as one, and the rows that have it."""
+    one = _one_if_equal(tool_length)
+    if isinstance(one, float):
+        return [(one, slice(None))]
+    lengths, number = np.unique(tool_length, return_inverse=True)
+    return [(float(length), np.flatnonzero(number == i)) for i, length in enumerate(lengths)]
+
+
+def _evaluate_rows(
+    model: StiffnessModel,
+    rows: slice | IntArray,
     position: FloatArray,
     abc: FloatArray,
     tangent: FloatArray,

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.machine.kinematics import Struts, joint_angles, singularity_index
+from toolpath_stiff.machine.kinematics import (
+    Struts,
+    joint_angles,
+    neutral_axes,
+    singularity_index,
+    solve_struts_at,
+)
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -42,22 +47,6 @@ class Limit:
 def machine_limits(machine: Machine) -> tuple[Limit, ...]:
     """The finite limits of a machine, in the order of `reach`'s columns."""
     return tuple(limit for limit in _all_limits(machine) if np.isfinite(limit.bound))
-
-
-def distinct_limits(machine: Machine) -> tuple[Limit, ...]:
-    """One of the finite limits for each quantity and side: the extreme strut or joint decides."""
-    return tuple({(limit.quantity, limit.lower): limit for limit in machine_limits(machine)}.values())
-
-
-def smallest_margin(limits: Iterable[Limit], extreme: Callable[[Limit], FloatArray]) -> FloatArray:
-    """(n,) the margins of `reach` without the name of the limit, from `distinct_limits`; inf without any.
-
-    `extreme` gives the values (n,) of a limit's quantity that come nearest to it.
-    """
-    margin: FloatArray = np.array(np.inf)
-    for limit in limits:
-        margin = np.minimum(margin, limit.margin(extreme(limit)))
-    return margin
 
 
 def _all_limits(machine: Machine) -> list[Limit]:
@@ -180,3 +169,164 @@ def reach(machine: Machine, position: ArrayLike, struts: Struts, rotation: Array
     worst = np.argmin(margins, axis=1)
     rows = np.arange(len(tip))
     return Reach(margins[rows, worst], worst, values[rows, worst], limits)
+
+
+# A cosine above this is no measure of an angle: rounding moves the arc cosine by more than 1e-15 rad.
+NEARLY_ONE = 0.98
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """The limits of a machine prepared for poses whose strut lengths and determinants are known already.
+
+    It gives what `reach` gives, for the extreme strut and the extreme joint alone: a kernel of the stiffness has both
+    lengths and determinants, and reach by itself takes ten times as long.
+
+    Attributes
+    ----------
+    machine
+        The machine.
+    limits
+        All its finite limits, as `machine_limits`.
+    distinct
+        Of each quantity and side one limit, and the columns of `limits` that are of its kind.
+    axes
+        Neutral axes of the frame joints and of the platform joints, as `neutral_axes`.
+    determinant
+        |det J| at the neutral pose, m^3.
+    """
+
+    machine: Machine
+    limits: tuple[Limit, ...]
+    distinct: tuple[tuple[Limit, IntArray], ...]
+    axes: tuple[FloatArray, FloatArray]
+    determinant: float
+
+    def margin(
+        self,
+        position: FloatArray,
+        lengths: FloatArray,
+        determinant: FloatArray,
+        rotation: FloatArray | None,
+        tool: float,
+    ) -> FloatArray:
+        """(n,) smallest margin to any limit, inf without limits; the arguments as of `reach`."""
+        extremes = _Extremes(self, position, lengths, determinant, rotation, tool)
+        margin = np.full(position.shape[1], np.inf)
+        for limit, _ in self.distinct:
+            np.minimum(margin, limit.margin(extremes.of(limit)), out=margin)
+        return margin
+
+    def reach(
+        self,
+        position: FloatArray,
+        lengths: FloatArray,
+        determinant: FloatArray,
+        rotation: FloatArray | None,
+        tool: float,
+    ) -> tuple[Reach, BoolArray]:
+        """How n poses with one tool stand to the limits.
+
+        Parameters
+        ----------
+        position
+            (3, n) m, tool tip; poses last, as in all of these.
+        lengths
+            (6, n) m.
+        determinant
+            (n,) |det J|, m^3.
+        rotation
+            (9, n) rows of the rotation matrices one after the other; None: vertical.
+        tool
+            m, length of the tool; nan: the reference tool.
+
+        Returns
+        -------
+        reach, sure
+            As of `reach`; (n,) false where an angle too small for its cosine decides, and `reach` must be asked.
+        """
+        n = position.shape[1]
+        extremes = _Extremes(self, position, lengths, determinant, rotation, tool)
+        margin, value, which = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
+        for number, (limit, _) in enumerate(self.distinct):
+            found = extremes.of(limit)
+            apart = limit.margin(found)
+            nearer = apart < margin
+            np.copyto(margin, apart, where=nearer)
+            np.copyto(value, found, where=nearer)
+            which[nearer] = number
+        column, sure = np.zeros(n, dtype=np.int64), np.ones(n, dtype=bool)
+        for number, (limit, columns) in enumerate(self.distinct):
+            rows = np.flatnonzero(which == number)
+            column[rows] = columns[0] if len(columns) == 1 else columns[extremes.strut(limit, rows)]
+            if limit.quantity in (FRAME, PLATFORM):
+                sure[rows] = value[rows] > np.arccos(NEARLY_ONE)
+        return Reach(margin, column, value, self.limits), sure
+
+
+@dataclass
+class _Extremes:
+    """The values of n poses that come nearest to a limit, found once for each kind of limit; arguments of `Gauge`."""
+
+    gauge: Gauge
+    position: FloatArray
+    lengths: FloatArray
+    determinant: FloatArray
+    rotation: FloatArray | None
+    tool: float
+    cosines: dict[str, FloatArray] = field(default_factory=dict)
+
+    def of(self, limit: Limit) -> FloatArray:
+        """(n,) the extreme values of a limit's quantity."""
+        if limit.quantity == STRUT:
+            return np.asarray(self.lengths.min(axis=0) if limit.lower else self.lengths.max(axis=0))
+        if limit.quantity in (FRAME, PLATFORM):
+            return np.asarray(np.arccos(np.clip(self._cosine(limit.quantity).min(axis=0), -1.0, 1.0)))
+        if limit.quantity == SINGULARITY:
+            return np.asarray(self.determinant / self.gauge.determinant)
+        return np.asarray(self.position[AXES.index(limit.quantity)])
+
+    def strut(self, limit: Limit, rows: IntArray) -> IntArray:
+        """(k,) the strut or joint that has the extreme value, of some poses; the first of several."""
+        values = self.lengths if limit.quantity == STRUT else self._cosine(limit.quantity)
+        some = np.ascontiguousarray(values[:, rows].T)
+        lowest = limit.lower or limit.quantity != STRUT  # the smallest cosine is the largest angle
+        return np.asarray(some.argmin(axis=1) if lowest else some.argmax(axis=1))
+
+    def _cosine(self, quantity: str) -> FloatArray:
+        """(6, n) cosines of the angles of the frame's or the platform's joints."""
+        axes = self.gauge.axes
+        same = self.rotation is None and bool((axes[0] == axes[1]).all())
+        name = FRAME if same else quantity
+        if name not in self.cosines:
+            self.cosines[name] = self._along_axes(axes[name == PLATFORM], name == PLATFORM) / self.lengths
+        return self.cosines[name]
+
+    def _along_axes(self, axes: FloatArray, of_platform: bool) -> FloatArray:
+        """(6, n) m, components of the struts R p + tip - b along the joints' neutral axes."""
+        machine, position, turns = self.gauge.machine, self.position, self.rotation
+        arms, frame = machine.platform_joints_for(self.tool), machine.frame_joints
+        if turns is None:
+            return np.asarray(axes @ position + np.einsum("id,id->i", arms - frame, axes)[:, None])
+        if of_platform:  # the axes turn with the platform: (R a) . (R p + tip - b)
+            local = (turns.reshape(3, 3, -1) * position[:, None]).sum(axis=0)
+            fixed = np.einsum("ic,id->icd", frame, axes).reshape(6, 9) @ turns
+            return np.asarray(axes @ local - fixed + np.einsum("id,id->i", axes, arms)[:, None])
+        turned = np.einsum("ic,id->icd", axes, arms).reshape(6, 9) @ turns
+        return np.asarray(axes @ position + turned - np.einsum("id,id->i", axes, frame)[:, None])
+
+
+def gauge_of(machine: Machine) -> Gauge:
+    """The gauge of a machine, made once."""
+    if "gauge" not in machine.derived:
+        limits = machine_limits(machine)
+        kinds = [(limit.quantity, limit.lower) for limit in limits]
+        distinct = tuple(
+            (limits[kinds.index(kind)], np.flatnonzero([kind == other for other in kinds]))
+            for kind in dict.fromkeys(kinds)
+        )
+        neutral = solve_struts_at(machine, machine.limits.neutral_pose)
+        determinant = float(np.abs(np.linalg.det(neutral.jacobian[0])))
+        machine.derived["gauge"] = Gauge(machine, limits, distinct, neutral_axes(machine), determinant)
+    gauge: Gauge = machine.derived["gauge"]
+    return gauge

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -56,10 +57,14 @@ class StrutLaw:
 
     def room(self, length: FloatArray) -> FloatArray:
         """How far lengths lie inside the range that the law was given for, m; negative outside."""
+        return self.room_of(length, length)
+
+    def room_of(self, shortest: FloatArray, longest: FloatArray) -> FloatArray:
+        """How far the shortest and the longest of some lengths lie inside that range, m."""
         # Half a micrometre: a pose that lands on an end of the range by construction is not outside it.
         slack = 5e-7
         low, high = sorted((self.length_1, self.length_2))
-        return np.asarray(np.minimum(length - (low - slack), (high + slack) - length))
+        return np.asarray(np.minimum(shortest - (low - slack), (high + slack) - longest))
 
     def extrapolates(self, length: FloatArray) -> BoolArray:
         """Whether a length lies outside the range that the law was given for."""
@@ -170,6 +175,11 @@ class Machine:
     effects: tuple[EffectEntry, ...] = ()
     instruments: tuple[EffectEntry, ...] = ()
     uncertainty: Uncertainty | None = None
+
+    @cached_property
+    def derived(self) -> dict[Any, Any]:
+        """What other modules computed of this machine, once; a machine never changes, `with_changes` makes another."""
+        return {}
 
     def platform_joints_for(self, tool_length: float) -> FloatArray:
         """(6, 3) m, platform joints relative to the tip of a tool of that length; nan: the reference tool.

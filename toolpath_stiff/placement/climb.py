@@ -3,15 +3,17 @@
 Range and weakest place are extremes over samples and have kinks where two samples are equally stiff, which is where
 their best values lie. Linearised sample by sample they are constraints of a linear programme (the epigraph form:
 L <= k_i <= H for all i), and so are the limits and what must not get worse. Its solution is tried; where the figures
-did not follow, the trust region shrinks (Fletcher, Practical Methods of Optimization, 1987, section 14.4, exact penalty
-functions; here with one shared slack for all constraints, so that there is always a solution).
+did not follow, it is corrected once for what was found there, and then the trust region shrinks (Fletcher, Practical
+Methods of Optimization, 1987, section 14.4, exact penalty functions and second-order corrections; here with one shared
+slack for all constraints, so that there is always a solution).
 
 A front holds what nothing beats in mean, range and weakest place.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -24,8 +26,11 @@ INSIDE = 1e-6  # of the mean stiffness, and of a limit's span: constraints are m
 SMALLEST_REGION = 1e-5  # of each range
 SMALLEST_GAIN = 1e-9  # of the mean stiffness
 WORTH_A_RESTART = 1e-5  # of the mean stiffness: with a region as wide as at first, which kinks may have closed early
-SIMPLEX = 0.01  # of each range, size of the first simplex
 SLACKEST = 1e3
+PERTURBATION, TOLERANCE = 1e-10, 1e-10  # of costs and of rows, both of the order of one
+MOST_PIVOTS = 500  # some thirty are usual
+SOME_STIFFNESS = 5e7  # N/m, the order of a machine tool's: where no climb begins within reach
+Rank = tuple[float, float, float]  # more is better, the first that differs decides: rules, floors, value
 
 
 @dataclass(frozen=True)
@@ -39,12 +44,12 @@ class Bounds:
     high: FloatArray
     heights: tuple[float, ...] = ()
 
-    @property
+    @cached_property
     def free(self) -> IntArray:
         """Columns of a placement that vary."""
         return np.flatnonzero(self.high > self.low)
 
-    @property
+    @cached_property
     def round(self) -> BoolArray:
         """(6,) turns that go all the way round, and so have no end."""
         angle = np.arange(6) == 5
@@ -124,6 +129,50 @@ class Goal:
         return np.asarray(np.where(np.isnan(below), np.inf, below))
 
 
+@dataclass
+class _Climb:
+    """One climb: where it is, the best that it met, how far the next linear programme may go."""
+
+    here: FloatArray
+    rows: PlacedRows
+    merit: float
+    best: FloatArray
+    best_rank: Rank
+    region: float
+    began: float
+    gradient: PlacedRows | None = None
+    step: FloatArray = field(default_factory=lambda: np.zeros(0))
+    tried: PlacedRows | None = None
+
+    def take(self, there: FloatArray, merit: float) -> None:
+        """Go to where the step led."""
+        if float(np.abs(self.step).max()) > 0.9 * self.region:
+            self.region = min(2.0 * self.region, 0.25)
+        assert self.tried is not None
+        self.here, self.rows, self.merit, self.gradient = there, self.tried, merit, None
+
+    def bent(self) -> PlacedRows:
+        """What the programme has to start from to foretell what was found after the step: the second-order correction.
+
+        A kink along which the figures are curved else lets only ever smaller steps pass (Fletcher 1987, section 14.4).
+        """
+        assert self.tried is not None and self.gradient is not None
+        return self.tried.less(self.gradient, self.step)
+
+    def shrink(self, first_region: float) -> None:
+        """Look nearer; from as far as at first again while that is worth it."""
+        self.region = 0.4 * min(self.region, max(float(np.abs(self.step).max()), SMALLEST_REGION))
+        if self.region < SMALLEST_REGION and self.merit - self.began >= WORTH_A_RESTART:
+            self.began, self.region = self.merit, first_region
+
+
+def _merit(rank: Rank, scale: float) -> float:
+    violated, worse, value = rank
+    if not np.isfinite(value) or not np.isfinite(worse):
+        return -1e3 + violated
+    return (value + PENALTY * worse) / scale + PENALTY * violated
+
+
 @dataclass(frozen=True)
 class Climber:
     """One evaluator, the bounds and the rules that a climb keeps."""
@@ -132,92 +181,68 @@ class Climber:
     bounds: Bounds
     rules: Rules
 
-    @property
+    @cached_property
     def free(self) -> IntArray:
         """Columns that a climb may vary: a height from a list stays."""
         free = self.bounds.free
         return free[free != 2] if self.bounds.heights else free
 
-    def climb(
-        self, first: FloatArray, goal: Goal, steps: int, region: float = 0.05, evaluations: int = 0
-    ) -> FloatArray:
-        """The best placement (6,) on the way up from `first` (6,): rules first, then floors, then value.
+    def climb(self, first: FloatArray, goal: Goal, steps: int, region: float = 0.05) -> FloatArray:
+        """The best placements (k, 6) on the ways up from `first` (k, 6): rules first, then floors, then value.
 
-        Linear programmes follow the kinks quickly, and creep where the figures are curved along one: a simplex search
-        (Nelder and Mead, 1965) of so many `evaluations` may end the climb.
+        All climb in step, so that each trial evaluates k placements at once.
         """
         if not len(self.free):
             return first
-        found = self._programmes(first, goal, steps, region)
-        return self._simplex(found, goal, evaluations) if evaluations else found
+        rows = self.evaluator.rows(first)
+        scale = float(np.nanmean(rows.stiffness)) if np.isfinite(rows.stiffness).any() else SOME_STIFFNESS
+        judged = self._judged(rows, goal, scale)
+        climbs = [
+            _Climb(first[i], rows.take(i), merit, first[i], rank, region, merit)
+            for i, (merit, rank) in enumerate(judged)
+        ]
+        for _ in range(steps):
+            going = [climb for climb in climbs if climb.region >= SMALLEST_REGION]
+            if not going:
+                break
+            self._differentiate([climb for climb in going if climb.gradient is None])
+            for climb in going:
+                climb.step = self._step(climb, climb.rows, goal)
+            missed = self._try(going, goal, scale)
+            for climb in missed:  # corrected for the curvature of what was found
+                climb.step = self._step(climb, climb.bent(), goal)
+            for climb in self._try(missed, goal, scale):
+                climb.shrink(region)
+        return np.array([climb.best for climb in climbs])
 
-    def _simplex(self, first: FloatArray, goal: Goal, evaluations: int) -> FloatArray:
-        from scipy.optimize import minimize
+    def _try(self, climbs: list[_Climb], goal: Goal, scale: float) -> list[_Climb]:
+        """Evaluate the next step of each climb and take it where it gains; those where it does not."""
+        if not climbs:
+            return []
+        there = np.array([self._moved(climb.here, climb.step) for climb in climbs])
+        rows = self.evaluator.rows(there)
+        missed = []
+        for i, (merit, rank) in enumerate(self._judged(rows, goal, scale)):
+            climb = climbs[i]
+            climb.tried = rows.take(i)
+            if rank > climb.best_rank:
+                climb.best, climb.best_rank = there[i], rank
+            if merit > climb.merit + SMALLEST_GAIN:
+                climb.take(there[i], merit)
+            else:
+                missed.append(climb)
+        return missed
 
-        best, best_rank = first, self._rank(self.evaluator.rows(first[None]), goal)
-
-        def loss(step: FloatArray) -> float:
-            nonlocal best, best_rank
-            there = self._moved(first, step)
-            rows = self.evaluator.rows(there[None])
-            rank = self._rank(rows, goal)
-            if rank > best_rank:
-                best, best_rank = there, rank
-            return -self._merit(rows, goal)
-
-        d = len(self.free)
-        simplex = np.vstack([np.zeros(d), SIMPLEX * np.diag(self._inwards(first))])
-        minimize(
-            loss,
-            np.zeros(d),
-            method="Nelder-Mead",
-            options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-6, "fatol": SMALLEST_GAIN},
-        )
-        return best
+    def _judged(self, rows: PlacedRows, goal: Goal, scale: float) -> list[tuple[float, Rank]]:
+        """Of each placement the merit, value less penalties in units of `scale` (N/m), and its rank."""
+        figures = self.evaluator.summary(rows)
+        ranks = zip(-self.rules.violation(figures), -goal.worsening(figures), goal.value(figures), strict=True)
+        return [(_merit(rank, scale), rank) for rank in ((float(a), float(b), float(c)) for a, b, c in ranks)]
 
     def _inwards(self, placement: FloatArray) -> FloatArray:
         """(free,) 1 or -1, the sense that leads away from the nearer bound."""
         middle = 0.5 * (self.bounds.low + self.bounds.high)
         return np.where(placement[self.free] > middle[self.free], -1.0, 1.0)
-
-    def _programmes(self, first: FloatArray, goal: Goal, steps: int, region: float) -> FloatArray:
-        here, rows = first, self.evaluator.rows(first[None])
-        merit = self._merit(rows, goal)
-        best, best_rank = first, self._rank(rows, goal)
-        gradient, began, first_region = None, merit, region
-        for _ in range(steps):
-            if gradient is None:
-                gradient = self._gradient(here, rows)
-            step = self._step(here, rows, gradient, goal, region)
-            there = self._moved(here, step)
-            tried = self.evaluator.rows(there[None])
-            gained, rank = self._merit(tried, goal), self._rank(tried, goal)
-            if rank > best_rank:
-                best, best_rank = there, rank
-            taken = float(np.abs(step).max())
-            if gained > merit + SMALLEST_GAIN:
-                region = min(2.0 * region, 0.25) if taken > 0.9 * region else region
-                here, rows, merit, gradient = there, tried, gained, None
-            else:
-                region = 0.4 * min(region, max(taken, SMALLEST_REGION))
-            if region < SMALLEST_REGION:
-                if merit - began < WORTH_A_RESTART:
-                    break
-                began, region = merit, first_region
-        return best
-
-    def _rank(self, rows: PlacedRows, goal: Goal) -> tuple[float, float, float]:
-        figures = self.evaluator.summary(rows)
-        worse = float(goal.worsening(figures)[0])
-        return (-float(self.rules.violation(figures)[0]), -worse, float(goal.value(figures)[0]))
-
-    def _merit(self, rows: PlacedRows, goal: Goal) -> float:
-        """Value less penalties, in units of the path's mean stiffness at this machine's scale."""
-        violated, worse, value = self._rank(rows, goal)
-        if not np.isfinite(value) or not np.isfinite(worse):
-            return -1e3 + violated
-        scale = float(np.nanmean(rows.stiffness))
-        return (value + PENALTY * worse) / scale + PENALTY * violated
 
     def _moved(self, placement: FloatArray, step: FloatArray) -> FloatArray:
         """A placement moved by a step (free,) of the ranges; a whole turn is brought back when the climb ends."""
@@ -230,28 +255,29 @@ class Climber:
             moved[5] = self.bounds.low[5] + np.mod(moved[5] - self.bounds.low[5], 2.0 * np.pi)
         return moved
 
-    def _gradient(self, here: FloatArray, rows: PlacedRows) -> PlacedRows:
+    def _differentiate(self, climbs: list[_Climb]) -> None:
         """Derivatives of every row along each free column: arrays (free, samples), per unit of the range."""
-        span = (self.bounds.high - self.bounds.low)[self.free]
-        sign = self._inwards(here)
-        around = np.repeat(here[None], len(self.free), axis=0)
-        around[np.arange(len(self.free)), self.free] += sign * DIFFERENCE * span
-        found = self.evaluator.rows(around)
-        names = ("stiffness", "law", "margin", "clearance")
-        with np.errstate(invalid="ignore"):
-            return PlacedRows(
-                **{n: (getattr(found, n) - getattr(rows, n)) / (sign * DIFFERENCE)[:, None] for n in names}
-            )
+        if not climbs:
+            return
+        d, span = len(self.free), (self.bounds.high - self.bounds.low)[self.free]
+        signs = np.array([self._inwards(climb.here) for climb in climbs])
+        around = np.repeat(np.array([climb.here for climb in climbs])[:, None], d, axis=1)
+        around[:, np.arange(d), self.free] += signs * DIFFERENCE * span
+        found = self.evaluator.rows(around.reshape(-1, 6))
+        for i, (climb, sign) in enumerate(zip(climbs, signs, strict=True)):
+            there = found.take(slice(i * d, (i + 1) * d))
+            climb.gradient = there.slopes(climb.rows, sign * DIFFERENCE)
 
-    def _step(self, here: FloatArray, rows: PlacedRows, gradient: PlacedRows, goal: Goal, region: float) -> FloatArray:
+    def _step(self, climb: _Climb, rows: PlacedRows, goal: Goal) -> FloatArray:
         """(free,) the linear programme's step within the region; variables step, L, H, t, slack."""
-        from scipy.optimize import linprog
-
+        here, region, gradient = climb.here, climb.region, climb.gradient
+        assert gradient is not None
         d = len(self.free)
-        matrix, right = self._constraints(rows, gradient, goal, region)
+        k, g, scale = self._stiffness(rows, gradient)
+        matrix, right = self._constraints(rows, gradient, k, g, scale, goal, region)
         cost = np.zeros(d + 4)
         weight = self.evaluator.path.weight[self.evaluator.path.headline]
-        slope = self._stiffness(rows, gradient)[1] @ weight / weight.sum()
+        slope = g @ weight / weight.sum()
         if goal.weights is None:
             cost[d + 2] = -1.0
         else:
@@ -265,25 +291,31 @@ class Climber:
             (-region, region) if self.bounds.round[i] else (max(-region, -below / s), min(region, above / s))
             for i, s, (below, above) in zip(self.free, span, room, strict=True)
         ]
-        limits = [*box, (None, None), (None, None), (None, None), (0.0, SLACKEST)]
-        found = linprog(cost, matrix, right, bounds=limits, method="highs")
-        return np.asarray(found.x[:d]) if found.x is not None else np.zeros(d)
+        low, high = np.array([*box, *[(-SLACKEST, SLACKEST)] * 3, (0.0, SLACKEST)]).T
+        found = least_cost(cost, matrix, right, low, high)
+        return np.zeros(d) if found is None else found[:d]
 
-    def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray]:
-        """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean."""
+    def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray, float]:
+        """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean, N/m."""
         head = self.evaluator.path.headline
         values = rows.stiffness[0, head]
         scale = float(np.mean(values))
         if not np.isfinite(scale):  # a cut out of reach: no figures, the limits alone guide
-            return np.ones(len(values)), np.zeros((len(self.free), len(values)))
-        return values / scale, np.nan_to_num(gradient.stiffness[:, head] / scale)
+            return np.ones(len(values)), np.zeros((len(self.free), len(values))), scale
+        return values / scale, np.nan_to_num(gradient.stiffness[:, head] / scale), scale
 
     def _constraints(
-        self, rows: PlacedRows, gradient: PlacedRows, goal: Goal, region: float
+        self,
+        rows: PlacedRows,
+        gradient: PlacedRows,
+        k: FloatArray,
+        g: FloatArray,
+        scale: float,
+        goal: Goal,
+        region: float,
     ) -> tuple[FloatArray, FloatArray]:
         """A x <= b in the variables step, L, H, t, slack; rows that cannot bind within the region are left out."""
         d = len(self.free)
-        k, g = self._stiffness(rows, gradient)
         reach = region * np.abs(g).sum(axis=0)
         low, high = (k - reach <= (k + reach).min()), (k + reach >= (k - reach).max())
         blocks = [_block(-g[:, low], [1.0, 0.0, 0.0, 0.0]), _block(g[:, high], [0.0, -1.0, 0.0, 0.0])]
@@ -294,7 +326,6 @@ class Climber:
             rights.append(values[near] - least - INSIDE)
         raw = self.evaluator.path.weight[self.evaluator.path.headline]
         weight = raw / raw.sum()
-        scale = float(np.nanmean(rows.stiffness))
         floors = (goal.floors / scale) + (0.0 if goal.weights is None else INSIDE)
         soft = (1.0, 0.0) if goal.weights is None else (0.0, -1.0)  # the common surplus t, or the slack
         if np.isfinite(scale):
@@ -323,6 +354,43 @@ class Climber:
             if np.mean(~inside) >= 0.98 * self.rules.extrapolated:
                 kept.append((law[inside], gradient.law[:, cutting][:, inside], 0.0))
         return kept
+
+
+def least_cost(
+    cost: FloatArray, matrix: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray | None:
+    """The x (n,) of least `cost` . x with `matrix` x <= `right` (m rows) and `low` <= x <= `high`, all finite.
+
+    The dual simplex method in the form of a working set: n rows that hold as equations, at first the bounds that the
+    cost leans on; the row that is broken most comes in, the one whose multiplier reaches zero first goes out (Nocedal
+    and Wright, Numerical Optimization, 2006, chapter 13, problem 13.6; Lemke 1954). For some ten unknowns and a
+    thousand rows it takes a tenth of the time of a general solver, most of which sets up. None where nothing keeps all
+    rows, or no end is found.
+    """
+    n = len(cost)
+    leaning = cost + PERTURBATION * np.arange(1, n + 1)  # equal multipliers could go round in a circle
+    rows = np.concatenate([matrix, np.eye(n), -np.eye(n)])
+    bounds = np.concatenate([right, high, -low])
+    working = len(matrix) + np.where(leaning < 0.0, np.arange(n), np.arange(n, 2 * n))
+    inverse = np.diag(np.where(leaning < 0.0, 1.0, -1.0))
+    for pivot in range(MOST_PIVOTS):
+        if pivot % 20 == 19:  # what the updates have rounded away
+            inverse = np.linalg.inv(rows[working])
+        x = inverse @ bounds[working]
+        broken = rows @ x - bounds
+        worst = int(broken.argmax())
+        if broken[worst] <= TOLERANCE:
+            return np.asarray(x)
+        multipliers, share = -leaning @ inverse, rows[worst] @ inverse
+        ratio = np.where(share > TOLERANCE, np.maximum(multipliers, 0.0) / np.maximum(share, TOLERANCE), np.inf)
+        out = int(ratio.argmin())
+        if not np.isfinite(ratio[out]):
+            return None
+        working[out] = worst
+        change = share.copy()
+        change[out] -= 1.0
+        inverse = inverse - np.outer(inverse[:, out] / share[out], change)
+    return None
 
 
 def _block(slopes: FloatArray, rest: list[float]) -> FloatArray:
@@ -357,12 +425,17 @@ def thin(objectives: FloatArray, rows: IntArray, points: int, best: int = -1) ->
     return np.asarray(rows[np.sort(np.array(chosen))])
 
 
-def apart(bounds: Bounds, placements: FloatArray, count: int) -> list[int]:
-    """The first of ranked placements, and the best of the others that are not beside one chosen."""
-    unit = bounds.unit(placements)
+def apart(bounds: Bounds, placements: FloatArray, count: int, distance: float = 0.1) -> list[int]:
+    """Rows of ranked placements: the first, and the best of the others that are not beside one chosen.
+
+    `distance` in shares of the ranges.
+    """
+    unit, whole_turn = bounds.unit(placements), bounds.round[bounds.free]
     chosen: list[int] = []
     for i in range(len(unit)):
-        if all(np.abs(unit[i] - unit[j]).max(initial=0.0) > 0.1 for j in chosen):
+        away = np.abs(unit[chosen] - unit[i])
+        away = np.where(whole_turn, np.minimum(away, 1.0 - away), away)
+        if (away.max(axis=1, initial=0.0) > distance).all():
             chosen.append(i)
         if len(chosen) == count:
             break

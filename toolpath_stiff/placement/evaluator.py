@@ -11,29 +11,17 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from toolpath_stiff.analysis.loads import Load, load_directions
+from toolpath_stiff.analysis.loads import Load, geometric_directions
 from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.machine.kinematics import neutral_axes, solve_struts, solve_struts_at
-from toolpath_stiff.machine.limits import (
-    AXES,
-    FRAME,
-    PLATFORM,
-    SINGULARITY,
-    STRUT,
-    Limit,
-    distinct_limits,
-    reach,
-    smallest_margin,
-)
+from toolpath_stiff.machine.kinematics import solve_struts
+from toolpath_stiff.machine.limits import gauge_of, reach
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.stiffness import closed_form, compiled, core
+from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 POSES_AT_A_TIME = 30_000  # fits the processor's cache
-# Evaluations of the whole path in a search, about: says whether numba's half a second is earned back.
-EVALUATIONS = 300
 
 
 @dataclass(frozen=True)
@@ -105,6 +93,23 @@ class PlacedRows:
     margin: FloatArray
     clearance: FloatArray
 
+    def take(self, rows: int | slice) -> PlacedRows:
+        """Some of the placements; of a single one arrays with one row."""
+        some = slice(rows, rows + 1) if isinstance(rows, int) else rows
+        return PlacedRows(*(getattr(self, f.name)[some] for f in fields(self)))
+
+    def slopes(self, here: PlacedRows, steps: FloatArray) -> PlacedRows:
+        """Derivatives by differences: these less those of one placement, over the steps (k,) that lie between."""
+        with np.errstate(invalid="ignore"):
+            return PlacedRows(
+                *((getattr(self, f.name) - getattr(here, f.name)) / steps[:, None] for f in fields(PlacedRows))
+            )
+
+    def less(self, slopes: PlacedRows, step: FloatArray) -> PlacedRows:
+        """These less what derivatives (d rows) make of a step (d,)."""
+        with np.errstate(invalid="ignore"):
+            return PlacedRows(*(getattr(self, f.name) - step @ getattr(slopes, f.name) for f in fields(PlacedRows)))
+
 
 class Evaluator:
     """Evaluates placements of one path and counts the poses that this took."""
@@ -116,33 +121,27 @@ class Evaluator:
         load: Load,
         force: float,
         keepouts: tuple[Keepout, ...] = (),
-        whole: int | None = None,
     ) -> None:
-        """`whole`: samples of the whole path, where `path` is only some of it."""
         self.model, self.path, self.load, self.force, self.keepouts = model, path, load, force, keepouts
         self.poses = 0
-        machine = model.machine
-        self.compiled = EVALUATIONS * (whole or len(path)) > core.COMPILED_FROM and compiled.available()
         # These two ask the compliance for a direction, the second at plunges.
         self.direct = core.is_closed_form(model) and load.kind not in ("softest", "normal")
         # A still sample has no direction; none of them is a headline sample, so any direction does.
         still = ~np.asarray(path.tangent.any(axis=1))
-        self.tangent = np.where(still[:, None], np.array([0.0, 0.0, 1.0]), path.tangent)
-        self.abc = np.concatenate([path.abc, path.anchored.abc])
-        self.turned = rotation_matrices(self.abc) if self.abc.any() else None
-        self.tool_length = np.concatenate([path.tool_length, path.anchored.tool_length])
-        self.kernels = [
-            (rows, float(self.tool_length[rows[0]]), closed_form.prepare(machine, float(self.tool_length[rows[0]])))
-            for rows in _groups(self.tool_length)
-        ]
-        self.limits = distinct_limits(machine)
-        self.axes = neutral_axes(machine)
-        neutral = solve_struts_at(machine, machine.limits.neutral_pose)
-        self.neutral_determinant = float(np.abs(np.linalg.det(neutral.jacobian[0])))
+        tangent = np.where(still[:, None], np.array([0.0, 0.0, 1.0]), path.tangent)
+        self.position, self.tangent = (np.ascontiguousarray(values.T) for values in (path.position, tangent))
+        abc = np.concatenate([path.abc, path.anchored.abc])
+        self.turned = np.ascontiguousarray(np.moveaxis(rotation_matrices(abc), 0, -1)) if abc.any() else None
+        tool_length = np.concatenate([path.tool_length, path.anchored.tool_length])
+        self.of_one_tool = _groups(tool_length)
+
+    def __len__(self) -> int:
+        """Samples, the anchored ones among them."""
+        return len(self.path) + len(self.path.anchored)
 
     def figures(self, placements: FloatArray) -> PlacementFigures:
         """Figures of placements (k, 6) m and rad."""
-        group = max(1, POSES_AT_A_TIME // max(len(self.abc), 1))
+        group = max(1, POSES_AT_A_TIME // max(len(self), 1))
         return PlacementFigures.joined(
             [
                 self.summary(self.rows(placements[start : start + group]))
@@ -153,39 +152,30 @@ class Evaluator:
     def rows(self, placements: FloatArray) -> PlacedRows:
         """What each sample does at placements (k, 6) m and rad; all in memory at once."""
         path, k = self.path, len(placements)
-        m = len(path)
-        self.poses += k * len(self.abc)
+        m, n = len(path), len(self)
+        self.poses += k * n
         turn = rotation_matrices(placements[:, 3:])
-        position = np.concatenate(
-            [
-                path.position @ np.swapaxes(turn, 1, 2) + placements[:, None, :3],
-                path.anchored.placed(turn, placements[:, :3]),
-            ],
-            axis=1,
-        )
-        tangent = self.tangent @ np.swapaxes(turn, 1, 2)
+        position, motion = np.empty((3, k, n)), np.zeros((3, k, n))
+        np.add(_turned(turn, self.position), placements[:, :3].T[:, :, None], out=position[:, :, :m])
+        position[:, :, m:] = np.moveaxis(path.anchored.placed(turn, placements[:, :3]), -1, 0)
+        motion[:, :, :m], motion[2, :, m:] = _turned(turn, self.tangent), 1.0
         rotation = self._orientations(placements, turn)
-        along, margin, law = (np.full(position.shape[:2], np.nan) for _ in range(3))
-        for rows, tool, kernel in self.kernels:
-            some = None if rotation is None else rotation[:, rows].reshape(-1, 3, 3)
-            tip = position[:, rows].reshape(-1, 3)
-            motion = np.zeros((k, len(rows), 3))
-            rigid = rows < m
-            motion[:, rigid] = tangent[:, rows[rigid]]
-            motion[:, ~rigid, 2] = 1.0
-            found = self._kernel_rows(kernel, tool, tip, motion.reshape(-1, 3), some)
-            for target, values in zip((along, margin, law), found, strict=True):
+        along, margin, law = (np.empty((k, n)) for _ in range(3))
+        for rows, tool in self.of_one_tool:
+            some = None if rotation is None else rotation[:, :, rows].reshape(9, -1)
+            tip, towards = position[:, :, rows].reshape(3, -1), motion[:, :, rows].reshape(3, -1)
+            for target, values in zip((along, margin, law), self._kernel_rows(tool, tip, towards, some), strict=True):
                 target[:, rows] = values.reshape(k, -1)
         stiffness = np.full((k, m), np.nan)
         head = path.headline
         if self.direct:
             with np.errstate(divide="ignore"):
-                stiffness[:, head] = 1.0 / along[:, :m][:, head]
+                np.divide(1.0, along[:, :m], out=stiffness, where=head)
         else:
-            stiffness[:, head] = self._asked(position[:, :m][:, head], tangent[:, head], rotation, margin[:, :m])
-        clearance = np.full(position.shape[:2], np.inf)
+            stiffness[:, head] = self._asked(position[:, :, :m], motion[:, :, :m], rotation, margin[:, :m])
+        clearance = np.full((k, n), np.inf)
         for box in self.keepouts:
-            np.minimum(clearance, clearances(box, position), out=clearance)
+            np.minimum(clearance, clearances(box, np.moveaxis(position, 0, -1)), out=clearance)
         return PlacedRows(stiffness, law[:, :m], margin, clearance)
 
     def summary(self, rows: PlacedRows) -> PlacementFigures:
@@ -213,88 +203,73 @@ class Evaluator:
             extrapolated=outside,
         )
 
+    def deciding_rows(self, placement: FloatArray, stretches: int) -> IntArray:
+        """Rising samples that decide at a placement (6,): of each of so many stretches the extremes of what counts."""
+        path, placed = self.path, self.rows(placement[None])
+        head, cuts, everything = np.flatnonzero(path.headline), np.flatnonzero(path.cutting), np.arange(len(path))
+        counts = [(head, placed.stiffness), (head, -placed.stiffness), (everything, placed.margin), (cuts, placed.law)]
+        if self.keepouts:
+            counts.append((everything, placed.clearance))
+        parts = [(part, values[0]) for rows, values in counts for part in np.array_split(rows, stretches) if len(part)]
+        return np.unique([part[int(np.argmin(values[part]))] for part, values in parts])
+
     def _orientations(self, placements: FloatArray, turn: FloatArray) -> FloatArray | None:
-        """(k, m + q, 3, 3) R' = Q R Rz(-C), the rule of `path`; None: all vertical."""
-        if self.turned is None and not placements[:, 3:5].any():
-            return None
-        own = np.broadcast_to(np.eye(3), (len(self.abc), 3, 3)) if self.turned is None else self.turned
-        back = rotation_about_z(-placements[:, 5])
-        return np.asarray(turn[:, None] @ own[None] @ back[:, None])
+        """(9, k, m + q) rows of R' = Q R Rz(-C), the rule of `path`; None: all vertical."""
+        k, n = len(placements), len(self)
+        if self.turned is None:
+            if not placements[:, 3:5].any():
+                return None
+            one = turn @ rotation_about_z(-placements[:, 5])
+            return np.repeat(one.reshape(k, 9).T[:, :, None], n, axis=2)
+        found = np.empty((3, 3, k, n))
+        first, second, found[:, 2] = (_turned(turn, self.turned[:, column]) for column in range(3))
+        cosine, sine = np.cos(placements[:, 5])[:, None], np.sin(placements[:, 5])[:, None]
+        found[:, 0] = cosine * first - sine * second
+        found[:, 1] = sine * first + cosine * second
+        return found.reshape(9, k, n)
 
     def _kernel_rows(
-        self,
-        kernel: closed_form.ClosedForm,
-        tool: float,
-        tip: FloatArray,
-        motion: FloatArray,
-        rotation: FloatArray | None,
+        self, tool: float, tip: FloatArray, motion: FloatArray, rotation: FloatArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Compliance along the load, margin and law of n poses with one tool."""
+        """Compliance along the load, margin and law of n poses with one tool; (3, n), (3, n), (9, n)."""
         machine = self.model.machine
-        direction = load_directions(self.load, np.empty((0, 3, 3)), tip, rotation, motion)[0] if self.direct else motion
-        columns = np.ascontiguousarray(tip.T)
-        if self.compiled:
-            turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
-            towards = np.ascontiguousarray(direction.T)
-            along, determinant, lengths, good = compiled.compliance_along_columns(kernel, columns, towards, turns)
-        else:
-            along, determinant, by_pose, good = closed_form.compliance_along(kernel, tip, direction, rotation)
-            lengths = np.ascontiguousarray(by_pose.T)
-        margin = self._margins(columns, rotation, lengths, determinant / self.neutral_determinant, tool)
-        law = machine.strut_law.room(lengths).min(axis=0)
+        direction = motion
+        if self.direct and self.load.kind != "tangential":
+            turns = None if rotation is None else rotation.T.reshape(-1, 3, 3)
+            direction = np.ascontiguousarray(geometric_directions(self.load, tip.T, turns, motion.T)[0].T)
+        # The same kernel whatever is installed: a search amplifies the last digit, and gives the same everywhere.
+        along, determinant, lengths, good = core.compliance_along_columns(
+            machine, tip, direction, rotation, tool, "closed_form"
+        )
+        margin = gauge_of(machine).margin(tip, lengths, determinant, rotation, tool)
+        law = machine.strut_law.room_of(lengths.min(axis=0), lengths.max(axis=0))
         doubtful = np.flatnonzero(~good & ~(margin < 0.0))  # ill-conditioned for the closed form: pivot
         if len(doubtful):
-            turns = None if rotation is None else rotation[doubtful]
-            struts = solve_struts(machine, tip[doubtful], turns, tool)
-            margin[doubtful] = reach(machine, tip[doubtful], struts, turns).margin
+            there = tip[:, doubtful].T
+            turns = None if rotation is None else rotation[:, doubtful].T.reshape(-1, 3, 3)
+            margin[doubtful] = reach(machine, there, solve_struts(machine, there, turns, tool), turns).margin
             if self.direct:
-                along[doubtful] = 1.0 / self._evaluated(tip[doubtful], motion[doubtful], turns, tool)
+                along[doubtful] = 1.0 / self._evaluated(there, motion[:, doubtful].T, turns, tool)
         return along, margin, law
 
-    def _margins(
-        self, position: FloatArray, rotation: FloatArray | None, lengths: FloatArray, index: FloatArray, tool: float
-    ) -> FloatArray:
-        """(n,) smallest margin to any limit, as `machine.limits.reach` has it; poses last: (3, n), (6, n), (n,)."""
-
-        def extreme(limit: Limit) -> FloatArray:
-            if limit.quantity == STRUT:
-                return np.asarray(lengths.min(axis=0) if limit.lower else lengths.max(axis=0))
-            if limit.quantity in (FRAME, PLATFORM):
-                along = self._along_axes(limit.quantity == PLATFORM, position, rotation, tool)
-                return np.asarray(np.arccos(np.clip((along / lengths).min(axis=0), -1.0, 1.0)))
-            return index if limit.quantity == SINGULARITY else position[AXES.index(limit.quantity)]
-
-        return np.broadcast_to(smallest_margin(self.limits, extreme), index.shape).copy()
-
-    def _along_axes(
-        self, of_platform: bool, position: FloatArray, rotation: FloatArray | None, tool: float
-    ) -> FloatArray:
-        """(6, n) m, components of the struts R p + tip - b along the joints' neutral axes."""
-        machine = self.model.machine
-        arms, frame, axes = machine.platform_joints_for(tool), machine.frame_joints, self.axes[of_platform]
-        if rotation is None:
-            return np.asarray(axes @ position + np.einsum("id,id->i", arms - frame, axes)[:, None])
-        turns = rotation.reshape(-1, 9).T
-        if of_platform:  # the axes turn with the platform: (R a) . (R p + tip - b)
-            local = np.einsum("ncd,cn->dn", rotation, position)
-            fixed = np.einsum("ic,id->icd", frame, axes).reshape(6, 9) @ turns
-            return np.asarray(axes @ local - fixed + np.einsum("id,id->i", axes, arms)[:, None])
-        turned = np.einsum("ic,id->icd", axes, arms).reshape(6, 9) @ turns
-        return np.asarray(axes @ position + turned - np.einsum("id,id->i", axes, frame)[:, None])
-
     def _asked(
-        self, position: FloatArray, tangent: FloatArray, rotation: FloatArray | None, margin: FloatArray
+        self, position: FloatArray, motion: FloatArray, rotation: FloatArray | None, margin: FloatArray
     ) -> FloatArray:
         """(k, h) stiffness at the headline samples by `analysis.poses.evaluate`, where all cuts are within reach."""
-        found = np.full(position.shape[:2], np.nan)
-        possible = np.flatnonzero((margin[:, self.path.cutting] >= 0.0).all(axis=1))
+        path = self.path
+        found = np.full((len(margin), int(path.headline.sum())), np.nan)
+        possible = np.flatnonzero((margin[:, path.cutting] >= 0.0).all(axis=1))
         if len(possible):
-            turns = None
-            if rotation is not None:
-                turns = rotation[possible][:, : len(self.path)][:, self.path.headline].reshape(-1, 3, 3)
-            tools = np.tile(self.path.tool_length[self.path.headline], len(possible))
-            tip, motion = (values[possible].reshape(-1, 3) for values in (position, tangent))
-            found[possible] = self._evaluated(tip, motion, turns, tools).reshape(len(possible), -1)
+            head = np.flatnonzero(path.headline)
+
+            def some(columns: FloatArray) -> FloatArray:
+                """Rows of the headline samples at the possible placements."""
+                return columns[:, possible][:, :, head].reshape(len(columns), -1).T
+
+            turns = None if rotation is None else some(rotation).reshape(-1, 3, 3)
+            tools = np.tile(path.tool_length[head], len(possible))
+            tip, towards = some(position), some(motion)
+            found[possible] = self._evaluated(tip, towards, turns, tools).reshape(len(possible), -1)
         return found
 
     def _evaluated(
@@ -304,10 +279,18 @@ class Evaluator:
         return evaluate(self.model, tip, abc, motion, tool, self.load, self.force).stiffness
 
 
-def _groups(tool_length: FloatArray) -> list[IntArray]:
-    """Rows of each tool length; nan counts as one."""
-    number = np.unique(tool_length, return_inverse=True)[1].ravel()
-    return [np.flatnonzero(number == i) for i in range(number.max(initial=-1) + 1)]
+def _turned(turn: FloatArray, columns: FloatArray) -> FloatArray:
+    """(3, k, n) the columns (3, n) turned by k rotations (k, 3, 3)."""
+    k = len(turn)
+    return np.asarray(turn.swapaxes(0, 1).reshape(3 * k, 3) @ columns).reshape(3, k, -1)
+
+
+def _groups(tool_length: FloatArray) -> list[tuple[IntArray | slice, float]]:
+    """Rows of each tool length, and the length; nan counts as one."""
+    lengths, number = np.unique(tool_length, return_inverse=True)
+    if len(lengths) == 1:
+        return [(slice(None), float(lengths[0]))]
+    return [(np.flatnonzero(number == i), float(length)) for i, length in enumerate(lengths)]
 
 
 def clearances(box: Keepout, position: FloatArray) -> FloatArray:

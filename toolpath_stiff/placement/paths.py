@@ -29,6 +29,7 @@ Read = Callable[[Pose], Program]  # the program as it is read where its zero sit
 SHIFT = np.array([0.011, 0.017, 0.023, 0.0, 0.0, 0.0])  # m; tells the axes of a point that follow the work from others
 LEG_SAMPLES = 40  # of an anchored rapid, at most; 25 mm apart over a metre, and reach changes slowly
 
+MOST_COMPARED = 6000  # samples of a long path that are compared with each other, evenly spread
 CORNER = rad_from_deg(10.0)  # a sharper one is kept before samples along straight cuts are
 SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
 
@@ -276,6 +277,17 @@ def telling_path(path: WorkPath, count: int) -> WorkPath:
     return replace(few, weight=np.concatenate([weight, np.zeros(len(others))]), anchored=anchored)
 
 
+def with_rows(few: WorkPath, whole: WorkPath, rows: IntArray) -> WorkPath:
+    """A path that stands for the whole, with some samples of the whole added, which stand for no length."""
+    some = whole.take(rows)
+    columns = {
+        f.name: np.concatenate([getattr(few, f.name), getattr(some, f.name)])
+        for f in fields(few)
+        if f.name not in ("anchored", "weight")
+    }
+    return WorkPath(**columns, weight=np.concatenate([few.weight, np.zeros(len(rows))]), anchored=few.anchored)
+
+
 def _spread(path: WorkPath, rows: IntArray, count: int) -> tuple[IntArray, FloatArray]:
     """At most `count` of the rows, spread over position and direction, and the weights that they take over.
 
@@ -284,6 +296,13 @@ def _spread(path: WorkPath, rows: IntArray, count: int) -> tuple[IntArray, Float
     """
     if len(rows) <= count:
         return rows, path.weight[rows]
+    if len(rows) > MOST_COMPARED:  # those between stand at their neighbours
+        number = np.arange(len(rows)) * MOST_COMPARED // len(rows)
+        first = np.flatnonzero(np.diff(number, prepend=-1))
+        carried = np.bincount(number, weights=path.weight[rows]).astype(float)
+        rows = rows[(first + np.append(first[1:], len(number)) - 1) // 2]
+    else:
+        carried = path.weight[rows]
     position = path.position[rows]
     size = max(float(np.ptp(position, axis=0).max()), 1e-9)
     features = np.concatenate([position / size, 0.5 * path.tangent[rows], path.abc[rows]], axis=1)
@@ -296,7 +315,7 @@ def _spread(path: WorkPath, rows: IntArray, count: int) -> tuple[IntArray, Float
         distance[closer], nearest[closer] = apart[closer], i
         if i + 1 < count:
             chosen.append(int(np.argmax(distance)))
-    weight = np.bincount(nearest, weights=path.weight[rows], minlength=count).astype(float)
+    weight = np.bincount(nearest, weights=carried, minlength=count).astype(float)
     return rows[np.array(chosen)], weight
 
 

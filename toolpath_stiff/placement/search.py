@@ -21,19 +21,24 @@ from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, front_rows, thin
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures, clearances
-from toolpath_stiff.placement.paths import WorkPath, placed_path, telling_path
+from toolpath_stiff.placement.paths import WorkPath, placed_path, telling_path, with_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
-SCOUTS = 1000  # placements tried at random before the evolution
+SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
 GENERATIONS, CHILDREN, ARCHIVE = 36, 60, 120
 WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last generation
-CLIMB_STEPS, FINAL_STEPS = 10, 6
-SIMPLEX_EVALUATIONS = 60  # at the end of the climb to the recommendation
+# Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
+STARTS, FINALISTS = 6, 4
+HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 10, 6
+APART = 0.1  # of each range, where they start
+BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
 FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
-STARTS = 5  # climbs towards the recommendation
+SHORT = 3000  # samples of a path that is climbed on as a whole; of a longer one, on what stands for it
+ROUNDS, STRETCHES = 2, 120  # of that: how often it is told anew, and stretches whose extremes join it
+WHOLE_POSES = 2_000_000  # about, of the whole path to which the front's candidates are thinned
 NO_WORSE = 1e-9  # of the mean: what rounding does to a figure that stays as it was
 NO_FLOORS = np.full(3, -np.inf)
 
@@ -118,15 +123,22 @@ class _Search:
     def sampled(self, path: WorkPath) -> None:
         """Evaluators of a path."""
         self.path = path
-        parts = {"whole": path, "middle": telling_path(path, POLISH_SAMPLES), "few": telling_path(path, SCOUT_SAMPLES)}
-        arguments = (self.load, self.force, self.asked.keepouts, len(path))
         before = self.poses
-        self.evaluators = {name: Evaluator(self.model, part, *arguments) for name, part in parts.items()}
-        self.evaluators["whole"].poses = before
+        whole = self.evaluator(path)
+        whole.poses = before
+        middle, few = (
+            self.evaluator(telling_path(path, count)) if len(path) > count else whole
+            for count in (POLISH_SAMPLES, SCOUT_SAMPLES)
+        )
+        self.evaluators = {"whole": whole, "middle": middle, "few": few}
+
+    def evaluator(self, path: WorkPath) -> Evaluator:
+        """An evaluator of a part of the path."""
+        return Evaluator(self.model, path, self.load, self.force, self.asked.keepouts)
 
     @property
     def poses(self) -> int:
-        return sum(evaluator.poses for evaluator in self.evaluators.values())
+        return sum(evaluator.poses for evaluator in set(self.evaluators.values()))
 
     def climber(self, name: str) -> Climber:
         return Climber(self.evaluators[name], self.bounds, self.rules)
@@ -174,7 +186,7 @@ def search_placements(
     search = _Search(model, path, load, force, bounds, asked, rules=Rules(asked.margin))
     search.sampled(path)
     now = None if present is None else search.evaluators["whole"].figures(present[None])
-    unit = rng.uniform(size=(SCOUTS if len(bounds.free) else 1, len(bounds.free)))
+    unit = rng.uniform(size=(max(SCOUTS * len(bounds.free), 1), len(bounds.free)))
     scouts = bounds.placements(unit)
     held = present is not None and bounds.holds(present)
     if present is not None and held:
@@ -184,12 +196,24 @@ def search_placements(
     report(1, 4)
     candidates = _evolved(search, scouts, rng)
     report(2, 4)
-    ends = _climbed(search, candidates, now)
+    ends = _climbed(search, np.vstack([candidates, scouts]), now)
     report(3, 4)
-    candidates = np.vstack([candidates, ends] + ([present[None]] if present is not None and held else []))
+    candidates = np.vstack(
+        [_for_the_front(search, candidates), ends] + ([present[None]] if present is not None and held else [])
+    )
     found = _result(search, candidates, now, unmended)
     report(4, 4)
     return found
+
+
+def _for_the_front(search: _Search, candidates: FloatArray) -> FloatArray:
+    """Those of the candidates that are evaluated on the whole path: of a long one no more than the front needs."""
+    most = max(search.asked.points, WHOLE_POSES // max(len(search.path), 1))
+    if len(candidates) <= most:
+        return candidates
+    figures = search.evaluators["middle"].figures(candidates)
+    rows = front_rows(figures, search.kept(figures))
+    return candidates[thin(figures.take(rows).objectives, rows, most) if len(rows) else slice(0, most)]
 
 
 def _result(
@@ -308,33 +332,67 @@ def _survivors(
 def _climbed(search: _Search, candidates: FloatArray, now: PlacementFigures | None) -> FloatArray:
     """The recommendation and the ends of the front, climbed to from several of the candidates."""
     asked = defaults.OBJECTIVES[search.asked.objective]
+    figures = search.evaluators["few"].figures(candidates)
     ends = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
-    figures = search.evaluators["middle"].figures(candidates)
     if now is not None and now.margin[0] >= 0.0:
         goal = Goal(asked, now.objectives[0])
-        found = _climbed_to(search, candidates, figures, goal, STARTS)
+        found = _climbed_to(search, candidates, figures, goal)
         if goal.worsening(search.evaluators["whole"].figures(found)).min() > 0.0:
-            found = np.vstack([found, _climbed_to(search, candidates, figures, Goal(None, goal.floors), STARTS)])
+            found = np.vstack([found, _climbed_to(search, candidates, figures, Goal(None, goal.floors))])
     else:
-        found = _climbed_to(search, candidates, figures, Goal(asked, NO_FLOORS), STARTS)
-    return np.vstack([found, *(_climbed_to(search, candidates, figures, goal, 1) for goal in ends)])
+        found = _climbed_to(search, candidates, figures, Goal(asked, NO_FLOORS))
+    return np.vstack([found, *(_climbed_to(search, candidates, figures, goal, end=True) for goal in ends)])
 
 
 def _climbed_to(
-    search: _Search, candidates: FloatArray, figures: PlacementFigures, goal: Goal, starts: int
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, goal: Goal, end: bool = False
 ) -> FloatArray:
-    """Where climbs from the best candidates end, on some hundred samples; and the best of them on the whole path.
+    """Where climbs from the best candidates end: many on few samples, few on more, one on the whole path.
 
-    `figures` are those of the candidates on these samples.
+    `figures` are those of the candidates on few samples. There are several hills, and a slope that few samples show is
+    not always the whole path's. An `end` of the front is worth fewer climbs than the recommendation.
     """
-    middle, whole = search.climber("middle"), search.climber("whole")
-    order = _ranked(search, goal, figures)
-    first = candidates[order][apart(search.bounds, candidates[order], starts)]
-    found = np.array([middle.climb(place, goal, CLIMB_STEPS) for place in first])
+    few, middle, whole = (search.climber(name) for name in ("few", "middle", "whole"))
+    free = len(search.bounds.free)
+    starts, finalists = (free, 2) if end else (STARTS * free, FINALISTS)
+    found = _best_apart(search, candidates, figures, goal, starts, APART)
+    for _ in range(HEATS):  # the better half of the climbs, those up the same hill counted once, goes on
+        climbed = few.climb(found, goal, CLIMB_STEPS)
+        starts = max((len(found) + 1) // 2, finalists)
+        found = _best_apart(search, climbed, few.evaluator.figures(climbed), goal, starts, BASIN)
+    if middle.evaluator is not few.evaluator:
+        found = middle.climb(found[:finalists], goal, POLISH_STEPS)
     best = found[_ranked(search, goal, whole.evaluator.figures(found))[0]]
-    return np.vstack(
-        [found, whole.climb(best, goal, FINAL_STEPS, FINAL_REGION, SIMPLEX_EVALUATIONS if starts > 1 else 0)]
-    )
+    return np.vstack([found, _finished(search, best, goal)])
+
+
+def _best_apart(
+    search: _Search, placements: FloatArray, figures: PlacementFigures, goal: Goal, count: int, distance: float
+) -> FloatArray:
+    """The best of some placements for a goal that are not beside each other."""
+    ranked = placements[_ranked(search, goal, figures)]
+    return ranked[apart(search.bounds, ranked, count, distance)]
+
+
+def _finished(search: _Search, best: FloatArray, goal: Goal) -> FloatArray:
+    """(k, 6) the end of a climb on the whole path, from near its top.
+
+    A long path is climbed on samples that stand for it, to which those are added that decide on it there: the extremes
+    of each of its stretches (an exchange method of semi-infinite programming; Hettich and Kortanek, SIAM Review 35
+    (1993) 380).
+    """
+    whole = search.climber("whole")
+    if len(search.path) <= SHORT:
+        return whole.climb(best[None], goal, FINAL_STEPS, FINAL_REGION)
+    found = best[None]
+    middle, everything = search.evaluators["middle"], search.evaluators["whole"]
+    for _ in range(ROUNDS):
+        deciding = everything.deciding_rows(found[-1], STRETCHES)
+        evaluator = search.evaluator(with_rows(middle.path, search.path, deciding))
+        climber = Climber(evaluator, search.bounds, search.rules)
+        found = np.vstack([found, climber.climb(found[-1:], goal, FINAL_STEPS, FINAL_REGION)])
+        middle.poses += evaluator.poses
+    return found[1:]
 
 
 def _ranked(search: _Search, goal: Goal, figures: PlacementFigures) -> IntArray:

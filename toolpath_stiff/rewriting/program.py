@@ -239,6 +239,8 @@ def _text_of(program: Program) -> tuple[str, str]:
 # -- offset blocks -----------------------------------------------------------------------------------------------------
 
 OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
+# What can hold a work offset or G10 once comments and blanks are out: tells the lines that are worth reading again.
+MAY_BE_OFFSET, COMMENTS = re.compile(r"[Gg]\+?0*[15]\d"), re.compile(r"\([^)]*\)")
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
 NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
 USE_WRITE = "use --write, which transforms the program itself"
@@ -325,8 +327,8 @@ def _not_about_z(program: Program, placement: Pose) -> str:
 def _not_g54_alone(program: Program) -> str:
     """Why setting G54 would not move the whole program, or ""."""
     for number, text in enumerate(program.source, 1):
-        if "5" not in text and "10" not in text:
-            continue  # neither a work offset nor G10
+        if not MAY_BE_OFFSET.search("".join(COMMENTS.sub("", text).split())):
+            continue
         for code in _codes(text, number, program):
             if code in OTHER_OFFSETS:
                 return f"the program uses {code} beside G54 (line {number}), which would stay where it is: {USE_WRITE}"

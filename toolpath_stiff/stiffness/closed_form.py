@@ -56,7 +56,27 @@ class ClosedForm:
 
 
 def prepare(machine: Machine, tool_length: float = np.nan) -> ClosedForm:
-    """The kernel's form of a machine with a tool of that length (m; nan: the reference tool)."""
+    """The kernel's form of a machine with a tool of that length (m; nan: the reference tool), made once a machine."""
+    key = ("closed form", "reference" if np.isnan(tool_length) else float(tool_length))
+    if key not in machine.derived:
+        order, arm = _split(machine)
+        machine.derived[key] = ClosedForm(
+            order=order,
+            frame=np.ascontiguousarray(machine.frame_joints[list(order)].T),
+            platform=np.ascontiguousarray(machine.platform_joints_for(tool_length)[list(order)].T),
+            intercept=machine.strut_law.intercept,
+            slope=machine.strut_law.slope,
+            arm=arm,
+        )
+    found: ClosedForm = machine.derived[key]
+    return found
+
+
+def _split(machine: Machine) -> tuple[tuple[int, ...], float]:
+    """Struts, triplet A first, by the best determinants at the neutral pose; m, the size of the arms."""
+    if "split" in machine.derived:
+        known: tuple[tuple[int, ...], float] = machine.derived["split"]
+        return known
     struts = solve_struts_at(machine, machine.limits.neutral_pose)
     directions, arms = struts.directions[0], struts.arms[0]
     arm = float(np.linalg.norm(machine.platform_joints - machine.platform_joints.mean(axis=0), axis=1).mean())
@@ -72,15 +92,8 @@ def prepare(machine: Machine, tool_length: float = np.nan) -> ClosedForm:
         return float(min(abs(leading), abs(np.linalg.det(rest)) / arm**3))
 
     best = max(combinations(range(6), 3), key=quality)
-    order = (*best, *(i for i in range(6) if i not in best))
-    return ClosedForm(
-        order=order,
-        frame=np.ascontiguousarray(machine.frame_joints[list(order)].T),
-        platform=np.ascontiguousarray(machine.platform_joints_for(tool_length)[list(order)].T),
-        intercept=machine.strut_law.intercept,
-        slope=machine.strut_law.slope,
-        arm=arm,
-    )
+    machine.derived["split"] = (*best, *(i for i in range(6) if i not in best)), arm
+    return _split(machine)
 
 
 class _Work:
@@ -120,12 +133,14 @@ def tip_compliance(
     compliance = np.empty((n, 3, 3))
     good = np.empty(n, dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for rows, tip, turn, work in _blocks(position, rotation):
+        for rows, work in _blocks(n):
+            tip = np.ascontiguousarray(position[rows].T)
+            turn = None if rotation is None else np.ascontiguousarray(np.moveaxis(rotation[rows], 0, -1))
             good[rows] = _tensor_block(kernel, tip, turn, work, compliance[rows])
     return compliance, good
 
 
-def compliance_along(
+def compliance_along_columns(
     kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Compliance along one direction a pose, with what the limits ask for; cheaper than the whole tensor.
@@ -135,24 +150,26 @@ def compliance_along(
     kernel
         From `prepare`.
     position, direction
-        (n, 3) m and unit vectors.
+        (3, n) m and unit vectors, poses last.
     rotation
-        (n, 3, 3); None: vertical spindle.
+        (9, n) rows of the rotation matrices one after the other; None: vertical spindle.
 
     Returns
     -------
     compliance, determinant, lengths, good
-        (n,) m/N; (n,) |det J| in m^3 (`kinematics.singularity_index` is its ratio to the neutral pose's); (n, 6) m,
+        (n,) m/N; (n,) |det J| in m^3 (`kinematics.singularity_index` is its ratio to the neutral pose's); (6, n) m,
         struts in the machine's order; (n,) as in `tip_compliance`.
     """
-    n = len(position)
-    compliance, determinant, lengths = np.empty(n), np.empty(n), np.empty((n, 6))
+    n = position.shape[1]
+    compliance, determinant, lengths = np.empty(n), np.empty(n), np.empty((6, n))
     good = np.empty(n, dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for rows, tip, turn, work in _blocks(position, rotation):
-            first, second = _eliminate(kernel, tip, turn, work)
-            lengths[rows, kernel.order] = work.length.T
-            force = _forces(work, np.ascontiguousarray(direction[rows].T))
+        for rows, work in _blocks(n):
+            turn = None if rotation is None else rotation[:, rows].reshape(3, 3, -1)
+            first, second = _eliminate(kernel, position[:, rows], turn, work)
+            for strut, values in zip(kernel.order, work.length, strict=True):
+                lengths[strut, rows] = values
+            force = _forces(work, direction[:, rows])
             law_holds = _strut_compliances(kernel, work)
             np.multiply(force, force, out=force)
             force *= work.six
@@ -168,18 +185,14 @@ def well_conditioned(kernel: ClosedForm, first: FloatArray, second: FloatArray) 
     return np.asarray((np.abs(first) > small) & (np.abs(second) > small * kernel.arm**3))
 
 
-def _blocks(
-    position: FloatArray, rotation: FloatArray | None
-) -> Iterator[tuple[slice, FloatArray, FloatArray | None, _Work]]:
-    """Rows of each block, its position (3, m) and rotation (3, 3, m) or None, and work arrays that it may overwrite."""
-    n = len(position)
+def _blocks(n: int) -> Iterator[tuple[slice, _Work]]:
+    """Rows of each block of n poses, and work arrays that it may overwrite."""
     work = _Work(min(BLOCK, n))
     for start in range(0, n, BLOCK):
         rows = slice(start, min(start + BLOCK, n))
         if rows.stop - start != work.length.shape[1]:
             work = _Work(rows.stop - start)
-        turn = None if rotation is None else np.ascontiguousarray(np.moveaxis(rotation[rows], 0, -1))
-        yield rows, np.ascontiguousarray(position[rows].T), turn, work
+        yield rows, work
 
 
 def _eliminate(
@@ -253,16 +266,17 @@ def _strut_compliances(kernel: ClosedForm, work: _Work) -> BoolArray:
 def _strut_geometry(kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None, work: _Work) -> None:
     """Arms r, directions u, moments r x u and lengths of the block."""
     arms, u, m, six = work.arms, work.directions, work.moments, work.six
-    for c in range(3):
-        if rotation is None:
-            arms[c] = kernel.platform[c][:, None]
-        else:
+    if rotation is None:
+        arms = kernel.platform[:, :, None]
+        np.add(position[:, None], (kernel.platform - kernel.frame)[:, :, None], out=u)
+    else:
+        for c in range(3):
             np.multiply(kernel.platform[0][:, None], rotation[c, 0], out=arms[c])
             for d in (1, 2):
                 np.multiply(kernel.platform[d][:, None], rotation[c, d], out=six)
                 arms[c] += six
-        np.add(arms[c], position[c], out=u[c])
-        u[c] -= kernel.frame[c][:, None]
+        np.add(arms, position[:, None], out=u)
+        u -= kernel.frame[:, :, None]
     np.multiply(u[0], u[0], out=work.length)
     for c in (1, 2):
         np.multiply(u[c], u[c], out=six)

@@ -20,7 +20,8 @@ from dataclasses import replace
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness import closed_form, exact
 from toolpath_stiff.stiffness.effects import guard
 from toolpath_stiff.stiffness.effects.contract import LoadPath
@@ -128,6 +129,27 @@ def _fast(
         turn = None if rotation is None else rotation[bad]
         compliance[bad] = _exact(model, position[bad], turn, tool_length, force)
     return compliance
+
+
+def compliance_along_columns(
+    machine: Machine,
+    position: FloatArray,
+    direction: FloatArray,
+    rotation: FloatArray | None,
+    tool_length: float,
+    route: str,
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Compliance of linear struts on a rigid platform along one direction a pose, with what the limits ask for.
+
+    Arguments and results as of `closed_form.compliance_along_columns`, of a machine with a tool of that length (m), by
+    one of the fast routes. Where a pose is not good the exact route must be asked.
+    """
+    kernel = closed_form.prepare(machine, tool_length)
+    if route == "compiled":
+        from toolpath_stiff.stiffness import compiled
+
+        return compiled.compliance_along_columns(kernel, position, direction, rotation)
+    return closed_form.compliance_along_columns(kernel, position, direction, rotation)
 
 
 def _exact(
