@@ -44,7 +44,7 @@ from toolpath_stiff.updating.inference.fits import (
     gain_in_standard_errors,
     held_out,
 )
-from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures
 from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
@@ -263,7 +263,7 @@ def _falls(before: Step, after: Step) -> bool:
 
 def dispersion(fit: Fit) -> float:
     """Weighted squares of a fit over their degrees of freedom, at least 1."""
-    squares = float(fit.residual @ fit.scatter.inverse @ fit.residual)
+    squares = float(fit.scatter.precision.squares(fit.residual))
     fitted = len(fit.free) + (2 if fit.law_free else 0)
     return max(1.0, squares / max(len(fit.residual) - fitted, 1))
 
@@ -334,8 +334,9 @@ class _Work:
             effects, _ = testable_effects(problem.predictor)
             families = score_families(problem, effects, base)
             gate = absolute_gate(
-                problem, base.residual, base.jacobian, Simulator.of(self.noise, problem.covariance, self.seed),
-                discrepancy_forms(problem.predictor), signatures(problem, families),
+                problem, base.residual, base.jacobian,
+                Simulator.of(self.noise, problem.scatter.covariance, self.seed),
+                Forms(discrepancy_forms(problem.predictor), problem.scatter.precision), signatures(problem, families),
             )  # fmt: skip
             self.fields[key] = problem, families, gate.gain_threshold
         return self.fields[key]

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import refine
-from toolpath_stiff.updating.inference.gates import Gate, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import (
     Family,
     Pair,
@@ -152,12 +152,12 @@ class Candidates:
     families
         All effects that do something to these data, the most likely first.
     forms
-        Forms that a discrepancy may take which no effect describes, in words -> covariance (n, n).
+        Forms that a discrepancy may take which no effect describes.
     """
 
     base: Fit
     families: tuple[Family, ...]
-    forms: Mapping[str, FloatArray]
+    forms: Forms
 
     @property
     def offered(self) -> list[Family]:
@@ -169,7 +169,8 @@ def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
     """Fit every effect with each of its choices beside the strut law."""
     base = problem.score_base()
     families = score_families(problem, effects, base)
-    return Candidates(base, tuple(families), discrepancy_forms(problem.predictor))
+    forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
+    return Candidates(base, tuple(families), forms)
 
 
 # -- fits --------------------------------------------------------------------------------------------------------------
@@ -225,7 +226,7 @@ class Gates:
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
     """The model alone, then single effects, then pairs: of the likeliest single that passes, else of the best ones."""
-    simulator = Simulator.of(noise, problem.covariance, seed)
+    simulator = Simulator.of(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
@@ -333,7 +334,7 @@ def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit
     freedom, n = noise.freedom, len(fit.residual)
     if not np.isfinite(freedom):
         return log_evidence
-    squares = -2.0 * fit.log_likelihood - problem.scatter.log_determinant
+    squares = -2.0 * fit.log_likelihood - problem.scatter.covariance.log_determinant
     return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.inference.covariances import Precision
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -345,10 +346,10 @@ LIKELY = 3.84  # 95 % quantile of chi-square with one degree of freedom
 
 @dataclass(frozen=True)
 class Sight:
-    """What these data can see: the base model's compliance (n,) and projected inverse covariance (n, n)."""
+    """What these data can see: the base model's compliance (n,) and the inverse covariance of what its refit leaves."""
 
     compliance: FloatArray
-    projected: FloatArray
+    projected: Precision
 
     def change(self, delta: FloatArray) -> FloatArray:
         """(..., n) change of ln compliance by added compliances (..., n)."""
@@ -356,8 +357,7 @@ class Sight:
 
     def length(self, change: FloatArray) -> FloatArray:
         """(...,) whitened length of changes (..., n) beside the strut law."""
-        squared = np.einsum("...i,...i->...", change @ self.projected, change)
-        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+        return np.asarray(np.sqrt(np.maximum(self.projected.squares(change), 0.0)))
 
 
 def _log_visible(lengths: FloatArray, longest: float) -> FloatArray:

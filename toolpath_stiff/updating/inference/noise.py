@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.defaults import CLAMPING, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -170,14 +171,12 @@ def _percent(repeat: float, clamping: float) -> str:
     return f"{100 * repeat:.2g} % a reading, {100 * clamping:.2g} % a clamping"
 
 
-def covariance(noise: Noise, predictor: Predictor, joints: FloatArray | None = None) -> FloatArray:
-    """(n, n) covariance of ln readings. `joints`: `predictor.joint_columns()`, if known already."""
-    same = predictor.data.clamp[:, None] == predictor.data.clamp[None, :]
+def covariance(noise: Noise, predictor: Predictor) -> Covariance:
+    """Of ln readings."""
     struts = noise.strut_spread * predictor.strut_columns()
-    shifted = noise.joint_error * (predictor.joint_columns() if joints is None else joints)
-    return np.asarray(
-        np.diag(noise.repeat**2) + noise.clamping**2 * same + struts @ struts.T + shifted @ shifted.T, dtype=float
-    )
+    shifted = noise.joint_error * predictor.joint_columns()
+    shared = np.ascontiguousarray(np.concatenate([struts, shifted], axis=1).T)
+    return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, shared)
 
 
 def repeat_groups(data: Measurements) -> NDArray[np.int64]:
@@ -262,9 +261,9 @@ def _maximum_likelihood(left: FloatArray, contrasts: FloatArray, same: NDArray[n
     return repeat_at(root**2), root * repeat_at(root**2), True
 
 
-# -- scatter as matrices -----------------------------------------------------------------------------------------------
+# -- scatter with wild readings ----------------------------------------------------------------------------------------
 #
-# The scatter of the readings as matrices, with wild readings found out fit by fit.
+# The scatter of the readings, with wild ones found out fit by fit.
 
 MOST_WILD = 0.05  # share of readings that may be taken for wild
 NEVER = 1e12  # price of a wild reading where there are none
@@ -272,14 +271,12 @@ NEVER = 1e12  # price of a wild reading where there are none
 
 @dataclass(frozen=True)
 class Scatter:
-    """The noise as matrices, with some readings taken for wild.
+    """The scatter of ln readings, with some readings taken for wild.
 
     Attributes
     ----------
-    inverse
-        (n, n) inverse covariance of ln readings.
-    log_determinant
-        Of the covariance.
+    covariance
+        With the wild readings' own scatter widened.
     widening
         (n,) variance that a wild reading adds.
     price
@@ -288,31 +285,32 @@ class Scatter:
         Readings taken for wild.
     """
 
-    inverse: FloatArray
-    log_determinant: float
+    covariance: Covariance
     widening: FloatArray
     price: float
     wild: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, noise: Noise, covariance: FloatArray) -> Scatter:
-        """From a noise model and its covariance (n, n)."""
-        from scipy.linalg import cho_factor, cho_solve
-
-        factor = cho_factor(covariance, lower=True)
-        inverse = cho_solve(factor, np.eye(len(covariance)))
+    def of(cls, noise: Noise, covariance: Covariance) -> Scatter:
+        """From a noise model and its covariance."""
         widening = (noise.outlier_width**2 - 1.0) * noise.repeat**2
         price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
-        return cls(0.5 * (inverse + inverse.T), float(2.0 * np.log(np.diag(factor[0])).sum()), widening, float(price))
+        return cls(covariance, widening, float(price))
+
+    @property
+    def precision(self) -> Precision:
+        """Inverse covariance."""
+        return self.covariance.precision
 
     def with_wild(self, residual: FloatArray, known: Scatter | None = None) -> Scatter:
         """With those readings taken for wild whose widening pays its price at these residuals (n,).
 
-        Where these are the wild readings of `known`, that is the answer: the matrix is not worked out again.
+        Where these are the wild readings of `known`, that is the answer: nothing is worked out again. One by one, the
+        most wild first, each by Sherman and Morrison's formula beside those before it.
         """
-        diagonal, determinant, wild = np.diag(self.inverse).copy(), self.log_determinant, list(self.wild)
-        pull = self.inverse @ residual
-        taken: list[tuple[FloatArray, float]] = []  # the inverse falls by column column^T times a factor
+        diagonal, wild = self.precision.diagonal, list(self.wild)
+        pull = self.precision.times(residual)
+        taken: list[FloatArray] = []  # the inverse falls by column column^T
         for _ in range(int(MOST_WILD * len(residual)) + 1):
             own = 1.0 + self.widening * diagonal
             gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
@@ -320,25 +318,22 @@ class Scatter:
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            column = self.inverse[:, row].copy()
-            for earlier, factor in taken:
-                column -= earlier * earlier[row] * factor
-            taken.append((column, self.widening[row] / own[row]))
-            diagonal -= column * column * taken[-1][1]
+            column = self.precision.columns(np.array([row]))[0]
+            for earlier in taken:
+                column -= earlier * earlier[row]
             pull = pull - column * (self.widening[row] * pull[row] / own[row])
-            determinant += float(np.log(own[row]))
+            taken.append(column * np.sqrt(self.widening[row] / own[row]))
+            diagonal = diagonal - taken[-1] ** 2
             wild.append(row)
         if known is not None and set(known.wild) == set(wild):
             return known
-        inverse = self.inverse.copy()
-        for column, factor in taken:
-            inverse -= np.outer(column, column) * factor
-        return Scatter(inverse, determinant, self.widening, self.price, tuple(wild))
+        rows = np.array(wild[len(self.wild) :], dtype=np.int64)
+        return replace(self, covariance=self.covariance.widened(rows, self.widening[rows]), wild=tuple(wild))
 
     def log_likelihood(self, residual: FloatArray) -> FloatArray:
         """(...,) of residuals (..., n), the price of wild readings included, without the constant n ln(2 pi) / 2."""
-        squared = np.einsum("...i,...i->...", residual @ self.inverse, residual)
-        return np.asarray(-0.5 * (squared + self.log_determinant) - len(self.wild) * self.price)
+        squared = self.precision.squares(residual)
+        return np.asarray(-0.5 * (squared + self.covariance.log_determinant) - len(self.wild) * self.price)
 
 
 # -- least squares under this scatter ----------------------------------------------------------------------------------
