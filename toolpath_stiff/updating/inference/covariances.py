@@ -89,7 +89,7 @@ class Covariance:
     @property
     def diagonal(self) -> FloatArray:
         """(n,) variance of each reading."""
-        return self.own + self.common + (self.shared**2).sum(axis=0)
+        return np.asarray(self.own + self.common + (self.shared**2).sum(axis=0))
 
     def dense(self) -> FloatArray:
         """(n, n), for a few readings only."""

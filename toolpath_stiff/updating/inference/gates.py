@@ -126,8 +126,8 @@ class Forms:
     """Forms of discrepancy as the scatter sees them, worked out once for all fits to the same readings.
 
     A form is a covariance K = L L^T between readings with features L (n, r). Under the inverse covariance P = A - G^T G
-    of what a fit leaves, G = X A, all that is asked of it are L^T P L = L^T A L - (G L)^T (G L) and L^T P r of residuals
-    r; so that a fit costs some products with the few rows of X.
+    of what a fit leaves, G = X A, all that is asked of it are L^T P L = L^T A L - (G L)^T (G L), and L^T P r of
+    residuals r: a fit costs some products with the few rows of X.
 
     Parameters
     ----------
