@@ -18,7 +18,7 @@ from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
 from toolpath_stiff.updating.diagnosis import common_verdict
 from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, _smallest_set
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.noise import Scatter, covariance
 
 STRONG = 0.1
@@ -32,10 +32,11 @@ def naive_gate(seed: int) -> float:
     naive = replace(noise, repeat=noise.reading, clamping=0.0, strut_spread=0.0, joint_error=0.0)
     predictor = judgement.problem.predictor
     spread = covariance(naive, predictor)
-    problem = Problem(predictor, Scatter.of(naive, spread), spread)
+    problem = Problem(predictor, Scatter.of(naive, spread))
     base = problem.score_base()
     simulator = Simulator.of(naive, spread, seed=0)
-    return absolute_gate(problem, base.residual, base.jacobian, simulator, discrepancy_forms(predictor)).probability
+    forms = Forms(discrepancy_forms(predictor), spread.precision)
+    return absolute_gate(problem, base.residual, base.jacobian, simulator, forms).probability
 
 
 def test_where_nothing_is_hidden_nothing_is_found():

@@ -201,16 +201,12 @@ def estimate_from_repeats(data: Measurements) -> tuple[float, float, int, bool] 
     for _ in range(4):
         if not kept.any():
             return result
-        contrasts, left, same = _contrasts(data.select(kept), groups[kept])
-        if len(left) < FEWEST_CONTRASTS:
+        contrasts = _Contrasts.of(data.select(kept), groups[kept])
+        if contrasts.count < FEWEST_CONTRASTS:
             return result
-        repeat, clamping, found = _maximum_likelihood(left, contrasts, same)
-        result = (repeat, clamping if found else min(CLAMPING, repeat), len(left), found)
-        spread = contrasts.T @ (np.eye(len(same)) * repeat**2 + result[1] ** 2 * same) @ contrasts
-        solved = np.linalg.inv(spread)
-        weighted = contrasts @ (solved @ left)
-        scale = np.sqrt(np.einsum("ij,jk,ik->i", contrasts, solved, contrasts))
-        wild = np.abs(weighted) > WILD * np.maximum(scale, 1e-12)
+        repeat, clamping, found = _maximum_likelihood(contrasts)
+        result = (repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found)
+        wild = contrasts.deviations(*result[:2]) > WILD
         if not wild.any():
             return result
         indices = np.flatnonzero(kept)
@@ -219,42 +215,104 @@ def estimate_from_repeats(data: Measurements) -> tuple[float, float, int, bool] 
     return result
 
 
-def _contrasts(data: Measurements, groups: NDArray[np.int64]) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Orthonormal contrasts (n, m) free of group means, time and order; the data in them (m,); same clamp (n, n)."""
-    n = len(data)
-    fixed = [(groups[:, None] == np.unique(groups)[None, :]).astype(float)]
-    regressors = [np.linspace(-1.0, 1.0, n)]
+@dataclass(frozen=True)
+class _Contrasts:
+    """Differences between repeats: what is left of n ln readings y beside group means, time and order, M y.
+
+    M takes least squares' residuals. Their covariance is M (repeat^2 + clamping^2 Z Z^T) M, Z with a column of ones and
+    noughts a clamping; all that a likelihood asks of it are the eigenvalues of Z^T M Z, as many as there are
+    clampings, and the shares of M y along its eigenvectors.
+
+    Attributes
+    ----------
+    left, own
+        (n,) M y; diagonal of M.
+    reached, values
+        (n, k) M Z E for eigenvectors E of Z^T M Z, and its eigenvalues (k,) that are not 0. None where every reading
+        was clamped by itself, which cannot be told from repeat noise.
+    count
+        Rank of M: degrees of freedom.
+    """
+
+    left: FloatArray
+    own: FloatArray
+    reached: FloatArray
+    values: FloatArray
+    count: int
+
+    @classmethod
+    def of(cls, data: Measurements, groups: NDArray[np.int64]) -> _Contrasts:
+        """Of readings in groups (n,) of repeats."""
+        means, clamps = Groups.by(groups), Groups.by(data.clamp)
+
+        def centred(columns: FloatArray) -> FloatArray:
+            sizes = np.bincount(means.of)
+            return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
+
+        axes, size, _ = np.linalg.svd(centred(_drifts(data)), full_matrices=False)
+        fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(np.bincount(means.of).max()))]
+
+        def left(columns: FloatArray) -> FloatArray:
+            found = centred(columns)
+            return np.asarray(found - fixed @ (fixed.T @ found))
+
+        n, count = len(groups), len(groups) - means.count - fixed.shape[1]
+        clamped = np.zeros((n, 0)) if clamps.alone else left((clamps.of[:, None] == np.arange(clamps.count)) * 1.0)
+        values, vectors = np.linalg.eigh(clamped.T @ clamped)
+        kept = values > values.max(initial=0.0) * n * np.finfo(float).eps
+        own = 1.0 - 1.0 / np.bincount(means.of)[means.of] - (fixed**2).sum(axis=1)
+        return cls(left(np.log(data.stiffness)[:, None])[:, 0], own, clamped @ vectors[:, kept], values[kept], count)
+
+    @property
+    def tells(self) -> bool:
+        """Whether the differences tell clamping from repeat noise."""
+        rank = len(self.values)
+        spread = float(np.ptp(self.values)) if rank == self.count else float(self.values.max(initial=0.0))
+        return spread > 1e-6 and rank >= 3
+
+    @property
+    def loads(self) -> FloatArray:
+        """(k,) squared shares of M y along the eigenvectors."""
+        return np.asarray((self.left @ self.reached) ** 2 / self.values)
+
+    def deviations(self, repeat: float, clamping: float) -> FloatArray:
+        """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
+        repeat, alone = max(repeat, 1e-12), self.reached.shape[1] == 0
+        ratio, own = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if alone else 0.0)
+        weights = ratio / (1.0 + ratio * self.values)
+        pull = (self.left - self.reached @ (weights * (self.left @ self.reached))) / own
+        scale = np.sqrt(np.maximum(self.own - self.reached**2 @ weights, 0.0) / own)
+        return np.asarray(np.abs(pull) / np.maximum(scale, 1e-12))
+
+
+def _drifts(data: Measurements) -> FloatArray:
+    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing."""
+    regressors = [np.linspace(-1.0, 1.0, len(data))]
     if "time_min" not in data.missing:
         # A drift adds rate * time to the deflection: to the logarithm, rate * time * k / F and its square.
         drift = data.time * data.stiffness / data.force
         drift = drift / max(float(np.abs(drift).max()), 1e-300)
         regressors += [drift, drift**2, data.time / max(float(data.time.max()), 1e-300)]
-    fixed.append(np.stack(regressors, axis=1))
-    left, singular, _ = np.linalg.svd(np.concatenate(fixed, axis=1), full_matrices=True)
-    rank = int((singular > 1e-9 * singular[0]).sum())
-    contrasts = left[:, rank:]
-    return contrasts, contrasts.T @ np.log(data.stiffness), data.clamp[:, None] == data.clamp[None, :]
+    return np.stack(regressors, axis=1)
 
 
-def _maximum_likelihood(left: FloatArray, contrasts: FloatArray, same: NDArray[np.bool_]) -> tuple[float, float, bool]:
+def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
     """Repeat noise and clamping that make the contrasts most likely, and whether they tell of clamping at all."""
     from scipy.optimize import minimize_scalar
 
-    clamped = contrasts.T @ same @ contrasts
-    values, vectors = np.linalg.eigh(clamped)
-    rotated = vectors.T @ left
-    rank = int((np.abs(values) > np.abs(values).max() * len(values) * np.finfo(float).eps).sum())
-    values = np.maximum(values, 0.0)
-    tells = float(np.ptp(values)) > 1e-6 and rank >= 3
+    values, loads = contrasts.values, contrasts.loads
+    rest = max(float(contrasts.left @ contrasts.left) - float(loads.sum()), 0.0)
 
     def repeat_at(ratio: float) -> float:
-        return float(np.sqrt(np.mean(rotated**2 / (1.0 + ratio * values))))
+        return float(np.sqrt((rest + (loads / (1.0 + ratio * values)).sum()) / contrasts.count))
 
     def minus_log_likelihood(root: float) -> float:
         ratio = root**2
-        return len(left) * float(np.log(max(repeat_at(ratio), 1e-12))) + 0.5 * float(np.log1p(ratio * values).sum())
+        return contrasts.count * float(np.log(max(repeat_at(ratio), 1e-12))) + 0.5 * float(
+            np.log1p(ratio * values).sum()
+        )
 
-    if not tells:
+    if not contrasts.tells:
         return repeat_at(0.0), 0.0, False
     best = minimize_scalar(minus_log_likelihood, bounds=(0.0, 5.0), method="bounded")
     root = float(best.x) if best.fun < minus_log_likelihood(0.0) else 0.0
