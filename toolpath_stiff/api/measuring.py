@@ -485,8 +485,10 @@ class Update(FolderResult):
         from toolpath_stiff.stiffness.model import build_model
 
         if self.correction.machine is None:
+            worse = self.correction.update.worse
             raise InputError(
-                f"the update was refused: {self._document['text']}", hint="force=True keeps it all the same"
+                f"the update was refused: {self._document['text']}",
+                hint="" if worse else "force=True keeps it all the same",
             )
         files = self._asked.on.effect_files
         return Machine(build_model(self.correction.machine, files), self._asked.on.asked, files)
@@ -575,7 +577,7 @@ def update(
     auto
         Go on adding effects while the data support them.
     force
-        Keep what the data do not support.
+        Keep what the data do not support; never what fits worse than the machine given.
     objective
         "likelihood"; or "mean-error", the strut law alone, as the paper fitted it.
     machine_file

@@ -279,7 +279,9 @@ def update_arguments(parser: argparse.ArgumentParser) -> None:
         help="add effects as long as the error at left-out points falls and the data support it",
     )
     parser.add_argument(
-        "--force", action="store_true", help="write what the data do not support as well; and as --replace"
+        "--force",
+        action="store_true",
+        help="write what the data do not support as well, but never a machine that fits worse; and as --replace",
     )
     parser.add_argument(
         "--objective", choices=("likelihood", "mean-error"), default="likelihood",

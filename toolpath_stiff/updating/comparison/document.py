@@ -30,6 +30,7 @@ from toolpath_stiff.updating.comparison.structure import (
 )
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import ErrorFigures, deviation_percent, error_figures, errors_text
+from toolpath_stiff.updating.inference.gates import question
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
@@ -162,6 +163,7 @@ class ComparisonDocument(TypedDict):
     notes: list[str]
     hints: list[FindingEntry]
     text: str
+    question: str
     next: list[str]
 
 
@@ -210,7 +212,7 @@ def document_of(
     following: list[str],
 ) -> ComparisonDocument:
     """The content of compare.json; `following` are the commands that go on from here."""
-    data = predictor.data
+    data, asked = predictor.data, question(predictor)
     by_noise = {
         one.noise.name: [as_finding(f, i, one.structure, one.refitted, looked_for, numbers, residual)
                          for i, f in enumerate(one.structure.found)]
@@ -243,7 +245,8 @@ def document_of(
         "warnings": list(data.warnings),
         "notes": list(data.notes),
         "hints": [] if findings else _hints(answers[-1], tests, looked_for, numbers, residual),
-        "text": overall_text(len(data), baseline, noises, findings),
+        "text": " ".join(filter(None, (asked, overall_text(len(data), baseline, noises, findings)))),
+        "question": asked,
         "next": following,
     }
 

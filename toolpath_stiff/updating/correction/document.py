@@ -98,6 +98,7 @@ class UpdateDocument(TypedDict):
 
     verdict: str
     text: str
+    question: str
     objective: str
     baseline: StepEntry
     strut_law_refitted: RoundedErrors
@@ -132,6 +133,7 @@ def document(correction: Correction) -> UpdateDocument:
     found: UpdateDocument = {
         "verdict": verdict,
         "text": _text(update, verdict),
+        "question": update.question,
         "objective": update.objective,
         "baseline": steps[0],
         "strut_law_refitted": rounded_errors(update.refitted.fit.residual),
@@ -180,22 +182,28 @@ def _search(search: StrutLawSearch) -> SearchEntry:
 def _verdict(update: Update) -> str:
     if not update.changed:
         return NOTHING
-    if not all(one.supported for one in update.supports):
-        return FORCED if update.forced else REFUSED
-    return UPDATED
+    if update.worse or not (update.supported or update.forced):
+        return REFUSED
+    return UPDATED if update.supported else FORCED
 
 
 def _text(update: Update, verdict: str) -> str:
     """What was done, the cause first, then the error step by step."""
+    asked = f"{update.question} " if update.question else ""
     if verdict == NOTHING:
-        return f"These data support no further effect: the machine stays as it is. Mean error: {_errors(update)}."
+        said = "These data support no further effect: the machine stays as it is."
+        return f"{asked}{said} Mean error: {_errors(update)}."
     fit = update.steps[-1].fit
     errors = f"Mean error: {_errors(update)}{_left_out(update)}."
+    if update.worse:
+        return f"{asked}The new machine would fit worse than the one given: it is not written. {errors}"
     against = "; ".join(f"{one.effect}: {', and '.join(one.reasons)}" for one in update.supports if not one.supported)
     if verdict == REFUSED:
-        return f"The data do not support {against}. (--force writes it all the same.) {errors}"
+        said = f"The data do not support {against}." if against else "The machine stays as it is."
+        return f"{asked}{said} (--force writes it all the same.) {errors}"
     if verdict == FORCED:
-        return f"Added by force, although the data do not support it ({against}). {errors}"
+        said = f" ({against})" if against else ""
+        return f"{asked}Added by force, although the data do not support it{said}. {errors}"
     if not fit.names:
         return f"Strut law refitted; no effect added. {errors}"
     cause = joined(fit.findings)

@@ -188,6 +188,7 @@ class DiagnosisDocument(TypedDict):
 
     verdict: str
     text: str
+    question: str
     baseline: BaselineEntry
     candidates: list[CandidateEntry]
     pairs: list[PairEntry]
@@ -221,6 +222,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
     return {
         "verdict": diagnosis.verdict,
         "text": verdict_text(diagnosis),
+        "question": main.question,
         "baseline": _baseline(diagnosis),
         "candidates": _candidates(diagnosis),
         "pairs": _pairs(diagnosis),

@@ -20,7 +20,8 @@ posterior probabilities decide; only a name far ahead of all others is given as 
 adequate      nothing is missing that these data could show
 identified    one effect (or one pair) explains the data, far likelier than any other
 ambiguous     several explain them, and none is far likelier than the others
-unexplained   something is missing, and nothing in the catalogue accounts for it
+unexplained   something is missing, and nothing in the catalogue accounts for it; or the readings do not look as if
+              they were of this machine at all (`gates.question`)
 """
 
 from __future__ import annotations
@@ -34,7 +35,14 @@ from numpy.typing import NDArray
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import refine
-from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.gates import (
+    Forms,
+    Gate,
+    Simulator,
+    absolute_gate,
+    discrepancy_forms,
+    question,
+)
 from toolpath_stiff.updating.inference.hypotheses import (
     Family,
     Pair,
@@ -90,6 +98,8 @@ class Judgement:
         have none unless nothing passes.
     form
         The form of discrepancy that stands out, in words; "" if none was looked for.
+    question
+        Whether these are readings of this machine, and why it is asked; "" where nothing says that they are not.
     """
 
     verdict: str
@@ -104,6 +114,7 @@ class Judgement:
     pairs: tuple[Pair, ...]
     probability: dict[str, float]
     form: str
+    question: str = ""
 
     @property
     def plausible(self) -> tuple[str, ...]:
@@ -131,10 +142,11 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     fits = Fits(problem)
     gates = apply_gates(problem, noise, candidates, fits, seed)
     weighed = weigh(problem, noise, candidates, gates)
-    verdict, explanations = decide(gates, weighed)
+    asked = question(problem.predictor)
+    verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
     return Judgement(
         verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form,
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked,
     )  # fmt: skip
 
 

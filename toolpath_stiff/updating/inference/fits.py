@@ -412,7 +412,7 @@ def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:
     prior = np.zeros((fit.jacobian.shape[1],) * 2)
     prior[:2, :2] = np.eye(2) * (1.0 / LAW_PRIOR**2 if fit.law_free else 1e12)
     precision = fit.scatter.precision
-    scale = np.maximum(np.sqrt(precision.squares(fit.jacobian.T) + np.diag(prior)), 1e-300)
+    scale = np.sqrt(np.maximum(precision.squares(fit.jacobian.T) + np.diag(prior), 1e-300))
     columns = fit.jacobian / scale
     for k, (out, products) in enumerate(products_without(precision, columns, fit.residual, points)):
         pull = products[:, -1]

@@ -83,6 +83,11 @@ class Predictor:
         return len(self.data)
 
     @property
+    def distinct(self) -> NDArray[np.int64]:
+        """(n,) number of what mechanics sees of each reading: repeats share it."""
+        return self._timeless.which
+
+    @property
     def effects_that_act(self) -> list[str]:
         """Effects and instruments of the machine file that change these readings, for headings."""
         idle = idle_on(self.base, self.data)
