@@ -13,7 +13,6 @@ from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_program_options,
     finite_number,
-    limit_threads,
     positive_number,
     program_for,
 )
@@ -66,12 +65,11 @@ def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and
 def add_output_arguments(
     parser: argparse.ArgumentParser, command: str, kept: str, *, force: bool = True, of: str = "DATA"
 ) -> None:
-    """--seed, --jobs, --out, --replace (--force), --no-plots, --json; `kept` is what --no-plots writes still.
+    """--seed, --out, --replace (--force), --no-plots, --json; `kept` is what --no-plots writes still.
 
     `of` is what the folder is named after.
     """
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
     parser.add_argument("--out", metavar="DIR", help=f"folder (default: reports/<{of}>-{command})")
     add_replace_option(parser, force=force)
     parser.add_argument("--no-plots", action="store_true", help=f"only {kept}")
@@ -184,7 +182,6 @@ def compare(args: argparse.Namespace) -> int:
     from toolpath_stiff.report.compare import names
 
     target = destination(args, "compare", args.data, "-compare").check(names(not args.no_plots))
-    limit_threads(args.jobs)
     from toolpath_stiff.api.measuring import compare
 
     with progress_line(quiet=args.json) as progress:
@@ -227,7 +224,6 @@ def diagnose(args: argparse.Namespace) -> int:
     from toolpath_stiff.report.diagnose import names
 
     target = destination(args, "diagnose", args.data, "-diagnose").check(names(not args.no_plots))
-    limit_threads(args.jobs)
     from toolpath_stiff.api.measuring import diagnose
 
     machine, data = measured(args)
@@ -300,7 +296,6 @@ def update(args: argparse.Namespace) -> int:
     replaced = check_written(args, [args.output])
     target = destination(args, "update", args.data, "-update")
     target.check(names(not args.no_plots, machine=args.output is None))
-    limit_threads(args.jobs)
     from toolpath_stiff.api.measuring import update
 
     with progress_line(quiet=args.json) as progress:
@@ -398,7 +393,6 @@ def plan(args: argparse.Namespace) -> int:
     from toolpath_stiff.report.plan import names
 
     target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
-    limit_threads(args.jobs)
     from toolpath_stiff.api.measuring import plan
 
     machine, data = measured(args)

@@ -7,7 +7,6 @@ counted and which sign they have: `baseline`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,7 +99,6 @@ def compare(
     strut_spread: float = STRUT_SPREAD,
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
-    jobs: int = 1,
     draws: int = DRAWS,
     asked: Asked | None = None,
 ) -> Comparison:
@@ -120,8 +118,6 @@ def compare(
         A user's own effects, which the machine file may name.
     seed
         Of the simulated scatter.
-    jobs
-        Threads; the low and the high guess are independent.
     draws
         Simulated sets of readings.
     asked
@@ -170,8 +166,7 @@ def compare(
         free = assess(checks, data, spread, scattering.draws(0.0))
         return Answer(model, scattering, structure, refitted, law, free)
 
-    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        answers = list(pool.map(answer, noises))
+    answers = [answer(one) for one in noises]
     files = tuple(dict.fromkeys(data.file.tolist()))
     asked = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
     document = document_of(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NotRequired, TypedDict
+from typing import NotRequired, TypedDict, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.units import certain, mm_from_m
 from toolpath_stiff.updating.comparison.principles import (
     CheckEntry,
 )
@@ -223,7 +223,7 @@ def document_of(
     baseline = _baseline(predictor, answers, residual)
     findings, tests = merged_findings(by_noise, answers_tests(answers, looked_for)), _tests(answers, looked_for)
     noises = [_noise(one.noise) for one in answers]
-    return {
+    written: ComparisonDocument = {
         "machine": predictor.machine.name,
         "effects": predictor.effects_that_act,
         "data": list(dict.fromkeys(data.file.tolist())),
@@ -249,6 +249,7 @@ def document_of(
         "question": asked,
         "next": following,
     }
+    return cast(ComparisonDocument, certain(written))
 
 
 def _baseline(predictor: Predictor, answers: list[Answer], residual: FloatArray) -> BaselineFigures:

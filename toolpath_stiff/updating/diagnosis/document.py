@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.units import json_number, mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.diagnosis.words import assumptions, next_steps, row_words, verdict_text, why
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
@@ -266,11 +266,6 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "readings": len(diagnosis.data),
         "command": diagnosis.command,
     }
-
-
-def json_number(value: float, digits: int = 5) -> float | None:
-    """A float of some significant digits; None for what JSON cannot hold."""
-    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def rounded_errors(residual: FloatArray) -> RoundedErrors:
