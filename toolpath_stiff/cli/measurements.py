@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.api.measuring import COSTS
+from toolpath_stiff.api.correction import COSTS
 from toolpath_stiff.cli.arguments import (
     add_condition_options,
     add_json_option,
@@ -28,8 +28,8 @@ from toolpath_stiff.cli.outputs import (
 from toolpath_stiff.defaults import MACHINE, STRUT_SPREAD
 
 if TYPE_CHECKING:
+    from toolpath_stiff.api.diagnosis import Measurements
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.measuring import Measurements
 
 
 def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherwise: str = "") -> None:
@@ -78,8 +78,8 @@ def add_output_arguments(
 
 def measured(args: argparse.Namespace) -> tuple[Machine, Measurements]:
     """The machine with its effect files, and the measurements."""
+    from toolpath_stiff.api.diagnosis import Measurements
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.measuring import Measurements
 
     return Machine.load(args.machine, effects=args.effects), Measurements(args.data)
 
@@ -134,7 +134,7 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
 
 def reduce(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
-    from toolpath_stiff.api.measuring import reduce
+    from toolpath_stiff.api.correction import reduce
     from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.tables import split_name
@@ -182,7 +182,7 @@ def compare(args: argparse.Namespace) -> int:
     from toolpath_stiff.report.compare import names
 
     target = destination(args, "compare", args.data, "-compare").check(names(not args.no_plots))
-    from toolpath_stiff.api.measuring import compare
+    from toolpath_stiff.api.diagnosis import compare
 
     with progress_line(quiet=args.json) as progress:
         found = compare(*measured(args), **noise_options(args), progress=progress)
@@ -224,7 +224,7 @@ def diagnose(args: argparse.Namespace) -> int:
     from toolpath_stiff.report.diagnose import names
 
     target = destination(args, "diagnose", args.data, "-diagnose").check(names(not args.no_plots))
-    from toolpath_stiff.api.measuring import diagnose
+    from toolpath_stiff.api.diagnosis import diagnose
 
     machine, data = measured(args)
     with progress_line(quiet=args.json) as progress:
@@ -296,7 +296,7 @@ def update(args: argparse.Namespace) -> int:
     replaced = check_written(args, [args.output])
     target = destination(args, "update", args.data, "-update")
     target.check(names(not args.no_plots, machine=args.output is None))
-    from toolpath_stiff.api.measuring import update
+    from toolpath_stiff.api.correction import update
 
     with progress_line(quiet=args.json) as progress:
         found = update(
@@ -390,10 +390,10 @@ def _cost(text: str) -> tuple[str, float]:
 
 def plan(args: argparse.Namespace) -> int:
     """Plan, write the files, say what the plan promises."""
-    from toolpath_stiff.report.plan import names
+    from toolpath_stiff.report.measuring import names
 
     target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
-    from toolpath_stiff.api.measuring import plan
+    from toolpath_stiff.api.correction import plan
 
     machine, data = measured(args)
     found = plan(
