@@ -90,12 +90,14 @@ def test_products_of_what_stays_are_those_of_its_own_covariance():
     points = Groups.by(np.array([0, 1, 2, 1, 0, 1, 2, 2, 2, 2, 3, 0]))
     columns, residual = rng.normal(size=(12, 2)), rng.normal(size=12)
     count = 0
-    for out, found in products_without(covariance.precision, columns, residual, points):
-        stay = np.setdiff1d(np.arange(12), out)
-        weighted = columns[stay].T @ np.linalg.inv(covariance.dense()[np.ix_(stay, stay)])
-        assert found[:, :2] == pytest.approx(weighted @ columns[stay], rel=1e-9)
-        assert found[:, 2] == pytest.approx(weighted @ residual[stay], rel=1e-9)
-        count += len(out)
+    for which, left_out, products in products_without(covariance.precision, columns, residual, points):
+        for label, out, found in zip(which, left_out, products, strict=True):
+            assert out.tolist() == np.flatnonzero(points.of == label).tolist()
+            stay = np.setdiff1d(np.arange(12), out)
+            weighted = columns[stay].T @ np.linalg.inv(covariance.dense()[np.ix_(stay, stay)])
+            assert found[:, :2] == pytest.approx(weighted @ columns[stay], rel=1e-9)
+            assert found[:, 2] == pytest.approx(weighted @ residual[stay], rel=1e-9)
+            count += len(out)
     assert count == 12
 
 

@@ -203,10 +203,13 @@ class Precision:
         return np.asarray(blocks - self.factors[:, at].T @ self.factors)
 
     def block(self, at: Rows) -> FloatArray:
-        """(k, k) some of its columns, of the same rows."""
-        own, of, factors = self.own[at], self.groups.of[at], self.factors[:, at]
-        same = of[:, None] == of[None, :]
-        return np.asarray(np.diag(1.0 / own) - same * self._pull[of] / own / own[:, None] - factors.T @ factors)
+        """(..., k, k) some of its columns, of the same rows, for rows (..., k)."""
+        own, of, factors = self.own[at], self.groups.of[at], np.moveaxis(self.factors[:, at], 0, -2)
+        same = of[..., :, None] == of[..., None, :]
+        blocks = -(same * (self._pull[of] / own)[..., None, :]) / own[..., :, None]
+        diagonal = np.arange(at.shape[-1])
+        blocks[..., diagonal, diagonal] += 1.0 / own
+        return np.asarray(blocks - np.swapaxes(factors, -1, -2) @ factors)
 
     def beside(self, fitted: FloatArray, prior: FloatArray) -> Precision:
         """P = A - A J (J^T A J + prior)^-1 J^T A: of what a fit of p unknowns leaves of the readings.

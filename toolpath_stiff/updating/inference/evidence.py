@@ -202,29 +202,33 @@ class Problem:
         return self._priors[key][1]
 
     def compliance(self, law: FloatArray, delta: FloatArray) -> FloatArray:
-        """(..., n) for laws (..., 2) and added compliances (..., n); held above a tenth of the base model's."""
-        return np.maximum(self.predictor.strut_part(law) + self.rest + delta, 0.1 * self.base_compliance)
+        """(..., n) for laws (..., 2) and added compliances (..., n)."""
+        return self._held(self.predictor.strut_part(law) + delta)
+
+    def _held(self, compliance: FloatArray) -> FloatArray:
+        """(..., n) with the machine file's own effects; above a tenth of the base model's."""
+        return np.maximum(compliance + self.rest, 0.1 * self.base_compliance)
 
     def law_jacobian(self, law: FloatArray, compliance: FloatArray) -> FloatArray:
         """(..., n, 2) of ln k."""
-        return np.asarray(-self.predictor.strut_slopes(law) / compliance[..., None])
+        slopes = self.predictor.strut_part_and_slopes(law)[1]
+        return np.asarray(np.swapaxes(-slopes / compliance[..., None, :], -1, -2))
 
     def fit_law(
         self, delta: FloatArray, precision: Precision, start: FloatArray, steps: int = 3
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Laws (g, 2), residuals (g, n), information matrices (g, 2, 2) for added compliances (g, n)."""
-        law = np.broadcast_to(start, (len(delta), 2)).copy()
-        compliance = self.compliance(law, delta)
-        residual = self.observed + np.log(compliance)
+        law = np.asarray(start)[None]  # the same for all at first
         for _ in range(steps):
-            jacobian = self.law_jacobian(law, compliance)
-            weighted = precision.times(np.swapaxes(jacobian, 1, 2))
-            information = weighted @ jacobian + np.eye(2) / LAW_PRIOR**2
+            part, slopes = self.predictor.strut_part_and_slopes(law)
+            compliance = self._held(part + delta)
+            columns = -slopes / compliance[:, None]
+            weighted = precision.times(columns)
+            information = weighted @ np.swapaxes(columns, 1, 2) + np.eye(2) / LAW_PRIOR**2
+            residual = self.observed + np.log(compliance)
             gradient = (weighted @ residual[..., None])[..., 0] - law / LAW_PRIOR**2
             law = law + np.clip(np.linalg.solve(information, gradient[..., None])[..., 0], -0.5, 0.5)
-            compliance = self.compliance(law, delta)
-            residual = self.observed + np.log(compliance)
-        return law, residual, information
+        return law, self.observed + np.log(self.compliance(law, delta)), information
 
     # -- scores ----------------------------------------------------------------------------------------------------
 

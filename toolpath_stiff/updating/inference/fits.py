@@ -414,28 +414,34 @@ def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:
     precision = fit.scatter.precision
     scale = np.sqrt(np.maximum(precision.squares(fit.jacobian.T) + np.diag(prior), 1e-300))
     columns = fit.jacobian / scale
-    for k, (out, products) in enumerate(products_without(precision, columns, fit.residual, points)):
-        pull = products[:, -1]
-        pull[:2] -= (prior[:2, :2] @ fit.law) / scale[:2]
-        information = products[:, :-1] + prior / np.outer(scale, scale)
-        moves[k] = np.linalg.pinv(information, hermitian=True) @ pull / scale
-        residual[out] = fit.residual[out] - fit.jacobian[out] @ moves[k]
+    for which, out, products in products_without(precision, columns, fit.residual, points):
+        pull = products[..., -1]
+        pull[:, :2] -= (prior[:2, :2] @ fit.law) / scale[:2]
+        information = products[..., :-1] + prior / np.outer(scale, scale)
+        moves[which] = (np.linalg.pinv(information, hermitian=True) @ pull[..., None])[..., 0] / scale
+        residual[out] = fit.residual[out] - (fit.jacobian[out] @ moves[which][..., None])[..., 0]
     return HeldOut(residual, moves, point)
 
 
 def products_without(
     precision: Precision, columns: FloatArray, residual: FloatArray, points: Groups
-) -> Iterator[tuple[NDArray[np.int64], FloatArray]]:
-    """Of each point in turn its readings, and (p, p + 1) J^T A [J, r] of those that stay.
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]]:
+    """For points left out in turn, those of k readings together: the points (m,), their readings (m, k), products.
 
-    Their inverse covariance is the Schur complement A_ss - A_so A_oo^-1 A_os of the inverse covariance of all, of which
-    the products need the readings that are left out only: J^T A J - (A J)_o^T A_oo^-1 (A J)_o.
+    The products are (m, p, p + 1) J^T A [J, r] of the readings that stay. Their inverse covariance is the Schur
+    complement A_ss - A_so A_oo^-1 A_os of the inverse covariance of all, of which the products need the readings that
+    are left out only: J^T A J - (A J)_o^T A_oo^-1 (A J)_o.
     """
     solved = precision.times(np.concatenate([columns.T, residual[None]]))
     whole = solved[:-1] @ np.concatenate([columns, residual[:, None]], axis=1)
-    for out in points.members():
-        part = solved[:, out]
-        yield out, whole - part[:-1] @ np.linalg.solve(precision.block(out), part.T)
+    members = points.members()
+    sizes = np.array([len(out) for out in members])
+    for size in np.unique(sizes).tolist():
+        which = np.flatnonzero(sizes == size)
+        out = np.array([members[k] for k in which])
+        part = np.moveaxis(solved[:, out], 0, 1)  # (m, p + 1, k)
+        taken = part[:, :-1] @ np.linalg.solve(precision.block(out), np.swapaxes(part, 1, 2))
+        yield which, out, whole - taken
 
 
 def gain_in_standard_errors(before: HeldOut, after: HeldOut) -> float:

@@ -117,13 +117,14 @@ def set_wild_aside(pulls: FloatArray, projected: Precision) -> Aside:
     squared = pulls**2 / np.maximum(projected.diagonal, 1e-12)
     most = max(1, int(MOST_WILD * pulls.shape[1]))
     taken = np.zeros_like(pulls)
-    for s in np.flatnonzero((squared > WILD_SQUARED).any(axis=1)):
-        rows = np.flatnonzero(squared[s] > WILD_SQUARED)
-        rows = rows[np.argsort(-squared[s, rows])][:most]
-        block = projected.block(rows)
-        block[np.diag_indices_from(block)] *= 1.0 + RIDGE
-        taken[s, rows] = np.linalg.solve(block, pulls[s, rows])
-    return Aside(pulls - projected.times(taken), taken, (taken != 0.0).sum(axis=1).astype(float))
+    count = np.minimum((squared > WILD_SQUARED).sum(axis=1), most)
+    furthest = np.argsort(-squared, axis=1, kind="stable")[:, : count.max(initial=0)]
+    for size in np.unique(count[count > 0]).tolist():
+        sets = np.flatnonzero(count == size)
+        rows = furthest[sets, :size]
+        block = projected.block(rows) * (1.0 + RIDGE * np.eye(size))
+        taken[sets[:, None], rows] = np.linalg.solve(block, np.take_along_axis(pulls[sets], rows, 1)[..., None])[..., 0]
+    return Aside(pulls - projected.times(taken), taken, count.astype(float))
 
 
 class Forms:

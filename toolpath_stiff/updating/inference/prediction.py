@@ -167,18 +167,21 @@ class Predictor:
 
     def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
-        first_term, second_term = self._law_terms(law)
-        return np.asarray((self._squared_forces / (first_term + second_term)).sum(axis=-1)[..., self._timeless.which])
+        first, second = self._law_terms(law)
+        return np.asarray((self._squared_forces / (first + second)).sum(axis=-2)[..., self._timeless.which])
 
-    def strut_slopes(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
-        """(..., n, 2) derivatives of `strut_part` to the law's logarithms."""
-        terms = self._law_terms(law)
-        energy = self._squared_forces / (terms[0] + terms[1]) ** 2
-        slopes = [-(energy * term).sum(axis=-1)[..., self._timeless.which] for term in terms]
-        return np.stack(slopes, axis=-1)
+    def strut_part_and_slopes(self, law: ArrayLike = NO_CHANGE) -> tuple[FloatArray, FloatArray]:
+        """`strut_part`, and its derivatives (..., 2, n) to the law's logarithms: they add up to minus the part."""
+        first, second = self._law_terms(law)
+        stiffness = first + second
+        energy = self._squared_forces / stiffness
+        part = energy.sum(axis=-2)
+        by_first = (energy * (first / stiffness)).sum(axis=-2)
+        which = self._timeless.which
+        return part[..., which], -np.stack([by_first, part - by_first], axis=-2)[..., which]
 
     def _law_terms(self, law: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """(..., m, 6) N/m each: what the law's two constants, scaled by laws (..., 2), give each strut."""
+        """(..., 6, m) N/m each: what the law's two constants, scaled by laws (..., 2), give each strut."""
         logs = np.asarray(law, dtype=float)
         rule, (first, second) = self.machine.strut_law, self._law_shares
         return (
@@ -188,14 +191,16 @@ class Predictor:
 
     @cached_property
     def _law_shares(self) -> tuple[FloatArray, FloatArray]:
-        """(m, 6) shares of the law's two constants in each strut's stiffness, by its length."""
+        """(6, m) shares of the law's two constants in each strut's stiffness, by its length."""
         rule = self.machine.strut_law
-        second = (self._timeless.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        lengths = np.ascontiguousarray(self._timeless.path.struts.lengths.T)
+        second = (lengths - rule.length_1) / (rule.length_2 - rule.length_1)
         return 1.0 - second, second
 
     @cached_property
     def _squared_forces(self) -> FloatArray:
-        return np.asarray(self._timeless.forces**2)
+        """(6, m) squared strut forces per unit load."""
+        return np.ascontiguousarray(self._timeless.forces.T**2)
 
     def joint_columns(self) -> FloatArray:
         """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
