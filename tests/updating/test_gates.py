@@ -192,9 +192,8 @@ def test_the_gain_of_the_best_of_many_is_judged_against_the_best_of_many():
         families = score_families(problem, effects, base)
         gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
         simulator = simulator_of(k)
-        gate = absolute_gate(
-            problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain
-        )
+        signs = signatures(problem, [table for family in families for table in family.tables])
+        gate = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signs, gain)
         thresholds.append(gate.gain_threshold)
         passed += gate.gain_probability <= 0.05
     single = float(chi2.ppf(0.90, 1))  # one-sided 5 % of one effect

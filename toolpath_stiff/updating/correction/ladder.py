@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -44,8 +45,8 @@ from toolpath_stiff.updating.inference.fits import (
     gain_in_standard_errors,
     held_out,
 )
-from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms, question
-from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures
+from toolpath_stiff.updating.inference.gates import Simulator, gain_threshold, question
+from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures, tables_of
 from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
@@ -292,6 +293,21 @@ def dispersion(fit: Fit) -> float:
     return max(1.0, squares / max(len(fit.residual) - fitted, 1))
 
 
+@dataclass(frozen=True)
+class _Field:
+    """All candidates on a machine: the problem, its base model, the effects, the gain that chance alone reaches."""
+
+    problem: Problem
+    base: Fit
+    effects: tuple[Effect, ...]
+    threshold: float
+
+    @cached_property
+    def families(self) -> list[Family]:
+        """The effects, the most likely first."""
+        return score_families(self.problem, self.effects, self.base)
+
+
 class _Work:
     """What one update passes from step to step."""
 
@@ -307,7 +323,7 @@ class _Work:
         self.problem, self.noise, self.law_free, self.seed = problem, noise, law_free, seed
         self.effect_files, self.say = effect_files, say
         self.data = problem.predictor.data
-        self.fields: dict[tuple[str, ...], tuple[Problem, list[Family], float]] = {}
+        self.fields: dict[tuple[str, ...], _Field] = {}
 
     def step(self, name: str, fit: Fit) -> Step:
         return Step(name, fit, held_out(fit, self.data.point))
@@ -346,8 +362,8 @@ class _Work:
                 fit = add_effect(self.problem, fit, [candidate], self.law_free)
         return self.step("", fit)
 
-    def field(self, others: Fit) -> tuple[Problem, list[Family], float]:
-        """The problem of a machine that carries the other effects, all candidates in it, the gate's threshold."""
+    def field(self, others: Fit) -> _Field:
+        """What an effect is judged against on a machine that carries the other effects."""
         key = tuple(candidate.label for candidate in others.candidates)
         if key not in self.fields:
             self.say("searching all effects for what chance alone would gain")
@@ -356,13 +372,10 @@ class _Work:
             problem = Problem.of(Predictor(carrying, self.data, self.effect_files), self.noise)
             base = problem.score_base()
             effects, _ = testable_effects(problem.predictor)
-            families = score_families(problem, effects, base)
-            gate = absolute_gate(
-                problem, base.residual, base.jacobian,
-                Simulator.of(self.noise, problem.scatter.covariance, self.seed),
-                Forms(discrepancy_forms(problem.predictor), problem.scatter.precision), signatures(problem, families),
-            )  # fmt: skip
-            self.fields[key] = problem, families, gate.gain_threshold
+            tables = [table for effect in effects for table in tables_of(problem, effect)]
+            simulator = Simulator.of(self.noise, problem.scatter.covariance, self.seed)
+            threshold = gain_threshold(problem, base.jacobian, simulator, signatures(problem, tables))
+            self.fields[key] = _Field(problem, base, effects, threshold)
         return self.fields[key]
 
     def support(self, before: Step, fit: Fit, j: int, candidates: Sequence[Candidate]) -> Support:
@@ -370,7 +383,8 @@ class _Work:
         name, after = fit.names[j], self.step("", fit)
         fall = before.held.mean_error - after.held.mean_error
         in_se = gain_in_standard_errors(before.held, after.held)
-        problem, _, threshold = self.field(before.fit)
+        field = self.field(before.fit)
+        problem, threshold = field.problem, field.threshold
         none = base_fit(problem, law_free=True)
         alone = add_effect(problem, none, candidates, law_free=True)
         gained = 2.0 * (alone.log_posterior - none.log_posterior) / dispersion(alone)
@@ -398,7 +412,7 @@ class _Work:
 
     def next_effect(self, before: Step) -> tuple[Step | None, tuple[Support, ...]]:
         """The most likely effect that the data support on top of a step, and the supports of all that were tried."""
-        _, families, _ = self.field(before.fit)
+        families = self.field(before.fit).families
         tried: list[Support] = []
         for family in [f for f in families if f.best is not None][:TRIED]:
             self.say(f"fitting {family.name}")

@@ -240,9 +240,10 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     """The model alone, then single effects, then pairs: of the likeliest single that passes, else of the best ones."""
     simulator = Simulator.of(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
+    signs = signatures(problem, (table for family in families for table in family.tables))
     # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
-    alone = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain)
+    alone = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signs, gain)
     if alone.probability > FALSE_ALARM:
         return Gates(alone, none_stands=True)
     by_name: dict[str, Gate] = {}

@@ -16,16 +16,22 @@ Before both stands a question that no effect answers: whether the readings are o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.updating.inference.candidates import EXPECTED
-from toolpath_stiff.updating.inference.covariances import Covariance, Precision
+from toolpath_stiff.updating.inference.covariances import (
+    Covariance,
+    Kernel,
+    Precision,
+    gaussian_kernel,
+    linear_kernel,
+    same_kernel,
+)
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor
@@ -36,6 +42,7 @@ DRAWS = 400
 RIDGE = 1e-12  # on the diagonal where readings are set aside: two that a fit explains entirely are not told apart
 WILD_SQUARED = 11.3  # squared deleted residual beyond which a reading is set aside; pays the price of `scatter`
 MOST_WILD = 0.05
+CHANCE = 0.05  # share of campaigns in which the best of all candidates gains as much by chance
 HOPELESS = 1.3  # times the largest simulated sum of squares
 NOTHING = 1e-6  # of the model's own variation: less is rounding
 
@@ -249,8 +256,17 @@ def absolute_gate(
         float(ranked[0, 1]),
         worst,
         float(ranked[0, 2]) if signatures else 1.0,
-        float(np.quantile(looks[2][1:], 0.95)) if signatures else 0.0,
+        float(np.quantile(looks[2][1:], 1.0 - CHANCE)) if signatures else 0.0,
     )
+
+
+def gain_threshold(
+    problem: Problem, jacobian: FloatArray, simulator: Simulator, signatures: Sequence[Sequence[FloatArray]]
+) -> float:
+    """Twice-log-likelihood gain that the best of all candidates reaches by chance in one campaign of twenty."""
+    projected = problem.projected(jacobian)
+    drawn = set_wild_aside(projected.times(simulator.draws), projected)
+    return float(np.quantile(largest_gain(drawn.pulls, projected, signatures), 1.0 - CHANCE))
 
 
 def _quadratic(problem: Problem, aside: Aside) -> FloatArray:
@@ -345,64 +361,8 @@ def _unlike(predictor: Predictor) -> str:
 RANGE_POSITION, RANGE_ANGLE, RANGE_LENGTH, RANGE_ORDER = 0.25, np.radians(15.0), 0.05, 0.3
 
 
-# Features are taken until they leave this share of a form's variance, or until there are so many: of forms that vary
-# within every point, one for each point and direction is more than the readings hold.
-LEFT, MOST_FEATURES = 1e-10, 300
-MOST_POINTS = 2000  # features of the form that has one for each point and direction
-
-
-@dataclass(frozen=True)
-class Kernel:
-    """A covariance between n readings by its columns: `column(i)` (n,), and its `diagonal` (n,)."""
-
-    column: Callable[[int], FloatArray]
-    diagonal: FloatArray
-
-    def __mul__(self, other: Kernel) -> Kernel:
-        """Element by element, which is a covariance again (Schur's product theorem)."""
-        return Kernel(lambda i: self.column(i) * other.column(i), self.diagonal * other.diagonal)
-
-    @property
-    def varies(self) -> bool:
-        """Whether it is finite, and more than one number throughout."""
-        first, scale = self.column(0), float(self.diagonal.mean())
-        finite = np.isfinite(first).all() and np.isfinite(self.diagonal).all()
-        off = max(np.abs(first - self.diagonal[0]).max(), np.abs(self.diagonal - self.diagonal[0]).max())
-        return bool(finite and scale > 1e-12 and off > 1e-9 * scale)
-
-    def features(self, most: int) -> FloatArray:
-        """(n, r) L with L L^T the covariance, scaled to a mean diagonal of 1.
-
-        By Cholesky's factorisation with complete pivoting: features of the readings that are known least come first
-        (Higham 2002, Accuracy and Stability of Numerical Algorithms, 10.3).
-        """
-        scale = float(self.diagonal.mean())
-        left = self.diagonal / scale
-        found = np.empty((min(most, len(left)), len(left)))
-        for r in range(len(found)):
-            at = int(np.argmax(left))
-            if left.sum() <= LEFT * len(left) or left[at] <= 0.0:
-                return found[:r].T
-            column = self.column(at) / scale - found[:r, at] @ found[:r]
-            found[r] = column / np.sqrt(left[at])
-            left = np.maximum(left - found[r] ** 2, 0.0)
-            left[at] = 0.0
-        return found.T
-
-
-def _gaussian(x: FloatArray) -> Kernel:
-    """Smooth in x (n, k), whose range is 1."""
-    return Kernel(lambda i: np.exp(-0.5 * ((x - x[i]) ** 2).sum(axis=1)), np.ones(len(x)))
-
-
-def _linear(x: FloatArray, power: int = 1) -> Kernel:
-    """Linear in x (n, k), or a power of that."""
-    return Kernel(lambda i: (x @ x[i]) ** power, (x**2).sum(axis=1) ** power)
-
-
-def _same(labels: NDArray[Any]) -> Kernel:
-    """Alike for readings with the same label (n,)."""
-    return Kernel(lambda i: (labels == labels[i]).astype(float), np.ones(len(labels)))
+# Features of a form, and of the one that has one for each point and direction: what varies faster is left out.
+MOST_FEATURES, MOST_POINTS = 300, 2000
 
 
 def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
@@ -427,26 +387,26 @@ POINT_TO_POINT = "from point to point, different by direction"
 def _kernels(predictor: Predictor) -> dict[str, Kernel]:
     """Every form in words, and its covariance."""
     data = predictor.data
-    same_direction = _linear(data.direction, 2)
-    near = _gaussian(np.concatenate([data.position / RANGE_POSITION, data.angles / RANGE_ANGLE], axis=1))
+    same_direction = linear_kernel(data.direction, 2)
+    near = gaussian_kernel(np.concatenate([data.position / RANGE_POSITION, data.angles / RANGE_ANGLE], axis=1))
     place = np.concatenate([_centred(data.position / RANGE_POSITION), _centred(data.angles / RANGE_ANGLE)], axis=1)
-    linear = _linear(place)
-    in_order = _gaussian(np.linspace(0.0, 1.0, len(data))[:, None] / RANGE_ORDER)
+    linear = linear_kernel(place)
+    in_order = gaussian_kernel(np.linspace(0.0, 1.0, len(data))[:, None] / RANGE_ORDER)
     share = predictor.strut_columns()
-    struts = _linear(share)
+    struts = linear_kernel(share)
     forms = {
         "smooth over the workspace": near,
         "smooth over the workspace, different by direction": near * same_direction,
         "linear over the workspace, different by direction": linear * same_direction,
-        "curved over the workspace, different by direction": _linear(place, 2) * same_direction,
+        "curved over the workspace, different by direction": linear_kernel(place, 2) * same_direction,
         # Point by point: the same pose and tool, whatever the repeat.
-        POINT_TO_POINT: _same(data.point) * same_direction,
+        POINT_TO_POINT: same_kernel(data.point) * same_direction,
         "in the course of the campaign": in_order,
         "in the course of the campaign, different by direction": in_order * same_direction,
         "in the course of the campaign, over the workspace": in_order * linear * same_direction,
         "of single struts in the course of the campaign": struts * in_order,
         "of single struts with their length": _by_length(share, predictor.strut_lengths() / RANGE_LENGTH),
-        "of struts in tension against compression": _linear(share * np.sign(predictor.strut_forces())),
+        "of struts in tension against compression": linear_kernel(share * np.sign(predictor.strut_forces())),
         "of single struts over the workspace": struts * near,
     }
     columns = {"with the load": np.log(data.force), "with the tool length": data.tool_extension}
@@ -458,7 +418,7 @@ def _kernels(predictor: Predictor) -> dict[str, Kernel]:
     for words, column in columns.items():
         forms |= _by_column(column, words, same_direction, near)
     if len(set(data.setup.tolist())) > 1:
-        forms["between set-ups, different by direction"] = _same(data.setup) * same_direction
+        forms["between set-ups, different by direction"] = same_kernel(data.setup) * same_direction
     return forms
 
 
@@ -472,7 +432,7 @@ def _by_length(share: FloatArray, length: FloatArray) -> Kernel:
 def _by_column(column: FloatArray, words: str, same_direction: Kernel, near: Kernel) -> dict[str, Kernel]:
     if not np.isfinite(column).all() or np.ptp(column) == 0.0:
         return {}
-    product = _linear(_centred(column[:, None] / float(np.ptp(column))))
+    product = linear_kernel(_centred(column[:, None] / float(np.ptp(column))))
     return {
         words: product,
         f"{words}, different by direction": product * same_direction,

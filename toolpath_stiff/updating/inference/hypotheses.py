@@ -51,15 +51,10 @@ class Family:
 
 def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
     """Search one effect; None if it does nothing to these data."""
-    data = problem.predictor.data
-    tables, evidences = [], []
+    tables, evidences = tables_of(problem, effect), []
     best: Fit | None = None
     subsets: tuple[tuple[Fit, float], ...] = ()
-    for candidate in candidates_of(effect, data):
-        table = table_of(candidate, problem.predictor)
-        if table is None:
-            continue
-        tables.append(table)
+    for table in tables:
         scores = _scores(problem, table, base)
         for score, log_weight in scores:
             evidences.append(score.log_evidence + log_weight)
@@ -96,18 +91,23 @@ def score_families(
     return sorted(found, key=lambda family: (-family.log_evidence, family.name))
 
 
-def signatures(problem: Problem, families: Sequence[Family]) -> list[list[FloatArray]]:
+def tables_of(problem: Problem, effect: Effect) -> list[Table]:
+    """The tables of an effect, one a choice that does something to these data."""
+    found = (table_of(candidate, problem.predictor) for candidate in candidates_of(effect, problem.predictor.data))
+    return [table for table in found if table is not None]
+
+
+def signatures(problem: Problem, tables: Iterable[Table]) -> list[list[FloatArray]]:
     """One-sided small-size signatures d ln k / d size of every candidate: subsets of columns (n, p), sizes >= 0."""
     found = []
-    for family in families:
-        for table in family.tables:
-            columns = -table.columns / problem.base_compliance[:, None]
-            components = table.candidate.components
-            if len(components) == 1:
-                found.append([columns * sign for sign in components[0].signs])
-            else:
-                toward = np.array([c.signs[-1] for c in components])
-                found.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
+    for table in tables:
+        columns = -table.columns / problem.base_compliance[:, None]
+        components = table.candidate.components
+        if len(components) == 1:
+            found.append([columns * sign for sign in components[0].signs])
+        else:
+            toward = np.array([c.signs[-1] for c in components])
+            found.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
     return found
 
 
