@@ -14,7 +14,7 @@ from toolpath_stiff.updating.comparison import compare
 from toolpath_stiff.updating.correction import update
 from toolpath_stiff.updating.correction.document import document
 from toolpath_stiff.updating.diagnosis.document import document as diagnosis_document
-from toolpath_stiff.updating.inference.gates import question
+from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.prediction import Predictor
 
 ASKED = "Are these readings of this machine?"

@@ -28,9 +28,9 @@ from toolpath_stiff.updating.comparison.structure import (
     Structure,
     far_off,
 )
+from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import ErrorFigures, deviation_percent, error_figures, errors_text
-from toolpath_stiff.updating.inference.gates import question
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements

@@ -33,6 +33,7 @@ from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.correction.machines import fitted_machine
 from toolpath_stiff.updating.diagnosis import FEWEST
+from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.candidates import Candidate, Component, candidates_of, testable_effects
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import (
@@ -45,7 +46,7 @@ from toolpath_stiff.updating.inference.fits import (
     gain_in_standard_errors,
     held_out,
 )
-from toolpath_stiff.updating.inference.gates import Simulator, gain_threshold, question
+from toolpath_stiff.updating.inference.gates import Simulator, gain_threshold
 from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures, tables_of
 from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor

@@ -20,9 +20,9 @@ from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.updating.correction.ladder import Step, Update
+from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, HeldOut, held_out
-from toolpath_stiff.updating.inference.gates import question
 from toolpath_stiff.updating.inference.noise import noise_models
 from toolpath_stiff.updating.inference.prediction import NO_CHANGE, Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements

@@ -10,8 +10,6 @@ ones. Compared are
 - for the base model, the largest gain that any candidate achieves.
 
 The bootstrapped distribution of the smallest p value makes one test of them.
-
-Before both stands a question that no effect answers: whether the readings are of this machine at all (`question`).
 """
 
 from __future__ import annotations
@@ -23,7 +21,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.updating.inference.candidates import EXPECTED
 from toolpath_stiff.updating.inference.covariances import (
     Covariance,
     Kernel,
@@ -32,7 +29,7 @@ from toolpath_stiff.updating.inference.covariances import (
     linear_kernel,
     same_kernel,
 )
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Problem
+from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor
 
@@ -44,7 +41,6 @@ WILD_SQUARED = 11.3  # squared deleted residual beyond which a reading is set as
 MOST_WILD = 0.05
 CHANCE = 0.05  # share of campaigns in which the best of all candidates gains as much by chance
 HOPELESS = 1.3  # times the largest simulated sum of squares
-NOTHING = 1e-6  # of the model's own variation: less is rounding
 
 
 @dataclass(frozen=True)
@@ -299,53 +295,6 @@ def largest_gain(pulls: FloatArray, projected: Precision, signatures: Sequence[S
             gain = np.einsum("sp,sp->s", sizes, slope / scale)
             best = np.maximum(best, np.where((sizes > 0.0).all(axis=1), gain, 0.0))
     return best
-
-
-# -- are these readings of this machine? -------------------------------------------------------------------------------
-#
-# Readings in the wrong unit, of another machine or of other poses find an effect that fits them better than the model
-# does: any freedom helps where the model says nothing true. Two things say so before anything is fitted.
-
-FACTOR = float(np.exp(4.0 * LAW_PRIOR))  # of the median reading to the model: four standard deviations of the strut law
-# Correlation of ln measured with ln modelled below which the readings do not follow the model. Hidden effects that
-# change the stiffness by 30 % leave 0.8 and more, readings of other machines or in another order 0.3 and less.
-FOLLOWS = 0.5
-TELLS = EXPECTED[1]  # sd of ln modelled over the readings from which it is asked: as large as the largest effect
-FEWEST_FOLLOWING = 6  # readings that differ in what mechanics sees
-
-
-def question(predictor: Predictor) -> str:
-    """Whether these are readings of this machine, with the reason to ask; "" where there is none."""
-    reason = _unlike(predictor)
-    return f"Are these readings of this machine? {reason}." if reason else ""
-
-
-def _unlike(predictor: Predictor) -> str:
-    """In what the readings are unlike the model's, a sentence without its full stop; "" where they may be its own."""
-    model, which = predictor.log_stiffness(), predictor.distinct
-    residual = np.log(predictor.data.stiffness) - model
-    if not np.isfinite(residual).all():
-        return ""
-    ratio = float(np.exp(np.median(residual)))
-    if not 1.0 / FACTOR < ratio < FACTOR:
-        times = f"{ratio:.2g} times" if ratio > 1.0 else f"1 / {1.0 / ratio:.2g} of"
-        return f"The median reading is {times} what the model says"
-    count = np.bincount(which)
-    modelled = np.bincount(which, weights=model) / count
-    measured = modelled + np.bincount(which, weights=residual) / count
-    if len(count) < FEWEST_FOLLOWING or float(modelled.std()) < TELLS:
-        return ""
-    spread = float(measured.std())
-    centred = (measured - measured.mean()) @ (modelled - modelled.mean()) / len(count)
-    correlation = float(centred) / (spread * float(modelled.std())) if spread > NOTHING * float(modelled.std()) else 0.0
-    if correlation >= FOLLOWS:
-        return ""
-    if correlation == 0.0:
-        return "The readings are all alike, where the model says that they differ"
-    return (
-        f"They do not follow the model from pose to pose and direction to direction: the correlation of "
-        f"their logarithms is {correlation:.2f}, of this machine it would be {FOLLOWS:g} or more"
-    )
 
 
 # -- forms of discrepancy ----------------------------------------------------------------------------------------------

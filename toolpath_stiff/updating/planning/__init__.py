@@ -24,10 +24,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.updating.inference import Judgement, judge
+from toolpath_stiff.updating.inference import Judgement, judge, question
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.gates import question
 from toolpath_stiff.updating.inference.noise import LEAST, Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
