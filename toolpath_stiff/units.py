@@ -119,7 +119,9 @@ def pose_in_si(pose: ShopPose) -> Pose:
 # Sums run in another order on another CPU, and searches stop within a tolerance: digits beyond these are not certain.
 
 DIGITS = 5  # significant digits of a fitted figure
-CERTAIN = 7  # of any figure of a document that rests on a search: two CPUs differ in the tenth
+# Of any figure of a document that rests on a search: two CPUs differ in the tenth. Decimals at most: what is left of a
+# difference of like figures has fewer digits that are certain.
+CERTAIN, DECIMALS = 7, 8
 
 
 def json_number(value: float, digits: int = DIGITS) -> float | None:
@@ -128,9 +130,9 @@ def json_number(value: float, digits: int = DIGITS) -> float | None:
 
 
 def certain(found: Any) -> Any:
-    """A document with every float of `CERTAIN` digits; what is nothing beside them stays as it is."""
+    """A document with its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
     if isinstance(found, float):
-        return float(f"{found:.{CERTAIN}g}")
+        return float(f"{round(found, DECIMALS):.{CERTAIN}g}") + 0.0
     if isinstance(found, dict):
         return {key: certain(value) for key, value in found.items()}
     return [certain(value) for value in found] if isinstance(found, list | tuple) else found

@@ -18,7 +18,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.updating.comparison.document import Answer, ComparisonDocument, document_of
-from toolpath_stiff.updating.comparison.principles import Shares, assess, load_path_shares, model_free_checks
+from toolpath_stiff.updating.comparison.principles import LinkShares, assess, load_path_shares, model_free_checks
 from toolpath_stiff.updating.comparison.residuals import (
     Label,
     Variable,
@@ -82,7 +82,7 @@ class Comparison:
     excess: float
     numbers: tuple[Variable, ...]
     names: tuple[Label, ...]
-    shares: Shares
+    shares: LinkShares
     document: ComparisonDocument
 
     def variance(self, weights: FloatArray) -> float:

@@ -22,10 +22,10 @@ from toolpath_stiff.updating.comparison.residuals import (
 from toolpath_stiff.updating.comparison.structure import (
     EXCESSES,
     SIGNIFICANT,
-    Found,
+    FoundPattern,
+    FoundPatterns,
     Pattern,
     Scattering,
-    Structure,
     far_off,
 )
 from toolpath_stiff.updating.inference import question
@@ -173,8 +173,8 @@ class Answer:
 
     noise: Noise
     scattering: Scattering
-    structure: Structure
-    refitted: Structure | None
+    structure: FoundPatterns
+    refitted: FoundPatterns | None
     law: Fit | None
     model_free: list[CheckEntry]
 
@@ -389,10 +389,10 @@ def _assumptions(answers: list[Answer]) -> list[str]:
 
 
 def as_finding(
-    found: Found,
+    found: FoundPattern,
     step: int,
-    structure: Structure,
-    refitted: Structure | None,
+    structure: FoundPatterns,
+    refitted: FoundPatterns | None,
     looked_for: list[Pattern],
     numbers: list[Variable],
     residual: FloatArray,

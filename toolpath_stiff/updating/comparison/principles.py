@@ -294,7 +294,7 @@ def _setups(data: Measurements) -> Iterator[Check]:
 
 
 @dataclass(frozen=True)
-class Shares:
+class LinkShares:
     """Compliance by link.
 
     Attributes
@@ -312,7 +312,7 @@ class Shares:
     poses: int
 
 
-def load_path_shares(model: StiffnessModel, data: Measurements) -> Shares:
+def load_path_shares(model: StiffnessModel, data: Measurements) -> LinkShares:
     """Shares at the measured poses, each counted once."""
     setup = np.unique(data.setup, return_inverse=True)[1]
     keys = np.concatenate([data.position, data.angles, data.tool_extension[:, None], setup[:, None]], axis=1)
@@ -322,7 +322,7 @@ def load_path_shares(model: StiffnessModel, data: Measurements) -> Shares:
         rows = replace(distinct, direction=np.broadcast_to(axis, (len(distinct), 3)).copy())
         by_axis.append(_by_link(model, rows).mean(axis=0))
     names = tuple(f"strut {i + 1}" for i in range(6)) + tuple(active.effect.name for active in model.effects)
-    return Shares(names, np.array(by_axis), len(distinct))
+    return LinkShares(names, np.array(by_axis), len(distinct))
 
 
 def _by_link(model: StiffnessModel, data: Measurements) -> FloatArray:

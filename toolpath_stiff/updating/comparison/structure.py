@@ -72,7 +72,7 @@ class Pattern:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundPattern:
     """The answer about one pattern.
 
     Attributes
@@ -98,7 +98,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Structure:
+class FoundPatterns:
     """All answers.
 
     Attributes
@@ -113,8 +113,8 @@ class Structure:
         Of residuals this large in scatter alone.
     """
 
-    found: tuple[Found, ...]
-    tests: tuple[Found, ...]
+    found: tuple[FoundPattern, ...]
+    tests: tuple[FoundPattern, ...]
     excess: float
     excess_left: float
     probability: float
@@ -340,7 +340,7 @@ def find_structure(
     scattering: Scattering,
     fixed: FloatArray | None = None,
     most: int = MOST_PATTERNS,
-) -> Structure:
+) -> FoundPatterns:
     """Which patterns residuals (n,) show beyond scatter.
 
     Parameters
@@ -359,8 +359,8 @@ def find_structure(
     n = len(residual)
     columns = np.array([one.values for one in patterns])
     base = np.zeros((0, n)) if fixed is None else fixed
-    found: list[Found] = []
-    tests: tuple[Found, ...] = ()
+    found: list[FoundPattern] = []
+    tests: tuple[FoundPattern, ...] = ()
     excess = left = 0.0
     for step in range(most + 1):
         fit = _Fit(scattering, columns, base)
@@ -381,11 +381,11 @@ def find_structure(
     square = float(scattering.covariance.precision.squares(residual))
     simulated = scattering.covariance.precision.squares(scattering.draws(0.0))
     probability = (1.0 + float((simulated >= square).sum())) / (1.0 + len(simulated))
-    return Structure(tuple(found), tests, excess, left, probability)
+    return FoundPatterns(tuple(found), tests, excess, left, probability)
 
 
 def far_off(
-    residual: FloatArray, scattering: Scattering, structure: Structure, patterns: list[Pattern]
+    residual: FloatArray, scattering: Scattering, structure: FoundPatterns, patterns: list[Pattern]
 ) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
     """(n,) residuals with the patterns found taken out, rows far from nought, the furthest first, and (n,) in sd."""
     columns = np.array([patterns[f.pattern].values for f in structure.found]).reshape(-1, len(residual)).T
@@ -395,14 +395,14 @@ def far_off(
     return rest, order[np.abs(ratio[order]) > FAR_OFF], ratio
 
 
-def _answers(fit: _Fit, at: int, factor: float, t: FloatArray, p: FloatArray) -> list[Found]:
+def _answers(fit: _Fit, at: int, factor: float, t: FloatArray, p: FloatArray) -> list[FoundPattern]:
     """One answer a pattern, at an excess of the grid and a factor on the noise."""
     x, sizes, _ = fit.columns(at)
     sizes = sizes / factor
     alike = np.abs(x.T @ x) > ALIKE
     np.fill_diagonal(alike, val=False)
     return [
-        Found(
+        FoundPattern(
             i,
             float(t[i]),
             float(p[i]),

@@ -33,9 +33,9 @@ from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning.campaign import RISER, TABLE, Campaign, first_campaign
 from toolpath_stiff.updating.planning.gaps import (
     SETTLED,
-    Outcome,
+    Expectation,
+    GapShares,
     ReadingNoise,
-    Shares,
     choose,
     enough,
     expectation,
@@ -137,12 +137,12 @@ class Plan:
 
     visits: Visits
     chosen: tuple[int, ...]
-    shares: dict[tuple[str, str], Shares]
+    shares: dict[tuple[str, str], GapShares]
     pairs: tuple[PairGap, ...]
     kinds: tuple[str, ...]
     why: tuple[str, ...]
-    before: Outcome
-    after: Outcome
+    before: Expectation
+    after: Expectation
     enough: int | None
     repeats: int | None
     minutes: float
@@ -232,7 +232,7 @@ def plan_measurements(
         pairs=pairs,
         kinds=kinds,
         why=why,
-        before=Outcome(before, float(max(weights.values()) >= SETTLED)),
+        before=Expectation(before, float(max(weights.values()) >= SETTLED)),
         after=after,
         enough=enough(visits, picked, forecasts, noise, seed),
         repeats=repeats_needed(visits, picked, forecasts, noise, seed),
@@ -292,7 +292,7 @@ def random_visits(plan: Plan, n: int, seed: int) -> tuple[int, ...]:
 
 def _pair(
     names: tuple[str, str],
-    share: Shares,
+    share: GapShares,
     chosen: Sequence[int],
     usable: NDArray[np.bool_],
     rivals: Sequence[Rival],

@@ -305,7 +305,7 @@ def plan_rows(
     visits, chosen
         The visits in measuring order; each is one clamping.
     taken
-        Names of points that new points must not bear.
+        Names of points that new points must not have.
     repeats
         Which repeat of its place each visit is, where places are clamped several times; else the rounds of a visit.
     """
