@@ -99,7 +99,8 @@ def older_cpu():
 @pytest.mark.parametrize("command", ["diagnose", "compare", "plan"])
 def test_the_same_command_writes_the_same_bytes_on_another_cpu(command, files, tmp_path):
     """Each into a folder of the same name; the campaign leaves the verdict ambiguous, so that a plan is made too."""
-    told = [command, "spindle.csv", "--no-plots", "--out", "found", *(["--n", "3"] if command == "plan" else [])]
+    given = ["--between", "spindle_compliance,table_compliance", "--n", "2"] if command == "plan" else ["spindle.csv"]
+    told = [command, *given, "--no-plots", "--out", "found"]
     folders = [shutil.copytree(files, tmp_path / name) for name in ("here", "there")]
     runs = [
         subprocess.Popen([sys.executable, "-m", "toolpath_stiff", *told], cwd=folder, env=env, stdout=subprocess.PIPE)
