@@ -382,20 +382,19 @@ class Scatter:
         """
         diagonal, wild = self.precision.diagonal, list(self.wild)
         pull = self.precision.times(residual)
-        taken: list[FloatArray] = []  # the inverse falls by column column^T
-        for _ in range(int(MOST_WILD * len(residual)) + 1):
+        most = int(MOST_WILD * len(residual)) + 1
+        taken = np.zeros((most, len(residual)))  # the inverse falls by row^T row of each
+        for k in range(most):
             own = 1.0 + self.widening * diagonal
             gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
             gain[wild] = -np.inf
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            column = self.precision.columns(np.array([row]))[0]
-            for earlier in taken:
-                column -= earlier * earlier[row]
+            column = self.precision.columns(np.array([row]))[0] - taken[:k, row] @ taken[:k]
             pull = pull - column * (self.widening[row] * pull[row] / own[row])
-            taken.append(column * np.sqrt(self.widening[row] / own[row]))
-            diagonal = diagonal - taken[-1] ** 2
+            taken[k] = column * np.sqrt(self.widening[row] / own[row])
+            diagonal = diagonal - taken[k] ** 2
             wild.append(row)
         if known is not None and set(known.wild) == set(wild):
             return known
