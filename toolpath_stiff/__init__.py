@@ -20,6 +20,17 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
+    from toolpath_stiff.api.correction import Plan as Plan
+    from toolpath_stiff.api.correction import Reduction as Reduction
+    from toolpath_stiff.api.correction import Update as Update
+    from toolpath_stiff.api.correction import plan as plan
+    from toolpath_stiff.api.correction import reduce as reduce
+    from toolpath_stiff.api.correction import update as update
+    from toolpath_stiff.api.diagnosis import Comparison as Comparison
+    from toolpath_stiff.api.diagnosis import Diagnosis as Diagnosis
+    from toolpath_stiff.api.diagnosis import Measurements as Measurements
+    from toolpath_stiff.api.diagnosis import compare as compare
+    from toolpath_stiff.api.diagnosis import diagnose as diagnose
     from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.api.effects import EffectCheck as EffectCheck
     from toolpath_stiff.api.effects import EffectFile as EffectFile
@@ -35,17 +46,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
-    from toolpath_stiff.api.measuring import Comparison as Comparison
-    from toolpath_stiff.api.measuring import Diagnosis as Diagnosis
-    from toolpath_stiff.api.measuring import Measurements as Measurements
-    from toolpath_stiff.api.measuring import Plan as Plan
-    from toolpath_stiff.api.measuring import Reduction as Reduction
-    from toolpath_stiff.api.measuring import Update as Update
-    from toolpath_stiff.api.measuring import compare as compare
-    from toolpath_stiff.api.measuring import diagnose as diagnose
-    from toolpath_stiff.api.measuring import plan as plan
-    from toolpath_stiff.api.measuring import reduce as reduce
-    from toolpath_stiff.api.measuring import update as update
     from toolpath_stiff.api.placements import CaseStudy as CaseStudy
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
@@ -91,10 +91,8 @@ _PUBLIC = {
         "Machine", "MachineCheck", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry",
     ),
     "api.many": ("ManyAnalyses", "analyze_many"),
-    "api.measuring": (
-        "Comparison", "Diagnosis", "Measurements", "Plan", "Reduction", "Update", "compare", "diagnose", "plan",
-        "reduce", "update",
-    ),
+    "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
+    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
     "api.placements": ("CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite"),
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),

@@ -36,3 +36,7 @@ CLAMPING = 0.01  # relative sd of clamping anew, assumed where the data cannot t
 # Mean of |x| over its standard deviation for a normal x: scatter alone leaves so large a mean error.
 MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
 NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
+
+# Environment variables by which linear algebra is told how many threads it may have, before it is loaded. One, by
+# design: on matrices of this size a second one costs four times the CPU, and sums keep their order.
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")

@@ -25,13 +25,13 @@ from multiprocessing.process import BaseProcess
 from types import FrameType, TracebackType
 from typing import Any, ParamSpec, TypeVar
 
+from toolpath_stiff.defaults import THREADS
 from toolpath_stiff.errors import InputError
 
 Arguments = ParamSpec("Arguments")
 Answer = TypeVar("Answer")
 
 LEAVE_SECONDS = 5.0  # for a process that is told to stop, to remove its temporary files
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _ONE_BY_ONE = threading.Lock()  # processes are started and reaped by one thread at a time
 
 

@@ -2,12 +2,13 @@
 
 Everything inside the package is SI; everything that a user reads or writes is in the shop's units.
 The functions take and return scalars or numpy arrays alike; they only multiply, so this module
-needs no imports and costs nothing at start-up.
+costs nothing at start-up. What is written is rounded here too (`json_number`, `certain`).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+import math
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -111,3 +112,27 @@ def pose_in_si(pose: ShopPose) -> Pose:
     """A pose in mm and degrees, in m and rad."""
     x, y, z, a, b, c = pose
     return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))
+
+
+# -- figures as they are written ---------------------------------------------------------------------------------------
+#
+# Sums run in another order on another CPU, and searches stop within a tolerance: digits beyond these are not certain.
+
+DIGITS = 5  # significant digits of a fitted figure
+# Of any figure of a document that rests on a search: two CPUs differ in the tenth. Decimals at most: what is left of a
+# difference of like figures has fewer digits that are certain.
+CERTAIN, DECIMALS = 7, 8
+
+
+def json_number(value: float, digits: int = DIGITS) -> float | None:
+    """A float of some significant digits; None for what JSON cannot hold."""
+    return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+
+
+def certain(found: Any) -> Any:
+    """A document with its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
+    if isinstance(found, float):
+        return float(f"{round(found, DECIMALS):.{CERTAIN}g}") + 0.0
+    if isinstance(found, dict):
+        return {key: certain(value) for key, value in found.items()}
+    return [certain(value) for value in found] if isinstance(found, list | tuple) else found

@@ -126,7 +126,6 @@ def test_the_command_writes_everything(tmp_path, capsys):
         (["nist-table1", "--machine", "no-such-machine"], "no-such-machine"),
         (["nist-table1", "--noise", "-3"], "noise"),
         (["nist-table1", "--seed", "-1"], "--seed -1"),
-        (["nist-table1", "--jobs", "0"], "--jobs 0"),
     ],
 )
 def test_errors_are_one_line_and_write_nothing(arguments, said, tmp_path, capsys):

@@ -22,6 +22,7 @@ from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
 from toolpath_stiff.updating.inference import Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
+from toolpath_stiff.updating.inference.covariances import Covariance, Groups
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
@@ -175,7 +176,13 @@ def judged(seed: int, layout: str = "tilted", hidden: str = "none", size: float 
 def make_problem(machine: Machine, data: Measurements, noise: Noise) -> tuple[Problem, FloatArray]:
     """Data, model and scatter, ready for fits; and the covariance (n, n) of ln readings."""
     problem = Problem.of(Predictor(machine, data), noise)
-    return problem, problem.covariance
+    return problem, problem.scatter.covariance.dense()
+
+
+def correlated_covariance(own: ArrayLike, shared: ArrayLike) -> Covariance:
+    """Of n readings with variances (n,) of their own, not clamped together, and shared columns (n, q)."""
+    own = np.asarray(own, dtype=float)
+    return Covariance(own, Groups.by(np.arange(len(own))), 0.0, np.asarray(shared, dtype=float).T)
 
 
 def examined(machine: Machine, data: Measurements, **options: Any) -> Diagnosis:

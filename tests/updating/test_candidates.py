@@ -198,7 +198,7 @@ def linear_table(per_unit: float, unit: float = 1.0) -> Table:
     declared = Parameter("a", "", 1.0, (0.0, 1e6 * unit), (0.01 * unit, 0.1 * unit), "made for a test")
     column = per_unit / unit * problem().base_compliance[:, None]
     column = column * np.linspace(0.0, 1.0, len(column))[:, None]
-    return Table(Candidate(EFFECTS["joint_compliance"], (), (Component.of(declared),)), column, {})
+    return Table(Candidate(EFFECTS["joint_compliance"], (), (Component.of(declared),)), column, dict)
 
 
 def test_the_unit_of_a_parameter_does_not_matter():

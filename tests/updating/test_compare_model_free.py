@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import active, readings_by_hand, simple_noise, table_1
+from tests.updating.cases import active, correlated_covariance, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.updating.comparison.principles import assess, model_free_checks, symmetries
 from toolpath_stiff.updating.inference.prediction import Predictor
@@ -24,7 +24,7 @@ def modelled(data: Measurements, effects=()) -> Measurements:
 
 def checked(data: Measurements, repeat: float = 0.02):
     noise = simple_noise(len(data), repeat)
-    spread = np.diag(noise.repeat**2)
+    spread = correlated_covariance(noise.repeat**2, np.zeros((len(data), 0)))
     draws = np.random.default_rng(0).normal(size=(400, len(data))) * repeat
     checks, cannot = model_free_checks(nist(), data)
     return assess(checks, data, spread, draws), cannot

@@ -67,7 +67,7 @@ def test_correlations_are_cosines_between_subspaces(case):
     """Readings whitened by the square root of the projected inverse covariance; the worst choice of each counts."""
     problem, families, found = case()
     law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
-    root = np.linalg.cholesky(np.linalg.inv(problem.covariance + 0.2**2 * law @ law.T)).T
+    root = np.linalg.cholesky(np.linalg.inv(problem.scatter.covariance.dense() + 0.2**2 * law @ law.T)).T
 
     def spans(family: Family) -> list[FloatArray]:
         columns = [root @ (table.columns / problem.base_compliance[:, None]) for table in family.tables]

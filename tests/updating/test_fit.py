@@ -54,7 +54,7 @@ def candidate(name: str, choice: int = 0) -> Candidate:
 
 def cost(problem: Problem, law: FloatArray, effects: list[ActiveEffect]) -> float:
     residual = problem.observed - problem.predictor.log_stiffness(law, effects)
-    return float(residual @ problem.scatter.inverse @ residual + law @ law / LAW_PRIOR**2)
+    return float(problem.scatter.precision.squares(residual) + law @ law / LAW_PRIOR**2)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_the_best_fit_is_the_best_fit(name, choice, start, truth):
     chosen = candidate(name, choice)
     free = tuple(range(len(start)))
     found = fit_effects(problem, [chosen], [np.array(start)], free, np.zeros(2))
-    whiten = np.linalg.cholesky(problem.scatter.inverse).T
+    whiten = np.linalg.cholesky(np.linalg.inv(problem.scatter.covariance.dense())).T
     unit = np.array([c.typical()[1] if np.isfinite(c.typical()[1]) else 1.0 for c in chosen.components])
 
     def residual(x: FloatArray) -> FloatArray:
@@ -157,7 +157,7 @@ def test_components_that_trade_off_against_each_other_end_in_one_place(seed):
     starts = [np.array([s, s, s, t]) for s, t in ((1e-9, 1e-9), (1e-9, 1e-10), (1e-10, 1e-12))]
     fits = [fit_effects(problem, [table], [start], (0, 1, 2, 3), np.zeros(2)) for start in starts]
     costs = [cost(problem, fit.law, [table.active(fit.sizes[0])]) for fit in fits]
-    whiten = np.linalg.cholesky(problem.scatter.inverse).T
+    whiten = np.linalg.cholesky(np.linalg.inv(problem.scatter.covariance.dense())).T
 
     def residual(x: FloatArray) -> FloatArray:
         logs = problem.predictor.log_stiffness(x[:2], [table.active(x[2:] * 1e-9)])

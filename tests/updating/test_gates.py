@@ -11,11 +11,12 @@ from scipy.optimize import nnls
 from scipy.stats import binom, chi2, kstest
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, make_problem, simple_noise
+from tests.updating.cases import campaign, correlated_covariance, make_problem, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import (
     DRAWS,
+    Forms,
     Gate,
     Simulator,
     Structure,
@@ -38,10 +39,14 @@ def noise(freedom: float = np.inf, outliers: float = 0.0) -> Noise:
 
 
 @cache
-def setting() -> tuple[Problem, FloatArray, dict[str, FloatArray]]:
+def setting() -> tuple[Problem, FloatArray, Forms]:
     """The paper's layout, its covariance (42, 42), the forms of discrepancy."""
     problem, spread = make_problem(nist(), campaign(31, "paper")[0], noise())
-    return problem, spread, discrepancy_forms(problem.predictor)
+    return problem, spread, Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
+
+
+def simulator_of(seed: int, draws: int = DRAWS, **options: float) -> Simulator:
+    return Simulator.of(noise(**options), setting()[0].scatter.covariance, seed, draws)
 
 
 def refitted(problem: Problem, logs: FloatArray) -> Fit:
@@ -66,8 +71,8 @@ def null_logs(seed: int) -> FloatArray:
 @cache
 def null_gates() -> tuple[Gate, ...]:
     """120 campaigns with nothing hidden, each with its own bootstrap."""
-    problem, spread, _ = setting()
-    return tuple(gate_of(problem, null_logs(k), Simulator.of(noise(), spread, seed=k)) for k in range(120))
+    problem = setting()[0]
+    return tuple(gate_of(problem, null_logs(k), simulator_of(k)) for k in range(120))
 
 
 def test_false_alarms_as_often_as_they_should_be():
@@ -82,16 +87,16 @@ def test_false_alarms_as_often_as_they_should_be():
 
 
 def test_noise_that_is_larger_or_structured_is_seen():
-    problem, spread, forms = setting()
-    simulator = Simulator.of(noise(), spread, seed=1)
+    problem, spread, _ = setting()
+    simulator = simulator_of(1)
     rng = np.random.default_rng(5)
     model, root = problem.predictor.log_stiffness(), np.linalg.cholesky(spread)
     for _ in range(3):
         assert gate_of(problem, model + 2.0 * root @ rng.standard_normal(N), simulator).squares_probability < 0.01
     # A discrepancy of a few per cent, linear over the workspace and different by direction: structure, not size.
-    form = np.linalg.cholesky(forms["linear over the workspace, different by direction"] + 1e-9 * np.eye(N))
+    form = discrepancy_forms(problem.predictor)["linear over the workspace, different by direction"]
     for _ in range(3):
-        scatter, structure = root @ rng.standard_normal(N), 0.06 * form @ rng.standard_normal(N)
+        scatter, structure = root @ rng.standard_normal(N), 0.06 * form @ rng.standard_normal(form.shape[1])
         seen = gate_of(problem, model + scatter + structure, simulator)
         assert seen.probability < 0.05 and seen.structure_probability < 0.05
         shuffled = gate_of(problem, model + scatter + rng.permutation(structure), simulator)
@@ -99,29 +104,29 @@ def test_noise_that_is_larger_or_structured_is_seen():
 
 
 def test_the_same_seed_gives_the_same_probabilities():
-    problem, spread, _ = setting()
-    first, again = (gate_of(problem, null_logs(3), Simulator.of(noise(), spread, seed=1)) for _ in range(2))
+    problem = setting()[0]
+    first, again = (gate_of(problem, null_logs(3), simulator_of(1)) for _ in range(2))
     assert first.probability == again.probability and np.array_equal(first.simulated, again.simulated)
-    other = gate_of(problem, null_logs(3), Simulator.of(noise(), spread, seed=2))
+    other = gate_of(problem, null_logs(3), simulator_of(2))
     assert not np.array_equal(other.simulated, first.simulated)
 
 
 def test_simulated_scatter_has_the_covariance_and_its_uncertainty():
     _, spread, _ = setting()
-    draws = Simulator.of(noise(), spread, seed=2, draws=4000).draws
+    draws = simulator_of(2, 4000).draws
     white = draws @ np.linalg.inv(np.linalg.cholesky(spread)).T
     low, high = chi2.ppf([1e-4, 1.0 - 1e-4], white.size) / white.size
     assert low < np.mean(white**2) < high
     values = np.linalg.eigvalsh(white.T @ white / len(white))
     assert values.max() < 1.1 * (1.0 + np.sqrt(N / 4000)) ** 2  # Marchenko and Pastur 1967
     # A noise known to 10 degrees of freedom: Student's t, variance 10 / 8 of the normal's.
-    wide = Simulator.of(noise(freedom=10.0), spread, seed=2, draws=4000).draws
+    wide = simulator_of(2, 4000, freedom=10.0).draws
     assert np.mean(wide**2) / np.mean(draws**2) == pytest.approx(10.0 / 8.0, rel=0.05)
-    wild = Simulator.of(noise(outliers=0.1), spread, seed=2, draws=4000).draws
+    wild = simulator_of(2, 4000, outliers=0.1).draws
     expected = np.trace(spread) + N * 0.02**2 * 0.1 * (4.0**2 - 1.0)
     assert np.mean(wild**2) * N == pytest.approx(expected, rel=0.05)
-    assert np.array_equal(wild, Simulator.of(noise(outliers=0.1), spread, seed=2, draws=4000).draws)
-    assert not np.array_equal(wild, Simulator.of(noise(outliers=0.1), spread, seed=3, draws=4000).draws)
+    assert np.array_equal(wild, simulator_of(2, 4000, outliers=0.1).draws)
+    assert not np.array_equal(wild, simulator_of(3, 4000, outliers=0.1).draws)
 
 
 def test_a_reading_set_aside_is_as_if_it_had_never_been_taken():
@@ -130,8 +135,9 @@ def test_a_reading_set_aside_is_as_if_it_had_never_been_taken():
     law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
     projected, residual = problem.projected(law), np.random.default_rng(1).multivariate_normal(np.zeros(N), spread)
     residual[9] += 0.12  # six standard deviations
-    out, count = set_wild_aside((residual @ projected)[None], projected)
-    assert count[0] == 1
+    found = set_wild_aside(projected.times(residual[None]), projected)
+    out = found.pulls
+    assert found.count[0] == 1 and np.flatnonzero(found.taken[0]).tolist() == [9]
     stay = np.arange(N) != 9
     rest = np.linalg.inv(spread[np.ix_(stay, stay)] + 0.2**2 * law[stay] @ law[stay].T)
     assert out[0][stay] == pytest.approx(rest @ residual[stay], rel=1e-6)
@@ -148,12 +154,13 @@ def test_surprise_is_the_tail_of_chi_square_even_where_it_underflows():
 
 def test_structure_of_pure_noise_surprises_no_one():
     """Each form's tail probability is uniform under the null, as well as Satterthwaite's approximation has it."""
-    problem, spread, forms = setting()
+    problem, _, forms = setting()
     law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
     projected = problem.projected(law)
-    draws = Simulator.of(noise(), spread, seed=4, draws=1000).draws @ projected
-    tails = np.exp(-Structure(forms, projected).surprises(draws))
-    for column, name in zip(tails.T, forms, strict=True):
+    draws = simulator_of(4, 1000).draws
+    structure = Structure(forms, projected)
+    tails = np.exp(-structure.surprises(structure.loads(draws, np.zeros_like(draws))))
+    for column, name in zip(tails.T, forms.names, strict=True):
         assert 0.02 < np.mean(column < 0.05) < 0.08, name
         assert 0.4 < np.mean(column) < 0.6, name
 
@@ -163,13 +170,13 @@ def test_largest_gain_is_that_of_non_negative_least_squares(columns):
     """All subsets with positive sizes, against the active-set method of Lawson and Hanson on whitened readings."""
     rng = np.random.default_rng(columns)
     n = 15
-    loose = rng.normal(size=(n, n))
-    projected = loose @ loose.T
+    covariance = correlated_covariance(rng.uniform(0.5, 2.0, n), rng.normal(size=(n, 3)))
+    projected = np.linalg.inv(covariance.dense())
     root = np.linalg.cholesky(projected).T
     shape = rng.normal(size=(n, columns))
     subsets = [list(s) for s in ([0], [1], [2], [0, 1], [0, 2], [1, 2], [0, 1, 2]) if max(s) < columns]
     residuals = rng.normal(size=(50, n))
-    found = largest_gain(residuals @ projected, projected, [[shape[:, s] for s in subsets]])
+    found = largest_gain(residuals @ projected, covariance.precision, [[shape[:, s] for s in subsets]])
     for residual, gain in zip(residuals, found, strict=True):
         left = nnls(root @ shape, root @ residual)[1] ** 2
         assert gain == pytest.approx(float(residual @ projected @ residual) - left, rel=1e-8, abs=1e-9)
@@ -177,17 +184,16 @@ def test_largest_gain_is_that_of_non_negative_least_squares(columns):
 
 def test_the_gain_of_the_best_of_many_is_judged_against_the_best_of_many():
     """With nothing hidden the threshold exceeds that of a single effect, and the real search rarely passes it."""
-    problem, spread, forms = setting()
+    problem, _, forms = setting()
     effects = [find_effect(name) for name in ("weak_strut", "gauge_scale", "table_compliance", "frame_compliance")]
     passed, thresholds = 0, []
     for k in range(20):
         base = refitted(problem, null_logs(1000 + k))
         families = score_families(problem, effects, base)
         gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
-        simulator = Simulator.of(noise(), spread, seed=k)
-        gate = absolute_gate(
-            problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain
-        )
+        simulator = simulator_of(k)
+        signs = signatures(problem, [table for family in families for table in family.tables])
+        gate = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signs, gain)
         thresholds.append(gate.gain_threshold)
         passed += gate.gain_probability <= 0.05
     single = float(chi2.ppf(0.90, 1))  # one-sided 5 % of one effect

@@ -12,13 +12,14 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, simple_noise
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.updating.inference.candidates import candidates_of
+from toolpath_stiff.updating.inference.covariances import Covariance, Groups
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
-from toolpath_stiff.updating.inference.fits import _inverse_without, fit_effects, gain_in_standard_errors, held_out
+from toolpath_stiff.updating.inference.fits import fit_effects, gain_in_standard_errors, held_out, products_without
 from toolpath_stiff.updating.inference.noise import Scatter
 
 DATA = campaign(21, "paper", "weak_strut", 0.06)[0]
 NOISE = simple_noise(len(DATA), 0.02, 0.01, 0.01, 0.5e-3)
-PROBLEM, COVARIANCE = make_problem(nist(), DATA, NOISE)
+PROBLEM = make_problem(nist(), DATA, NOISE)[0]
 
 
 def fit(problem: Problem, name: str | None = "weak_strut") -> Fit:
@@ -38,8 +39,7 @@ def honest(whole: Fit) -> np.ndarray:
         out = DATA.point == label
         rest = make_problem(nist(), DATA.select(~out), NOISE.select(~out))[0]
         # The same joint positions and struts are uncertain: the covariance of the readings that stay.
-        kept = COVARIANCE[np.ix_(~out, ~out)]
-        rest = Problem(rest.predictor, Scatter.of(NOISE.select(~out), kept), kept)
+        rest = Problem(rest.predictor, Scatter.of(NOISE.select(~out), PROBLEM.scatter.covariance.select(~out)))
         again = fit_effects(rest, whole.candidates, whole.sizes, whole.free, whole.law)
         residual[out] = (PROBLEM.observed - PROBLEM.predictor.log_stiffness(again.law, again.effects))[out]
     return residual
@@ -76,21 +76,29 @@ def test_more_parameters_look_better_fitted_than_held_out():
         base = fit(problem, None)
         table = candidates_of(find_effect("table_compliance"), data)
         more = fit_effects(problem, table, [np.array([1e-9, 1e-9, 1e-9, 1e-10])], (0, 1, 2, 3), np.zeros(2))
-        weighed = [float(f.residual @ problem.scatter.inverse @ f.residual) for f in (base, more)]
+        weighed = [float(problem.scatter.precision.squares(f.residual)) for f in (base, more)]
         assert weighed[1] <= weighed[0] + 0.1
         before, after = held_out(base, data.point), held_out(more, data.point)
         better.append(gain_in_standard_errors(before, after))
     assert np.mean(np.array(better) > 1.0) <= 0.4
 
 
-def test_the_covariance_of_what_stays_is_inverted_by_its_complement():
+def test_products_of_what_stays_are_those_of_its_own_covariance():
+    """Points of one to five readings, clampings across points: generalised least squares of the rest, inverted anew."""
     rng = np.random.default_rng(0)
-    loose = rng.normal(size=(12, 12))
-    covariance = loose @ loose.T + np.eye(12)
-    out = np.zeros(12, dtype=bool)
-    out[[1, 5, 6]] = True
-    expected = np.linalg.inv(covariance[np.ix_(~out, ~out)])
-    assert _inverse_without(np.linalg.inv(covariance), out) == pytest.approx(expected, rel=1e-8, abs=1e-10)
+    covariance = Covariance(rng.uniform(0.5, 2.0, 12), Groups.by(rng.integers(0, 4, 12)), 0.7, rng.normal(size=(3, 12)))
+    points = Groups.by(np.array([0, 1, 2, 1, 0, 1, 2, 2, 2, 2, 3, 0]))
+    columns, residual = rng.normal(size=(12, 2)), rng.normal(size=12)
+    count = 0
+    for which, left_out, products in products_without(covariance.precision, columns, residual, points):
+        for label, out, found in zip(which, left_out, products, strict=True):
+            assert out.tolist() == np.flatnonzero(points.of == label).tolist()
+            stay = np.setdiff1d(np.arange(12), out)
+            weighted = columns[stay].T @ np.linalg.inv(covariance.dense()[np.ix_(stay, stay)])
+            assert found[:, :2] == pytest.approx(weighted @ columns[stay], rel=1e-9)
+            assert found[:, 2] == pytest.approx(weighted @ residual[stay], rel=1e-9)
+            count += len(out)
+    assert count == 12
 
 
 def test_the_gain_is_a_paired_t_statistic_over_points():

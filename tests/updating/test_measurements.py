@@ -1,4 +1,4 @@
-"""Measurement files: what is read, what is said aloud, what is refused and how."""
+"""Measurement files: what is read, what is pointed out, what is refused and how."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2, multivariate_normal
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, readings_by_hand, simple_noise, table_1
+from tests.updating.cases import campaign, correlated_covariance, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig import Nuisances
 from toolpath_stiff.updating.inference.noise import (
@@ -137,7 +137,7 @@ def test_covariance_is_that_of_simulated_campaigns():
     data = campaign(0, "paper", nuisances=nuisances)[0]
     predictor = Predictor(nist(), data)
     noise = simple_noise(len(data), 0.01, 0.02, 0.03, 1e-3)
-    root = np.linalg.inv(np.linalg.cholesky(covariance(noise, predictor)))
+    root = np.linalg.inv(np.linalg.cholesky(covariance(noise, predictor).dense()))
     model = predictor.log_stiffness()
     count = 60
     logs = [np.log(campaign(seed, "paper", nuisances=nuisances)[0].stiffness) - model for seed in range(count)]
@@ -151,7 +151,7 @@ def test_covariance_is_that_of_simulated_campaigns():
     # Each part is needed: without it something stands out far.
     for without in ({"clamping": 0.0}, {"strut_spread": 0.0}, {"joint_error": 0.0}):
         parts = {"repeat": 0.01, "clamping": 0.02, "strut_spread": 0.03, "joint_error": 1e-3} | without
-        bare = np.linalg.inv(np.linalg.cholesky(covariance(simple_noise(len(data), **parts), predictor)))
+        bare = np.linalg.inv(np.linalg.cholesky(covariance(simple_noise(len(data), **parts), predictor).dense()))
         assert np.mean((np.array(logs) @ bare.T) ** 2) > 1.2 * high
 
 
@@ -163,7 +163,7 @@ def correlated(n: int = 30, outliers: float = 0.02) -> tuple[Scatter, np.ndarray
     matrix = np.diag(noise.repeat**2) + shared @ shared.T
     residual = rng.multivariate_normal(np.zeros(n), matrix)
     residual[7] += 0.25
-    return Scatter.of(noise, matrix), matrix, residual
+    return Scatter.of(noise, correlated_covariance(noise.repeat**2, shared)), matrix, residual
 
 
 def test_scatter_is_the_multivariate_normal():
@@ -171,7 +171,7 @@ def test_scatter_is_the_multivariate_normal():
     expected = multivariate_normal(np.zeros(len(residual)), matrix).logpdf(residual)
     found = float(scatter.log_likelihood(residual)) - 0.5 * len(residual) * math.log(2.0 * math.pi)
     assert found == pytest.approx(expected, rel=1e-10)
-    assert scatter.inverse == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
+    assert scatter.precision.times(np.eye(len(matrix))) == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
 
 
 def test_a_wild_reading_is_found_and_its_own_scatter_widened():
@@ -179,8 +179,8 @@ def test_a_wild_reading_is_found_and_its_own_scatter_widened():
     wild = scatter.with_wild(residual)
     assert wild.wild == (7,)
     matrix[7, 7] += (4.0**2 - 1.0) * 0.02**2
-    assert wild.inverse == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
-    assert wild.log_determinant == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-10)
+    assert wild.precision.times(np.eye(len(matrix))) == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
+    assert wild.covariance.log_determinant == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-10)
     price = math.log(0.98 / 0.02)
     normal = multivariate_normal(np.zeros(len(residual)), matrix).logpdf(residual)
     constant = 0.5 * len(residual) * math.log(2.0 * math.pi)
@@ -196,8 +196,8 @@ def test_several_wild_readings_and_an_answer_that_is_known_already():
     assert set(wild.wild) >= {7, 20}
     for row in wild.wild:
         matrix[row, row] += (4.0**2 - 1.0) * 0.02**2
-    assert wild.inverse == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
-    assert wild.log_determinant == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-10)
+    assert wild.precision.times(np.eye(len(matrix))) == pytest.approx(np.linalg.inv(matrix), rel=1e-6, abs=1e-6)
+    assert wild.covariance.log_determinant == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-10)
     assert scatter.with_wild(residual, wild) is wild
     assert scatter.with_wild(residual, scatter) is not scatter
 

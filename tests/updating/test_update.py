@@ -1,4 +1,4 @@
-"""Updates: hidden effects found by name, by --auto; what the data do not bear is refused; files give the fit back."""
+"""Updates: hidden effects found by name, by --auto; what data do not support is refused; files give the fit back."""
 
 from __future__ import annotations
 

@@ -115,7 +115,6 @@ def test_the_papers_own_estimation_with_its_figure_3(tmp_path, capsys):
         (("--objective", "mean-error"), "--strut-law"),
         (("--add", "weak_strutt"), "weak_strut"),
         (("--auto", "--seed", "-1"), "--seed -1"),
-        (("--auto", "--jobs", "0"), "--jobs 0"),
     ],
 )
 def test_wrong_arguments(arguments, words, tmp_path, capsys):

@@ -18,11 +18,11 @@ from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
 from toolpath_stiff.updating.diagnosis import common_verdict
 from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, _smallest_set
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.gates import Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.noise import Scatter, covariance
 
 STRONG = 0.1
-SEEDS = tuple(range(100, 112))
+SEEDS = tuple(range(100, 108))
 
 
 def naive_gate(seed: int) -> float:
@@ -32,23 +32,24 @@ def naive_gate(seed: int) -> float:
     naive = replace(noise, repeat=noise.reading, clamping=0.0, strut_spread=0.0, joint_error=0.0)
     predictor = judgement.problem.predictor
     spread = covariance(naive, predictor)
-    problem = Problem(predictor, Scatter.of(naive, spread), spread)
+    problem = Problem(predictor, Scatter.of(naive, spread))
     base = problem.score_base()
     simulator = Simulator.of(naive, spread, seed=0)
-    return absolute_gate(problem, base.residual, base.jacobian, simulator, discrepancy_forms(predictor)).probability
+    forms = Forms(discrepancy_forms(predictor), spread.precision)
+    return absolute_gate(problem, base.residual, base.jacobian, simulator, forms).probability
 
 
 def test_where_nothing_is_hidden_nothing_is_found():
-    """12 dense campaigns; the issue allows 10 % false alarms, 3 of 12 is what chance makes of them once in 40 times."""
+    """8 dense campaigns; the issue allows 10 % false alarms, 2 of 8 is what chance exceeds once in 26 times."""
     alarms = [judged(seed).verdict != "adequate" for seed in SEEDS]
-    assert binom.sf(3, 12, 0.10) < 0.03
-    assert sum(alarms) <= 3
+    assert binom.sf(2, 8, 0.10) < 0.04
+    assert sum(alarms) <= 2
     for seed in SEEDS:
         if judged(seed).verdict == "adequate":
             assert NONE in judged(seed).plausible
     # Without clamping, strut spread and joint errors the same campaigns look broken: at least the 40 % of the issue.
     naive = [naive_gate(seed) <= FALSE_ALARM for seed in SEEDS]
-    assert sum(naive) >= 5 and sum(naive) > sum(alarms)
+    assert sum(naive) >= 4 and sum(naive) > sum(alarms)
 
 
 def test_a_sparse_campaign_without_anything_hidden_is_adequate_too():

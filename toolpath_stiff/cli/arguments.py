@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -21,17 +20,6 @@ if TYPE_CHECKING:
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 ALL_BLOCKS = "all"
 LOADS_HELP = "tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ"
-
-
-def limit_threads(jobs: int) -> None:
-    """Let linear algebra use `jobs` threads, if it is not loaded yet: on small matrices more only cost time.
-
-    Raises `InputError` for fewer than one.
-    """
-    if jobs < 1:
-        raise InputError(f"--jobs {jobs}", expected="1 or more")
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, str(jobs))
 
 
 def finite_number(text: str) -> float:

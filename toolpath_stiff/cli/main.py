@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 from toolpath_stiff import __version__
 from toolpath_stiff.cli.arguments import whole_options
+from toolpath_stiff.defaults import THREADS
 from toolpath_stiff.errors import TpsError
 
 
@@ -146,5 +147,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def entry() -> None:
-    """Console script."""
+    """Console script: one thread of linear algebra, whatever the command."""
+    os.environ.update(dict.fromkeys(THREADS, "1"))
     sys.exit(main())

@@ -7,13 +7,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.api.measuring import COSTS
+from toolpath_stiff.api.correction import COSTS
 from toolpath_stiff.cli.arguments import (
     add_condition_options,
     add_json_option,
     add_program_options,
     finite_number,
-    limit_threads,
     positive_number,
     program_for,
 )
@@ -29,8 +28,8 @@ from toolpath_stiff.cli.outputs import (
 from toolpath_stiff.defaults import MACHINE, STRUT_SPREAD
 
 if TYPE_CHECKING:
+    from toolpath_stiff.api.diagnosis import Measurements
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.measuring import Measurements
 
 
 def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherwise: str = "") -> None:
@@ -66,12 +65,11 @@ def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and
 def add_output_arguments(
     parser: argparse.ArgumentParser, command: str, kept: str, *, force: bool = True, of: str = "DATA"
 ) -> None:
-    """--seed, --jobs, --out, --replace (--force), --no-plots, --json; `kept` is what --no-plots writes still.
+    """--seed, --out, --replace (--force), --no-plots, --json; `kept` is what --no-plots writes still.
 
     `of` is what the folder is named after.
     """
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads (default: 1)")
     parser.add_argument("--out", metavar="DIR", help=f"folder (default: reports/<{of}>-{command})")
     add_replace_option(parser, force=force)
     parser.add_argument("--no-plots", action="store_true", help=f"only {kept}")
@@ -80,8 +78,8 @@ def add_output_arguments(
 
 def measured(args: argparse.Namespace) -> tuple[Machine, Measurements]:
     """The machine with its effect files, and the measurements."""
+    from toolpath_stiff.api.diagnosis import Measurements
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.measuring import Measurements
 
     return Machine.load(args.machine, effects=args.effects), Measurements(args.data)
 
@@ -136,7 +134,7 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
 
 def reduce(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
-    from toolpath_stiff.api.measuring import reduce
+    from toolpath_stiff.api.correction import reduce
     from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.tables import split_name
@@ -184,8 +182,7 @@ def compare(args: argparse.Namespace) -> int:
     from toolpath_stiff.report.compare import names
 
     target = destination(args, "compare", args.data, "-compare").check(names(not args.no_plots))
-    limit_threads(args.jobs)
-    from toolpath_stiff.api.measuring import compare
+    from toolpath_stiff.api.diagnosis import compare
 
     with progress_line(quiet=args.json) as progress:
         found = compare(*measured(args), **noise_options(args), progress=progress)
@@ -227,8 +224,7 @@ def diagnose(args: argparse.Namespace) -> int:
     from toolpath_stiff.report.diagnose import names
 
     target = destination(args, "diagnose", args.data, "-diagnose").check(names(not args.no_plots))
-    limit_threads(args.jobs)
-    from toolpath_stiff.api.measuring import diagnose
+    from toolpath_stiff.api.diagnosis import diagnose
 
     machine, data = measured(args)
     with progress_line(quiet=args.json) as progress:
@@ -279,7 +275,9 @@ def update_arguments(parser: argparse.ArgumentParser) -> None:
         help="add effects as long as the error at left-out points falls and the data support it",
     )
     parser.add_argument(
-        "--force", action="store_true", help="write what the data do not support as well; and as --replace"
+        "--force",
+        action="store_true",
+        help="write what the data do not support as well, but never a machine that fits worse; and as --replace",
     )
     parser.add_argument(
         "--objective", choices=("likelihood", "mean-error"), default="likelihood",
@@ -298,8 +296,7 @@ def update(args: argparse.Namespace) -> int:
     replaced = check_written(args, [args.output])
     target = destination(args, "update", args.data, "-update")
     target.check(names(not args.no_plots, machine=args.output is None))
-    limit_threads(args.jobs)
-    from toolpath_stiff.api.measuring import update
+    from toolpath_stiff.api.correction import update
 
     with progress_line(quiet=args.json) as progress:
         found = update(
@@ -393,11 +390,10 @@ def _cost(text: str) -> tuple[str, float]:
 
 def plan(args: argparse.Namespace) -> int:
     """Plan, write the files, say what the plan promises."""
-    from toolpath_stiff.report.plan import names
+    from toolpath_stiff.report.measuring import names
 
     target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
-    limit_threads(args.jobs)
-    from toolpath_stiff.api.measuring import plan
+    from toolpath_stiff.api.correction import plan
 
     machine, data = measured(args)
     found = plan(

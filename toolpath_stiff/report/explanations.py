@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from toolpath_stiff.defaults import MEAN_OVER_SD
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report.words import WIDTH, labelled, machine_text, number, plain, shortened
 from toolpath_stiff.updating.inference.candidates import choice_text
@@ -16,8 +17,6 @@ from toolpath_stiff.updating.inference.candidates import choice_text
 if TYPE_CHECKING:
     from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument
 
-# Mean of |x| over its standard deviation for a normal x, sqrt(2 / pi): scatter alone leaves so large a mean error.
-MEAN_OVER_SD = math.sqrt(2.0 / math.pi)
 NONE = "none"
 LEAST = 0.005  # probability from which a row is more than "< 0.5 %"
 SETTLED = ("does not fit", "ruled out")
@@ -212,6 +211,8 @@ def floor_text(document: DiagnosisDocument) -> str:
 
 def headline(document: DiagnosisDocument) -> str:
     """The verdict as one sentence: the cause where one was found."""
+    if document.get("question"):
+        return plain(str(document["question"]))
     verdict = str(document.get("verdict") or "-")
     cause = str((best_explanation(document) or {}).get("finding") or "") if verdict == "identified" else ""
     if cause:

@@ -277,7 +277,7 @@ def planes_png(found: Comparison) -> Figure:
             chosen = near & ((where == plane) | (plane == "all")) & ((along == axis) | (axis == "all"))
             if chosen.any():
                 weights = chosen / chosen.sum()
-                error = 100.0 * float(np.sqrt(weights @ found.covariance @ weights))
+                error = 100.0 * float(np.sqrt(found.variance(weights)))
                 cells[i, j] = deviation_percent(weights @ found.residual), error, chosen.sum()
     from matplotlib import colormaps
 

@@ -7,7 +7,6 @@ counted and which sign they have: `baseline`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.updating.comparison.document import Answer, ComparisonDocument, document_of
-from toolpath_stiff.updating.comparison.principles import Shares, assess, load_path_shares, model_free_checks
+from toolpath_stiff.updating.comparison.principles import LinkShares, assess, load_path_shares, model_free_checks
 from toolpath_stiff.updating.comparison.residuals import (
     Label,
     Variable,
@@ -31,6 +30,7 @@ from toolpath_stiff.updating.comparison.structure import (
     Scattering,
     find_structure,
 )
+from toolpath_stiff.updating.inference.covariances import Covariance, Groups
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import Baseline
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance, noise_models
@@ -60,8 +60,9 @@ class Comparison:
         (n,) ln(measured / modelled).
     scatter
         (n,) standard deviation of `residual` from scatter alone, under the last noise.
-    covariance
-        (n, n) of the residuals under the last noise, with the excess scatter that was found.
+    covariance, places, excess
+        Of the residuals under the last noise; readings that are mechanically the same, and the relative sd by which
+        these scatter more than noise.
     numbers, names
         What the residuals were held against.
     shares
@@ -76,11 +77,18 @@ class Comparison:
     log_model: FloatArray
     residual: FloatArray
     scatter: FloatArray
-    covariance: FloatArray
+    covariance: Covariance
+    places: Groups
+    excess: float
     numbers: tuple[Variable, ...]
     names: tuple[Label, ...]
-    shares: Shares
+    shares: LinkShares
     document: ComparisonDocument
+
+    def variance(self, weights: FloatArray) -> float:
+        """Of a combination of residuals with weights (n,), by noise and by what it leaves unexplained."""
+        of_places = float((self.places.sums(weights) ** 2).sum())
+        return float(self.covariance.squares(weights)) + self.excess**2 * of_places
 
 
 def compare(
@@ -91,7 +99,6 @@ def compare(
     strut_spread: float = STRUT_SPREAD,
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
-    jobs: int = 1,
     draws: int = DRAWS,
     asked: Asked | None = None,
 ) -> Comparison:
@@ -111,8 +118,6 @@ def compare(
         A user's own effects, which the machine file may name.
     seed
         Of the simulated scatter.
-    jobs
-        Threads; the low and the high guess are independent.
     draws
         Simulated sets of readings.
     asked
@@ -148,22 +153,21 @@ def compare(
     looked_for = patterns(data, numbers, names)
     noises = noise_models(data, noise, strut_spread)
     checks, cannot = model_free_checks(machine, data)
-    joints, law_columns, place = predictor.joint_columns(), predictor.law_columns(log_model), _places(data)
+    law_columns, place = predictor.law_columns(log_model), _places(data)
 
     def answer(model: Noise) -> Answer:
-        spread = covariance(model, predictor, joints)
+        spread = covariance(model, predictor)
         scattering = Scattering(model, spread, data.clamp, place, draws, seed)
         structure = find_structure(residual, looked_for, scattering)
         refitted = law = None
         if len(data) >= FEWEST_TO_REFIT:
-            law = Baseline.of(Problem(predictor, Scatter.of(model, spread), spread)).refitted
+            law = Baseline.of(Problem(predictor, Scatter.of(model, spread))).refitted
             if np.linalg.cond(law_columns) < 1.0 / TELLS_LAW:
                 refitted = find_structure(residual, looked_for, scattering, law_columns.T, most=0)
         free = assess(checks, data, spread, scattering.draws(0.0))
         return Answer(model, scattering, structure, refitted, law, free)
 
-    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        answers = list(pool.map(answer, noises))
+    answers = [answer(one) for one in noises]
     files = tuple(dict.fromkeys(data.file.tolist()))
     asked = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
     document = document_of(
@@ -171,10 +175,10 @@ def compare(
         [hint("which effect would explain it", asked.command("diagnose"))],
     )  # fmt: skip
     last = answers[-1]
-    whole = last.scattering.covariance + last.structure.excess**2 * (place[:, None] == place[None, :])
     return Comparison(
-        predictor, data, noises, log_model, residual, np.sqrt(last.scattering.square), whole, tuple(numbers),
-        tuple(names), load_path_shares(predictor.base, data), document,
+        predictor, data, noises, log_model, residual, np.sqrt(last.scattering.square), last.scattering.covariance,
+        last.scattering.places, last.structure.excess, tuple(numbers), tuple(names),
+        load_path_shares(predictor.base, data), document,
     )  # fmt: skip
 
 

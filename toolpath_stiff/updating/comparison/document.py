@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NotRequired, TypedDict
+from typing import NotRequired, TypedDict, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.units import certain, mm_from_m
 from toolpath_stiff.updating.comparison.principles import (
     CheckEntry,
 )
@@ -22,12 +22,13 @@ from toolpath_stiff.updating.comparison.residuals import (
 from toolpath_stiff.updating.comparison.structure import (
     EXCESSES,
     SIGNIFICANT,
-    Found,
+    FoundPattern,
+    FoundPatterns,
     Pattern,
     Scattering,
-    Structure,
     far_off,
 )
+from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import ErrorFigures, deviation_percent, error_figures, errors_text
 from toolpath_stiff.updating.inference.noise import Noise
@@ -162,6 +163,7 @@ class ComparisonDocument(TypedDict):
     notes: list[str]
     hints: list[FindingEntry]
     text: str
+    question: str
     next: list[str]
 
 
@@ -171,8 +173,8 @@ class Answer:
 
     noise: Noise
     scattering: Scattering
-    structure: Structure
-    refitted: Structure | None
+    structure: FoundPatterns
+    refitted: FoundPatterns | None
     law: Fit | None
     model_free: list[CheckEntry]
 
@@ -210,7 +212,7 @@ def document_of(
     following: list[str],
 ) -> ComparisonDocument:
     """The content of compare.json; `following` are the commands that go on from here."""
-    data = predictor.data
+    data, asked = predictor.data, question(predictor)
     by_noise = {
         one.noise.name: [as_finding(f, i, one.structure, one.refitted, looked_for, numbers, residual)
                          for i, f in enumerate(one.structure.found)]
@@ -221,7 +223,7 @@ def document_of(
     baseline = _baseline(predictor, answers, residual)
     findings, tests = merged_findings(by_noise, answers_tests(answers, looked_for)), _tests(answers, looked_for)
     noises = [_noise(one.noise) for one in answers]
-    return {
+    written: ComparisonDocument = {
         "machine": predictor.machine.name,
         "effects": predictor.effects_that_act,
         "data": list(dict.fromkeys(data.file.tolist())),
@@ -243,9 +245,11 @@ def document_of(
         "warnings": list(data.warnings),
         "notes": list(data.notes),
         "hints": [] if findings else _hints(answers[-1], tests, looked_for, numbers, residual),
-        "text": overall_text(len(data), baseline, noises, findings),
+        "text": " ".join(filter(None, (asked, overall_text(len(data), baseline, noises, findings)))),
+        "question": asked,
         "next": following,
     }
+    return cast(ComparisonDocument, certain(written))
 
 
 def _baseline(predictor: Predictor, answers: list[Answer], residual: FloatArray) -> BaselineFigures:
@@ -385,10 +389,10 @@ def _assumptions(answers: list[Answer]) -> list[str]:
 
 
 def as_finding(
-    found: Found,
+    found: FoundPattern,
     step: int,
-    structure: Structure,
-    refitted: Structure | None,
+    structure: FoundPatterns,
+    refitted: FoundPatterns | None,
     looked_for: list[Pattern],
     numbers: list[Variable],
     residual: FloatArray,

@@ -25,6 +25,7 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.comparison.residuals import directions, radius
+from toolpath_stiff.updating.inference.covariances import Covariance
 from toolpath_stiff.updating.inference.noise import repeat_groups
 from toolpath_stiff.updating.measurements import Measurements, measured_path
 
@@ -120,7 +121,7 @@ def model_free_checks(machine: Machine, data: Measurements) -> tuple[list[Check]
     return checks, cannot
 
 
-def assess(checks: list[Check], data: Measurements, covariance: FloatArray, draws: FloatArray) -> list[CheckEntry]:
+def assess(checks: list[Check], data: Measurements, covariance: Covariance, draws: FloatArray) -> list[CheckEntry]:
     """Size, statistic and adjusted probability of every check.
 
     `draws` (m, n): simulated scatter, in which the largest statistic of all checks is looked up as well.
@@ -128,7 +129,7 @@ def assess(checks: list[Check], data: Measurements, covariance: FloatArray, draw
     if not checks:
         return []
     weights = np.array([check.weights for check in checks])
-    sd = np.sqrt(np.einsum("ij,jk,ik->i", weights, covariance, weights))
+    sd = np.sqrt(covariance.squares(weights))
     logs = np.log(data.stiffness)
     value = np.array([check.weights @ logs if check.size is None else check.size for check in checks])
     largest = np.abs(draws @ (weights / sd[:, None]).T).max(axis=1)
@@ -293,7 +294,7 @@ def _setups(data: Measurements) -> Iterator[Check]:
 
 
 @dataclass(frozen=True)
-class Shares:
+class LinkShares:
     """Compliance by link.
 
     Attributes
@@ -311,7 +312,7 @@ class Shares:
     poses: int
 
 
-def load_path_shares(model: StiffnessModel, data: Measurements) -> Shares:
+def load_path_shares(model: StiffnessModel, data: Measurements) -> LinkShares:
     """Shares at the measured poses, each counted once."""
     setup = np.unique(data.setup, return_inverse=True)[1]
     keys = np.concatenate([data.position, data.angles, data.tool_extension[:, None], setup[:, None]], axis=1)
@@ -321,7 +322,7 @@ def load_path_shares(model: StiffnessModel, data: Measurements) -> Shares:
         rows = replace(distinct, direction=np.broadcast_to(axis, (len(distinct), 3)).copy())
         by_axis.append(_by_link(model, rows).mean(axis=0))
     names = tuple(f"strut {i + 1}" for i in range(6)) + tuple(active.effect.name for active in model.effects)
-    return Shares(names, np.array(by_axis), len(distinct))
+    return LinkShares(names, np.array(by_axis), len(distinct))
 
 
 def _by_link(model: StiffnessModel, data: Measurements) -> FloatArray:

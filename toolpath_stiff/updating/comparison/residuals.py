@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import about
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
-from toolpath_stiff.updating.comparison.structure import SIGNIFICANT, Found, Pattern
+from toolpath_stiff.updating.comparison.structure import SIGNIFICANT, FoundPattern, Pattern
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -271,7 +271,7 @@ def _slopes(variable: Variable, group: str, rows: BoolArray) -> Iterator[Pattern
 
 
 def sentence(
-    found: Found, pattern: Pattern, numbers: dict[str, Variable], residual: FloatArray, first: bool
+    found: FoundPattern, pattern: Pattern, numbers: dict[str, Variable], residual: FloatArray, first: bool
 ) -> tuple[str, float]:
     """A finding in words, and its size in per cent: of a level the readings' mean, of a slope the change end to end.
 
@@ -337,7 +337,7 @@ def _short(value: float, values: FloatArray) -> str:
 
 
 def _level_words(
-    found: Found, pattern: Pattern, who: str, mean: float, readings: str, first: bool
+    found: FoundPattern, pattern: Pattern, who: str, mean: float, readings: str, first: bool
 ) -> tuple[str, float]:
     place = f" {pattern.place}" if pattern.place else " everywhere" if pattern.direction == ALL else ""
     size, own = percent(mean), percent(found.coefficient)

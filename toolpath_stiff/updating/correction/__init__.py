@@ -85,7 +85,7 @@ def update(
     auto
         Go on adding effects while the data support them.
     force
-        Keep what the data do not support.
+        Keep what the data do not support, or readings hardly of this machine; never what fits worse than `machine`.
     objective
         "likelihood"; or "mean-error", the paper's own estimation, of the strut law alone.
     noise, strut_spread, effect_files, seed, progress
@@ -118,7 +118,7 @@ def update(
     if objective == MEAN_ERROR:
         check_mean_error(add, strut_law, auto)
         found, search = update_by_mean_error(
-            machine, data, noise=noise, strut_spread=strut_spread, effect_files=effect_files, seed=seed,
+            machine, data, force=force, noise=noise, strut_spread=strut_spread, effect_files=effect_files, seed=seed,
             progress=progress,
         )  # fmt: skip
     else:

@@ -11,12 +11,12 @@ from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison.residuals import directions
 from toolpath_stiff.updating.correction import Correction
 from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
 from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
-from toolpath_stiff.updating.diagnosis.document import HeldErrors, RoundedErrors, interval, json_number, rounded_errors
+from toolpath_stiff.updating.diagnosis.document import HeldErrors, RoundedErrors, interval, rounded_errors
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent, errors_text, gain_in_standard_errors
 from toolpath_stiff.updating.inference.prediction import scaled_law
@@ -98,6 +98,7 @@ class UpdateDocument(TypedDict):
 
     verdict: str
     text: str
+    question: str
     objective: str
     baseline: StepEntry
     strut_law_refitted: RoundedErrors
@@ -132,6 +133,7 @@ def document(correction: Correction) -> UpdateDocument:
     found: UpdateDocument = {
         "verdict": verdict,
         "text": _text(update, verdict),
+        "question": update.question,
         "objective": update.objective,
         "baseline": steps[0],
         "strut_law_refitted": rounded_errors(update.refitted.fit.residual),
@@ -180,22 +182,28 @@ def _search(search: StrutLawSearch) -> SearchEntry:
 def _verdict(update: Update) -> str:
     if not update.changed:
         return NOTHING
-    if not all(one.supported for one in update.supports):
-        return FORCED if update.forced else REFUSED
-    return UPDATED
+    if update.worse or not (update.supported or update.forced):
+        return REFUSED
+    return UPDATED if update.supported else FORCED
 
 
 def _text(update: Update, verdict: str) -> str:
     """What was done, the cause first, then the error step by step."""
+    asked = f"{update.question} " if update.question else ""
     if verdict == NOTHING:
-        return f"These data support no further effect: the machine stays as it is. Mean error: {_errors(update)}."
+        said = "These data support no further effect: the machine stays as it is."
+        return f"{asked}{said} Mean error: {_errors(update)}."
     fit = update.steps[-1].fit
     errors = f"Mean error: {_errors(update)}{_left_out(update)}."
+    if update.worse:
+        return f"{asked}The new machine would fit worse than the one given: it is not written. {errors}"
     against = "; ".join(f"{one.effect}: {', and '.join(one.reasons)}" for one in update.supports if not one.supported)
     if verdict == REFUSED:
-        return f"The data do not support {against}. (--force writes it all the same.) {errors}"
+        said = f"The data do not support {against}." if against else "The machine stays as it is."
+        return f"{asked}{said} (--force writes it all the same.) {errors}"
     if verdict == FORCED:
-        return f"Added by force, although the data do not support it ({against}). {errors}"
+        said = f" ({against})" if against else ""
+        return f"{asked}Added by force, although the data do not support it{said}. {errors}"
     if not fit.names:
         return f"Strut law refitted; no effect added. {errors}"
     cause = joined(fit.findings)

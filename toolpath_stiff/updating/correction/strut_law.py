@@ -20,6 +20,7 @@ from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.updating.correction.ladder import Step, Update
+from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, HeldOut, held_out
 from toolpath_stiff.updating.inference.noise import noise_models
@@ -263,6 +264,7 @@ def update_by_mean_error(
     machine: Machine,
     data: Measurements,
     *,
+    force: bool = False,
     noise: float | tuple[float, float] | None = None,
     strut_spread: float = STRUT_SPREAD,
     effect_files: Sequence[str | Path] = (),
@@ -275,6 +277,8 @@ def update_by_mean_error(
     ----------
     machine, data
         The model and n readings.
+    force
+        Keep the law even of readings that hardly are of this machine.
     noise, strut_spread
         For the noise floor only: the objective does not know of noise.
     effect_files
@@ -310,5 +314,6 @@ def update_by_mean_error(
     )
     refitted = Step(LAW_REFITTED, baseline.refitted, held_out(baseline.refitted, data.point))
     return Update(
-        machine, data, worst, problem, steps, refitted, (), (), False, False, law_asked=True, objective="mean-error"
-    ), found
+        machine, data, worst, problem, steps, refitted, (), (), force, False, law_asked=True, objective="mean-error",
+        question=question(predictor),
+    ), found  # fmt: skip

@@ -245,12 +245,11 @@ def _examined(
             expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
         )
     predictor = Predictor(machine, data, effect_files)
-    joints = predictor.joint_columns()
     effects, cannot = testable_effects(predictor)
     judgements: dict[str, Judgement] = {}
     for one in noise_models(data, noise, strut_spread, joint_error):
         say(f"searching {len(effects)} effects, noise {one.name}")
-        judgements[one.name] = judge(Problem.of(predictor, one, joints), one, effects, seed)
+        judgements[one.name] = judge(Problem.of(predictor, one), one, effects, seed)
     verdict, plausible = common_verdict(list(judgements.values()))
     # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
     main = max(judgements.values(), key=lambda judgement: judgement.noise.typical)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.units import json_number, mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.diagnosis.words import assumptions, next_steps, row_words, verdict_text, why
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
@@ -188,6 +188,7 @@ class DiagnosisDocument(TypedDict):
 
     verdict: str
     text: str
+    question: str
     baseline: BaselineEntry
     candidates: list[CandidateEntry]
     pairs: list[PairEntry]
@@ -221,6 +222,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
     return {
         "verdict": diagnosis.verdict,
         "text": verdict_text(diagnosis),
+        "question": main.question,
         "baseline": _baseline(diagnosis),
         "candidates": _candidates(diagnosis),
         "pairs": _pairs(diagnosis),
@@ -264,11 +266,6 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "readings": len(diagnosis.data),
         "command": diagnosis.command,
     }
-
-
-def json_number(value: float, digits: int = 5) -> float | None:
-    """A float of some significant digits; None for what JSON cannot hold."""
-    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def rounded_errors(residual: FloatArray) -> RoundedErrors:

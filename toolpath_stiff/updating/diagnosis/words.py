@@ -34,6 +34,8 @@ def verdict_text(diagnosis: Diagnosis) -> str:
             ]
             return "The verdict depends on the noise, which these data do not tell. " + "; ".join(parts) + "."
         return _rivals(diagnosis)
+    if diagnosis.main.question:
+        return f"{diagnosis.main.question} Mean error: {_errors(diagnosis)}."
     form = diagnosis.main.form
     return (
         "Something is missing, and nothing in the catalogue accounts for it. Mean error: "
@@ -110,7 +112,7 @@ def why(diagnosis: Diagnosis) -> list[str]:
         found.append(_base_text(judgement, len(diagnosis.judgements) > 1))
     if diagnosis.verdict == "ambiguous":
         found += _confounded(diagnosis)
-    if diagnosis.verdict == "unexplained":
+    if diagnosis.verdict == "unexplained" and not main.question:
         tested = [f"{name} (p = {g.probability:.2g})" for name, g in list(main.gates.items())[:4]]
         if tested:
             found.append(f"the best of the catalogue leave more than noise would: {', '.join(tested)}")
@@ -183,6 +185,11 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
         if len(diagnosis.judgements) > 1:
             found.insert(0, "repeat a few readings, re-clamped, or state --noise: the verdict depends on the scatter")
         return found
+    if diagnosis.main.question:
+        return [
+            "check that machine file, poses and units are those of the readings: stiffness in N/mm, lengths in mm",
+            hint("see which readings are how far off", asked.command("compare")),
+        ]
     if diagnosis.verdict == "unexplained":
         file = asked.new_effect
         return [

@@ -20,7 +20,8 @@ posterior probabilities decide; only a name far ahead of all others is given as 
 adequate      nothing is missing that these data could show
 identified    one effect (or one pair) explains the data, far likelier than any other
 ambiguous     several explain them, and none is far likelier than the others
-unexplained   something is missing, and nothing in the catalogue accounts for it
+unexplained   something is missing, and nothing in the catalogue accounts for it; or the readings do not look as if
+              they were of this machine at all (`question`)
 """
 
 from __future__ import annotations
@@ -32,9 +33,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.updating.inference.evidence import Fit, Problem
+from toolpath_stiff.updating.inference.candidates import EXPECTED
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.fits import refine
-from toolpath_stiff.updating.inference.gates import Gate, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import (
     Family,
     Pair,
@@ -45,6 +47,7 @@ from toolpath_stiff.updating.inference.hypotheses import (
     signatures,
 )
 from toolpath_stiff.updating.inference.noise import Noise
+from toolpath_stiff.updating.inference.prediction import Predictor
 
 FloatArray = NDArray[np.float64]
 
@@ -90,6 +93,8 @@ class Judgement:
         have none unless nothing passes.
     form
         The form of discrepancy that stands out, in words; "" if none was looked for.
+    question
+        Whether these are readings of this machine, and why it is asked; "" where nothing says that they are not.
     """
 
     verdict: str
@@ -104,6 +109,7 @@ class Judgement:
     pairs: tuple[Pair, ...]
     probability: dict[str, float]
     form: str
+    question: str = ""
 
     @property
     def plausible(self) -> tuple[str, ...]:
@@ -131,11 +137,60 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     fits = Fits(problem)
     gates = apply_gates(problem, noise, candidates, fits, seed)
     weighed = weigh(problem, noise, candidates, gates)
-    verdict, explanations = decide(gates, weighed)
+    asked = question(problem.predictor)
+    verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
     return Judgement(
         verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form,
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked,
     )  # fmt: skip
+
+
+# -- are these readings of this machine? -------------------------------------------------------------------------------
+#
+# Readings in the wrong unit, of another machine or of other poses find an effect that fits them better than the model
+# does: any freedom helps where the model says nothing true. Two things say so before anything is fitted.
+
+FACTOR = float(np.exp(4.0 * LAW_PRIOR))  # of the median reading to the model: four standard deviations of the strut law
+# Correlation of ln measured with ln modelled below which the readings do not follow the model. Hidden effects that
+# change the stiffness by 30 % leave 0.8 and more, readings of other machines or in another order 0.3 and less.
+FOLLOWS = 0.5
+NOTHING = 1e-6  # of the model's own variation: less is rounding
+TELLS = EXPECTED[1]  # sd of ln modelled over the readings from which it is asked: as large as the largest effect
+FEWEST_FOLLOWING = 6  # readings that differ in what mechanics sees
+
+
+def question(predictor: Predictor) -> str:
+    """Whether these are readings of this machine, with the reason to ask; "" where there is none."""
+    reason = _unlike(predictor)
+    return f"Are these readings of this machine? {reason}." if reason else ""
+
+
+def _unlike(predictor: Predictor) -> str:
+    """In what the readings are unlike the model's, a sentence without its full stop; "" where they may be its own."""
+    model, which = predictor.log_stiffness(), predictor.distinct
+    residual = np.log(predictor.data.stiffness) - model
+    if not np.isfinite(residual).all():
+        return ""
+    ratio = float(np.exp(np.median(residual)))
+    if not 1.0 / FACTOR < ratio < FACTOR:
+        times = f"{ratio:.2g} times" if ratio > 1.0 else f"1 / {1.0 / ratio:.2g} of"
+        return f"The median reading is {times} what the model says"
+    count = np.bincount(which)
+    modelled = np.bincount(which, weights=model) / count
+    measured = modelled + np.bincount(which, weights=residual) / count
+    if len(count) < FEWEST_FOLLOWING or float(modelled.std()) < TELLS:
+        return ""
+    spread = float(measured.std())
+    centred = (measured - measured.mean()) @ (modelled - modelled.mean()) / len(count)
+    correlation = float(centred) / (spread * float(modelled.std())) if spread > NOTHING * float(modelled.std()) else 0.0
+    if correlation >= FOLLOWS:
+        return ""
+    if correlation == 0.0:
+        return "The readings are all alike, where the model says that they differ"
+    return (
+        f"They do not follow the model from pose to pose and direction to direction: the correlation of "
+        f"their logarithms is {correlation:.2f}, of this machine it would be {FOLLOWS:g} or more"
+    )
 
 
 # -- candidates --------------------------------------------------------------------------------------------------------
@@ -152,12 +207,12 @@ class Candidates:
     families
         All effects that do something to these data, the most likely first.
     forms
-        Forms that a discrepancy may take which no effect describes, in words -> covariance (n, n).
+        Forms that a discrepancy may take which no effect describes.
     """
 
     base: Fit
     families: tuple[Family, ...]
-    forms: Mapping[str, FloatArray]
+    forms: Forms
 
     @property
     def offered(self) -> list[Family]:
@@ -169,7 +224,8 @@ def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
     """Fit every effect with each of its choices beside the strut law."""
     base = problem.score_base()
     families = score_families(problem, effects, base)
-    return Candidates(base, tuple(families), discrepancy_forms(problem.predictor))
+    forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
+    return Candidates(base, tuple(families), forms)
 
 
 # -- fits --------------------------------------------------------------------------------------------------------------
@@ -225,11 +281,12 @@ class Gates:
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
     """The model alone, then single effects, then pairs: of the likeliest single that passes, else of the best ones."""
-    simulator = Simulator.of(noise, problem.covariance, seed)
+    simulator = Simulator.of(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
+    signs = signatures(problem, (table for family in families for table in family.tables))
     # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
-    alone = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signatures(problem, families), gain)
+    alone = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signs, gain)
     if alone.probability > FALSE_ALARM:
         return Gates(alone, none_stands=True)
     by_name: dict[str, Gate] = {}
@@ -333,7 +390,7 @@ def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit
     freedom, n = noise.freedom, len(fit.residual)
     if not np.isfinite(freedom):
         return log_evidence
-    squares = -2.0 * fit.log_likelihood - problem.scatter.log_determinant
+    squares = -2.0 * fit.log_likelihood - problem.scatter.covariance.log_determinant
     return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
 
 

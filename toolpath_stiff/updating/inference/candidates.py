@@ -10,7 +10,7 @@ Sizes count from the neutral value: `value - neutral`, or `1 / value` where neut
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.inference.covariances import Precision
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -185,10 +186,20 @@ class Table:
     Several: linear in each, from one size of each.
     """
 
-    def __init__(self, candidate: Candidate, columns: FloatArray, knots: dict[float, tuple[FloatArray, FloatArray]]):
+    def __init__(
+        self,
+        candidate: Candidate,
+        columns: FloatArray,
+        knots: Callable[[], dict[float, tuple[FloatArray, FloatArray]]],
+    ) -> None:
         self.candidate = candidate
         self.columns = columns  # (n, p) m/N per unit of size, small sizes
-        self.knots = knots  # sign -> (ln size (g,), delta / size (g, n))
+        self._knots = knots
+
+    @cached_property
+    def knots(self) -> dict[float, tuple[FloatArray, FloatArray]]:
+        """Sign -> (ln size (g,), delta / size (g, n)); worked out when it is first asked for: columns often suffice."""
+        return self._knots()
 
     @cached_property
     def _splines(self) -> dict[float, Any]:
@@ -247,7 +258,7 @@ def tabulate(
         return None if np.isnan(logs).any() else np.asarray(np.exp(-logs) - compliance)
 
     count = len(candidate.components)
-    columns, knots = np.zeros((len(base), count)), {}
+    columns, starts = np.zeros((len(base), count)), {}
     for j, component in enumerate(candidate.components):
         for sign in component.signs:
             unit = np.zeros(count)
@@ -260,10 +271,14 @@ def tabulate(
                 continue
             columns[:, j] = found / (start * sign)
             if count == 1:
-                knots[sign] = _knots(component, sign, start, delta, compliance)
+                starts[sign] = start
     if not columns.any():
         return None
-    return Table(candidate, columns, knots)
+    return Table(
+        candidate,
+        columns,
+        lambda: {s: _knots(candidate.components[0], s, start, delta, compliance) for s, start in starts.items()},
+    )
 
 
 def _rms(delta: FloatArray, compliance: FloatArray) -> float:
@@ -345,10 +360,10 @@ LIKELY = 3.84  # 95 % quantile of chi-square with one degree of freedom
 
 @dataclass(frozen=True)
 class Sight:
-    """What these data can see: the base model's compliance (n,) and projected inverse covariance (n, n)."""
+    """What these data can see: the base model's compliance (n,) and the inverse covariance of what its refit leaves."""
 
     compliance: FloatArray
-    projected: FloatArray
+    projected: Precision
 
     def change(self, delta: FloatArray) -> FloatArray:
         """(..., n) change of ln compliance by added compliances (..., n)."""
@@ -356,8 +371,7 @@ class Sight:
 
     def length(self, change: FloatArray) -> FloatArray:
         """(...,) whitened length of changes (..., n) beside the strut law."""
-        squared = np.einsum("...i,...i->...", change @ self.projected, change)
-        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+        return np.asarray(np.sqrt(np.maximum(self.projected.squares(change), 0.0)))
 
 
 def _log_visible(lengths: FloatArray, longest: float) -> FloatArray:

@@ -25,6 +25,7 @@ from toolpath_stiff.updating.inference.candidates import (
     likely_interval,
     log_comparable,
 )
+from toolpath_stiff.updating.inference.covariances import Precision
 from toolpath_stiff.updating.inference.noise import (
     Noise,
     NormalEquations,
@@ -158,25 +159,23 @@ class Problem:
     ----------
     predictor
         The model's answers.
-    scatter, covariance
-        Without wild readings; (n, n) of ln readings.
+    scatter
+        Of ln readings, without wild ones.
     observed
         (n,) ln k as measured.
     """
 
     predictor: Predictor
     scatter: Scatter
-    covariance: FloatArray
     observed: FloatArray = field(init=False)
     sight: Sight = field(init=False)
     rest: FloatArray = field(init=False)  # (n,) m/N of the machine file's own effects
     base_compliance: FloatArray = field(init=False)
 
     @classmethod
-    def of(cls, predictor: Predictor, noise: Noise, joints: FloatArray | None = None) -> Problem:
-        """From the model's answers and a noise model; `joints`: `predictor.joint_columns()`, if known already."""
-        spread = covariance(noise, predictor, joints)
-        return cls(predictor, Scatter.of(noise, spread), spread)
+    def of(cls, predictor: Predictor, noise: Noise) -> Problem:
+        """From the model's answers and a noise model."""
+        return cls(predictor, Scatter.of(noise, covariance(noise, predictor)))
 
     def __post_init__(self) -> None:
         self.observed = np.log(self.predictor.data.stiffness)
@@ -186,17 +185,14 @@ class Problem:
         jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
         self.sight = Sight(self.base_compliance, self.projected(jacobian))
 
-    def projected(self, jacobian: FloatArray) -> FloatArray:
-        """(n, n) P = A - A J (J^T A J + prior)^-1 J^T A: the inverse covariance of what a refit leaves.
+    def projected(self, jacobian: FloatArray) -> Precision:
+        """P = A - A J (J^T A J + prior)^-1 J^T A: the inverse covariance of what a refit leaves.
 
         `jacobian` (n, 2 + p) of ln k to the strut law and p sizes.
         """
-        weighted = self.scatter.inverse @ jacobian
-        information = jacobian.T @ weighted
-        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-        inner = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
-        return np.asarray(self.scatter.inverse - weighted @ inner @ weighted.T)
+        prior = np.zeros((jacobian.shape[1],) * 2)
+        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        return self.scatter.precision.beside(jacobian.T, prior)
 
     def prior(self, table: Table, j: int) -> SizePrior:
         """Prior of a component's size, worked out once."""
@@ -206,30 +202,33 @@ class Problem:
         return self._priors[key][1]
 
     def compliance(self, law: FloatArray, delta: FloatArray) -> FloatArray:
-        """(..., n) for laws (..., 2) and added compliances (..., n); held above a tenth of the base model's."""
-        return np.maximum(self.predictor.strut_part(law) + self.rest + delta, 0.1 * self.base_compliance)
+        """(..., n) for laws (..., 2) and added compliances (..., n)."""
+        return self._held(self.predictor.strut_part(law) + delta)
+
+    def _held(self, compliance: FloatArray) -> FloatArray:
+        """(..., n) with the machine file's own effects; above a tenth of the base model's."""
+        return np.maximum(compliance + self.rest, 0.1 * self.base_compliance)
 
     def law_jacobian(self, law: FloatArray, compliance: FloatArray) -> FloatArray:
         """(..., n, 2) of ln k."""
-        return np.asarray(-self.predictor.strut_slopes(law) / compliance[..., None])
+        slopes = self.predictor.strut_part_and_slopes(law)[1]
+        return np.asarray(np.swapaxes(-slopes / compliance[..., None, :], -1, -2))
 
     def fit_law(
-        self, delta: FloatArray, inverse: FloatArray, start: FloatArray, steps: int = 3
+        self, delta: FloatArray, precision: Precision, start: FloatArray, steps: int = 3
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Laws (g, 2), residuals (g, n), information matrices (g, 2, 2) for added compliances (g, n)."""
-        count, n = delta.shape
-        law = np.broadcast_to(start, (count, 2)).copy()
-        compliance = self.compliance(law, delta)
-        residual = self.observed + np.log(compliance)
+        law = np.asarray(start)[None]  # the same for all at first
         for _ in range(steps):
-            jacobian = self.law_jacobian(law, compliance)
-            weighted = (np.swapaxes(jacobian, 1, 2).reshape(2 * count, n) @ inverse).reshape(count, 2, n)
-            information = weighted @ jacobian + np.eye(2) / LAW_PRIOR**2
+            part, slopes = self.predictor.strut_part_and_slopes(law)
+            compliance = self._held(part + delta)
+            columns = -slopes / compliance[:, None]
+            weighted = precision.times(columns)
+            information = weighted @ np.swapaxes(columns, 1, 2) + np.eye(2) / LAW_PRIOR**2
+            residual = self.observed + np.log(compliance)
             gradient = (weighted @ residual[..., None])[..., 0] - law / LAW_PRIOR**2
             law = law + np.clip(np.linalg.solve(information, gradient[..., None])[..., 0], -0.5, 0.5)
-            compliance = self.compliance(law, delta)
-            residual = self.observed + np.log(compliance)
-        return law, residual, information
+        return law, self.observed + np.log(self.compliance(law, delta)), information
 
     # -- scores ----------------------------------------------------------------------------------------------------
 
@@ -238,7 +237,7 @@ class Problem:
         scatter, law = self.scatter, np.zeros(2)
         none = np.zeros((1, len(self.observed)))
         for _ in range(3):
-            laws, residuals, information = self.fit_law(none, scatter.inverse, law)
+            laws, residuals, information = self.fit_law(none, scatter.precision, law)
             law, residual = laws[0], residuals[0]
             scatter, wild = self.scatter.with_wild(residual), scatter.wild
             if scatter.wild == wild:
@@ -257,7 +256,7 @@ class Problem:
         prior = self.prior(table, 0)
         scatter, law = self.scatter, start.law
         for last in range(MOST_ROUNDS, -1, -1):
-            scan = self._refined(table, self._scan(table, sizes, scatter.inverse, law), scatter.inverse)
+            scan = self._refined(table, self._scan(table, sizes, scatter.precision, law), scatter.precision)
             peak = int(np.argmax(scan.profile))
             residual, law = scan.residuals[peak], scan.laws[peak]
             again = self.scatter.with_wild(residual, scatter)
@@ -268,21 +267,20 @@ class Problem:
         interval = likely_interval(scan.sizes, scan.profile)
         best = (np.array([scan.sizes[peak]]),)
         jacobian = self._jacobian((table,), best, law)
-        information = jacobian.T @ scatter.inverse @ jacobian
+        information = scatter.precision.times(jacobian.T) @ jacobian
         information[:2, :2] += np.eye(2) / LAW_PRIOR**2
-        constant = -0.5 * scatter.log_determinant - len(scatter.wild) * scatter.price
+        constant = -0.5 * scatter.covariance.log_determinant - len(scatter.wild) * scatter.price
         return Fit(
             (table.candidate,), best, (0,), law, residual, jacobian,
             np.asarray(np.linalg.pinv(information), dtype=float), scatter,
             tables=(table,), log_evidence=log_integral + constant, interval=interval,
         )  # fmt: skip
 
-    def _scan(self, table: Table, sizes: FloatArray, inverse: FloatArray, law: FloatArray, steps: int = 3) -> _Scan:
-        laws, residuals, information = self.fit_law(table.delta(sizes[:, None]), inverse, law, steps)
-        squared = np.einsum("gi,gi->g", residuals @ inverse, residuals)
-        return _Scan(sizes, -0.5 * squared + _law_terms(laws, information), laws, residuals)
+    def _scan(self, table: Table, sizes: FloatArray, precision: Precision, law: FloatArray, steps: int = 3) -> _Scan:
+        laws, residuals, information = self.fit_law(table.delta(sizes[:, None]), precision, law, steps)
+        return _Scan(sizes, -0.5 * precision.squares(residuals) + _law_terms(laws, information), laws, residuals)
 
-    def _refined(self, table: Table, scan: _Scan, inverse: FloatArray) -> _Scan:
+    def _refined(self, table: Table, scan: _Scan, precision: Precision) -> _Scan:
         """With more sizes about the peak: zooms, then five standard deviations to each side."""
         for _ in range(ZOOMS):
             peak = int(np.argmax(scan.profile))
@@ -290,12 +288,14 @@ class Problem:
             low, high = (max(low, 0.0), high) if scan.sizes[peak] > 0.0 else (low, min(high, 0.0))
             more = np.linspace(low, high, 8)[1:-1]
             more = more[(more != 0.0) & (more != scan.sizes[peak])]
-            scan = scan.merged(self._scan(table, more, inverse, scan.laws[peak], steps=2))
+            scan = scan.merged(self._scan(table, more, precision, scan.laws[peak], steps=2))
         peak = int(np.argmax(scan.profile))
         size, sd = float(scan.sizes[peak]), scan.width()
         more = size + sd * np.linspace(-4.5, 4.5, 14)
         inside = (more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))
-        return scan.merged(self._scan(table, more[inside], inverse, scan.laws[peak], steps=2)) if inside.any() else scan
+        return (
+            scan.merged(self._scan(table, more[inside], precision, scan.laws[peak], steps=2)) if inside.any() else scan
+        )
 
     def _jacobian(self, tables: Sequence[Table], sizes: Sequence[FloatArray], law: FloatArray) -> FloatArray:
         """(n, 2 + p) of the modelled ln k to law and all sizes."""
@@ -314,7 +314,7 @@ class Problem:
         sizes = _starting_sizes(tables, start)
         law, scatter = start.law.copy(), self.scatter
         for last in range(MOST_ROUNDS, -1, -1):
-            converged = self._gauss_newton(tables, chosen, sizes, law, scatter.inverse)
+            converged = self._gauss_newton(tables, chosen, sizes, law, scatter.precision)
             if converged is None:
                 return None
             law, residual, information, jacobian = converged
@@ -326,7 +326,7 @@ class Problem:
         deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
         held = _pull_back(chosen, sizes) if len(tables) > 1 else []
         if held:  # the others once more beside them
-            settled = self._gauss_newton(tables, [c for c in chosen if c not in held], sizes, law, scatter.inverse)
+            settled = self._gauss_newton(tables, [c for c in chosen if c not in held], sizes, law, scatter.precision)
             law, residual = (law, residual) if settled is None else settled[:2]
         own = [float(sizes[id(table)][j]) for table, j in chosen]
         possible = all(t.candidate.components[j].allows(size) for (t, j), size in zip(chosen, own, strict=True))
@@ -393,7 +393,7 @@ class Problem:
         chosen: Sequence[tuple[Table, int]],
         sizes: dict[int, FloatArray],
         law: FloatArray,
-        inverse: FloatArray,
+        precision: Precision,
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
         """Law, residual, information and jacobian after fitting the chosen sizes, in place; None where that fails."""
         prior = np.zeros((2 + len(chosen), 2 + len(chosen)))
@@ -410,9 +410,10 @@ class Problem:
             slopes = {id(t): t.slope(sizes[id(t)]) for t in tables}
             for i, (table, j) in enumerate(chosen):
                 jacobian[:, 2 + i] = -slopes[id(table)][:, j] / compliance
-            gradient = jacobian.T @ (inverse @ (self.observed + np.log(compliance)))
+            weighted = precision.times(jacobian.T)
+            gradient = weighted @ (self.observed + np.log(compliance))
             gradient[:2] -= law / LAW_PRIOR**2
-            return NormalEquations(jacobian, jacobian.T @ inverse @ jacobian + prior, gradient)
+            return NormalEquations(jacobian, weighted @ jacobian + prior, gradient)
 
         def move(law: FloatArray, here: NormalEquations) -> tuple[FloatArray, FloatArray]:
             scale = here.scale

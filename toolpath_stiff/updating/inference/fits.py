@@ -6,7 +6,7 @@ Everything is dimensionless or scaled: with constants in N/m the gradient would 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypedDict
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
+from toolpath_stiff.updating.inference.covariances import Groups, Precision
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
 
@@ -105,9 +106,9 @@ def _pulls_on_absent(
 def _normal_equations(
     jacobian: FloatArray, residual: FloatArray, law: FloatArray, scatter: Scatter, law_free: bool
 ) -> tuple[FloatArray, FloatArray]:
-    weighted = scatter.inverse @ jacobian
-    information = jacobian.T @ weighted
-    gradient = weighted.T @ residual
+    weighted = scatter.precision.times(jacobian.T)
+    information = weighted @ jacobian
+    gradient = weighted @ residual
     prior = 1.0 / LAW_PRIOR**2 if law_free else 1e12
     information[:2, :2] += prior * np.eye(2)
     gradient[:2] -= prior * law
@@ -188,7 +189,7 @@ class _Search:
         """The step, halved until the fit gets no worse; None for the residual where nothing helps."""
 
         def misfit(at: FloatArray, logs: FloatArray) -> float:
-            return float(at @ scatter.inverse @ at + (logs @ logs) / LAW_PRIOR**2)
+            return float(scatter.precision.squares(at) + (logs @ logs) / LAW_PRIOR**2)
 
         before = misfit(residual, law)
         for _ in range(10):
@@ -277,7 +278,7 @@ def _without_zeros(fit: Fit) -> Fit:
         return fit
     columns = [0, 1, *(2 + k for k in kept)]
     # Where the data would pull them, could they go below zero: what an upper limit is counted from.
-    gradient = fit.jacobian.T @ fit.scatter.inverse @ fit.residual
+    gradient = fit.scatter.precision.times(fit.jacobian.T) @ fit.residual
     gradient[:2] -= fit.law / LAW_PRIOR**2 if fit.law_free else 0.0
     step, variance = fit.covariance @ gradient, np.diag(fit.covariance)
     absent = {
@@ -403,31 +404,44 @@ class HeldOut:
 
 def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:
     """Leave each point out in turn; with fewer than three points nothing can be left out and all is nan."""
-    labels = np.unique(point)
+    points = Groups.by(point)
     residual = np.full(len(fit.residual), np.nan)
-    moves = np.zeros((len(labels), fit.jacobian.shape[1]))
-    if len(labels) < 3:
+    moves = np.zeros((points.count, fit.jacobian.shape[1]))
+    if points.count < 3:
         return HeldOut(residual, moves, point)
     prior = np.zeros((fit.jacobian.shape[1],) * 2)
     prior[:2, :2] = np.eye(2) * (1.0 / LAW_PRIOR**2 if fit.law_free else 1e12)
-    scale = np.maximum(np.sqrt(np.diag(fit.jacobian.T @ fit.scatter.inverse @ fit.jacobian + prior)), 1e-300)
-    for k, label in enumerate(labels):
-        out = point == label
-        inverse = _inverse_without(fit.scatter.inverse, out)
-        columns = fit.jacobian[~out] / scale
-        information = columns.T @ inverse @ columns + prior / np.outer(scale, scale)
-        pull = columns.T @ (inverse @ fit.residual[~out])
-        pull[:2] -= (prior[:2, :2] @ fit.law) / scale[:2]
-        moves[k] = np.linalg.pinv(information, hermitian=True) @ pull / scale
-        residual[out] = fit.residual[out] - fit.jacobian[out] @ moves[k]
+    precision = fit.scatter.precision
+    scale = np.sqrt(np.maximum(precision.squares(fit.jacobian.T) + np.diag(prior), 1e-300))
+    columns = fit.jacobian / scale
+    for which, out, products in products_without(precision, columns, fit.residual, points):
+        pull = products[..., -1]
+        pull[:, :2] -= (prior[:2, :2] @ fit.law) / scale[:2]
+        information = products[..., :-1] + prior / np.outer(scale, scale)
+        moves[which] = (np.linalg.pinv(information, hermitian=True) @ pull[..., None])[..., 0] / scale
+        residual[out] = fit.residual[out] - (fit.jacobian[out] @ moves[which][..., None])[..., 0]
     return HeldOut(residual, moves, point)
 
 
-def _inverse_without(inverse: FloatArray, out: NDArray[np.bool_]) -> FloatArray:
-    """Inverse of the covariance of the readings that stay, from the inverse of all: the Schur complement."""
-    stay = ~out
-    across = inverse[np.ix_(stay, out)]
-    return np.asarray(inverse[np.ix_(stay, stay)] - across @ np.linalg.solve(inverse[np.ix_(out, out)], across.T))
+def products_without(
+    precision: Precision, columns: FloatArray, residual: FloatArray, points: Groups
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]]:
+    """For points left out in turn, those of k readings together: the points (m,), their readings (m, k), products.
+
+    The products are (m, p, p + 1) J^T A [J, r] of the readings that stay. Their inverse covariance is the Schur
+    complement A_ss - A_so A_oo^-1 A_os of the inverse covariance of all, of which the products need the readings that
+    are left out only: J^T A J - (A J)_o^T A_oo^-1 (A J)_o.
+    """
+    solved = precision.times(np.concatenate([columns.T, residual[None]]))
+    whole = solved[:-1] @ np.concatenate([columns, residual[:, None]], axis=1)
+    members = points.members()
+    sizes = np.array([len(out) for out in members])
+    for size in np.unique(sizes).tolist():
+        which = np.flatnonzero(sizes == size)
+        out = np.array([members[k] for k in which])
+        part = np.moveaxis(solved[:, out], 0, 1)  # (m, p + 1, k)
+        taken = part[:, :-1] @ np.linalg.solve(precision.block(out), np.swapaxes(part, 1, 2))
+        yield which, out, whole - taken
 
 
 def gain_in_standard_errors(before: HeldOut, after: HeldOut) -> float:

@@ -16,10 +16,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.updating.inference.covariances import (
+    Covariance,
+    Kernel,
+    Precision,
+    gaussian_kernel,
+    linear_kernel,
+    same_kernel,
+)
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor
@@ -27,8 +36,10 @@ from toolpath_stiff.updating.inference.prediction import Predictor
 FloatArray = NDArray[np.float64]
 
 DRAWS = 400
+RIDGE = 1e-12  # on the diagonal where readings are set aside: two that a fit explains entirely are not told apart
 WILD_SQUARED = 11.3  # squared deleted residual beyond which a reading is set aside; pays the price of `scatter`
 MOST_WILD = 0.05
+CHANCE = 0.05  # share of campaigns in which the best of all candidates gains as much by chance
 HOPELESS = 1.3  # times the largest simulated sum of squares
 
 
@@ -73,61 +84,120 @@ class Simulator:
     draws: FloatArray
 
     @classmethod
-    def of(cls, noise: Noise, covariance: FloatArray, seed: int, draws: int = DRAWS) -> Simulator:
-        """From a noise model and its covariance (n, n)."""
+    def of(cls, noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS) -> Simulator:
+        """From a noise model and its covariance."""
         rng = np.random.default_rng(seed)
-        n = len(covariance)
-        rest = covariance - np.diag(noise.repeat**2)
-        values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
-        shared = rng.standard_normal((draws, n)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
-        wide = np.where(rng.random((draws, n)) < noise.outliers, noise.outlier_width, 1.0)
-        scatter = shared + noise.repeat * wide * rng.standard_normal((draws, n))
+        shape = (draws, len(covariance))
+        shared = covariance.draw(rng, draws)
+        wide = np.where(rng.random(shape) < noise.outliers, noise.outlier_width, 1.0)
+        scatter = shared + noise.repeat * wide * rng.standard_normal(shape)
         if np.isfinite(noise.freedom):
             scatter = scatter / np.sqrt(rng.chisquare(noise.freedom, draws) / noise.freedom)[:, None]
         return cls(scatter)
 
 
-def set_wild_aside(pulls: FloatArray, projected: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Pulls P r (s, n) as if the wild readings were not there, and the number of these (s,)."""
-    diagonal = np.maximum(np.diag(projected), 1e-12)
-    squared = pulls**2 / diagonal
+@dataclass(frozen=True)
+class Aside:
+    """Residuals r of s sets of n readings without what is wild in them.
+
+    Attributes
+    ----------
+    pulls
+        (s, n) P r as if the wild readings had not been taken.
+    taken
+        (s, n) what that takes off the residuals: nothing but at wild readings.
+    count
+        (s,) wild readings.
+    """
+
+    pulls: FloatArray
+    taken: FloatArray
+    count: FloatArray
+
+
+def set_wild_aside(pulls: FloatArray, projected: Precision) -> Aside:
+    """Set aside in pulls P r (s, n) the readings that are far off what all others say of them."""
+    squared = pulls**2 / np.maximum(projected.diagonal, 1e-12)
     most = max(1, int(MOST_WILD * pulls.shape[1]))
-    out, count = pulls.copy(), np.zeros(len(pulls))
-    for s in np.flatnonzero((squared > WILD_SQUARED).any(axis=1)):
-        rows = np.flatnonzero(squared[s] > WILD_SQUARED)
-        rows = rows[np.argsort(-squared[s, rows])][:most]
-        block = projected[np.ix_(rows, rows)]
-        out[s] = pulls[s] - projected[:, rows] @ np.linalg.lstsq(block, pulls[s, rows], rcond=None)[0]
-        count[s] = len(rows)
-    return out, count
+    taken = np.zeros_like(pulls)
+    count = np.minimum((squared > WILD_SQUARED).sum(axis=1), most)
+    furthest = np.argsort(-squared, axis=1, kind="stable")[:, : count.max(initial=0)]
+    for size in np.unique(count[count > 0]).tolist():
+        sets = np.flatnonzero(count == size)
+        rows = furthest[sets, :size]
+        block = projected.block(rows) * (1.0 + RIDGE * np.eye(size))
+        taken[sets[:, None], rows] = np.linalg.solve(block, np.take_along_axis(pulls[sets], rows, 1)[..., None])[..., 0]
+    return Aside(pulls - projected.times(taken), taken, count.astype(float))
+
+
+class Forms:
+    """Forms of discrepancy as the scatter sees them, worked out once for all fits to the same readings.
+
+    A form is a covariance K = L L^T between readings with features L (n, r). Under the inverse covariance P = A - G^T G
+    of what a fit leaves, G = X A, all that is asked of it are L^T P L = L^T A L - (G L)^T (G L), and L^T P r of
+    residuals r: a fit costs some products with the few rows of X.
+
+    Parameters
+    ----------
+    features
+        Form in words -> (n, r).
+    precision
+        A, inverse covariance of the readings.
+    """
+
+    def __init__(self, features: Mapping[str, FloatArray], precision: Precision) -> None:
+        self.names = tuple(features)
+        solved = [precision.times(one.T).T for one in features.values()]
+        self.own = [one.T @ mine for one, mine in zip(features.values(), solved, strict=True)]  # L^T A L
+        self.solved = np.ascontiguousarray(np.concatenate([*solved, np.zeros((len(precision), 0))], axis=1))  # A L
+        ends = np.cumsum([0, *(one.shape[1] for one in solved)])
+        self.slices = [slice(*pair) for pair in pairwise(ends.tolist())]
+        self._drawn: tuple[FloatArray | None, FloatArray] = None, np.zeros((0, 0))
+
+    def of_draws(self, draws: FloatArray) -> FloatArray:
+        """(s, all features) L^T A r of simulated residuals (s, n), kept for the next fit."""
+        if self._drawn[0] is not draws:
+            self._drawn = draws, draws @ self.solved
+        return self._drawn[1]
 
 
 class Structure:
     """Fit statistics of the forms of discrepancy for one fit, as surprises: -ln of a tail probability.
 
-    r^T P K P r is a weighted sum of chi-squares; its tail is that of one scaled chi-square with the same mean and
-    variance (Satterthwaite 1946). The bootstrap corrects what the approximation gets wrong.
+    r^T P K P r is a weighted sum of chi-squares; its tail is that of one scaled chi-square with the same mean tr(P K)
+    and variance 2 tr(P K P K) (Satterthwaite 1946). The bootstrap corrects what the approximation gets wrong.
     """
 
-    def __init__(self, forms: Mapping[str, FloatArray], projected: FloatArray) -> None:
-        self.names = tuple(forms)
-        self.forms = tuple(forms.values())
-        self.means, self.variances = [], []
-        for form in self.forms:
-            product = projected @ form
-            self.means.append(float(np.trace(product)))
-            self.variances.append(float(max(2.0 * (product * product.T).sum(), 1e-300)))
+    def __init__(self, forms: Forms, projected: Precision) -> None:
+        self.forms, self.fitted = forms, projected.fitted
+        self.removed = projected.factors[len(projected.factors) - len(self.fitted) :]  # G
+        self.reached = self.fitted @ forms.solved  # G L, all forms
+        inner = [self.inner(k) for k in range(len(forms.names))]
+        self.means = np.array([np.trace(one) for one in inner])
+        self.variances = np.array([max(2.0 * (one**2).sum(), 1e-300) for one in inner])
 
-    def surprises(self, pulls: FloatArray) -> FloatArray:
-        """(s, forms) of pulls (s, n)."""
-        columns = []
-        for form, mean, variance in zip(self.forms, self.means, self.variances, strict=True):
-            value = np.einsum("si,si->s", pulls @ form, pulls)
-            columns.append(_surprise(value * 2.0 * mean / variance, 2.0 * mean**2 / variance))
-        return np.stack(columns, axis=1) if columns else np.zeros((len(pulls), 1))
+    def inner(self, k: int) -> FloatArray:
+        """(r, r) L^T P L of form k."""
+        reached = self.reached[:, self.forms.slices[k]]
+        return np.asarray(self.forms.own[k] - reached.T @ reached)
+
+    def loads(self, residuals: FloatArray, taken: FloatArray, known: FloatArray | None = None) -> FloatArray:
+        """(s, all features) L^T P (r - taken) of residuals (s, n); `known`: L^T A r."""
+        from scipy.sparse import csr_array
+
+        whole = residuals @ self.forms.solved if known is None else known
+        whole = whole - csr_array(taken) @ self.forms.solved
+        return np.asarray(whole - (residuals - taken) @ self.removed.T @ self.reached)
+
+    def surprises(self, loads: FloatArray) -> FloatArray:
+        """(s, forms) of loads (s, all features)."""
+        if not self.forms.names:
+            return np.zeros((len(loads), 1))
+        value = np.stack([(loads[:, part] ** 2).sum(axis=1) for part in self.forms.slices], axis=1)
+        return _surprise(value * 2.0 * self.means / self.variances, 2.0 * self.means**2 / self.variances)
 
 
-def _surprise(value: FloatArray, freedom: float) -> FloatArray:
+def _surprise(value: FloatArray, freedom: FloatArray) -> FloatArray:
     """-ln P(chi-square of `freedom` > value), with the leading term of its asymptote where that underflows."""
     from scipy.special import gammaincc, gammaln
 
@@ -143,7 +213,7 @@ def absolute_gate(
     residual: FloatArray,
     jacobian: FloatArray,
     simulator: Simulator,
-    forms: Mapping[str, FloatArray],
+    forms: Forms,
     signatures: Sequence[Sequence[FloatArray]] = (),
     gain: float = 0.0,
 ) -> Gate:
@@ -154,23 +224,26 @@ def absolute_gate(
     """
     projected = problem.projected(jacobian)
     # What the linearised refit leaves of the data is their residual; the law's prior pulls as in the simulation.
-    observed, wild = set_wild_aside((residual @ projected)[None], projected)
-    pulls, count = set_wild_aside(simulator.draws @ projected, projected)
-    squares = _quadratic(problem, pulls) + WILD_SQUARED * count
-    observed_squares = float((_quadratic(problem, observed) + WILD_SQUARED * wild)[0])
+    observed = set_wild_aside(projected.times(residual[None]), projected)
+    drawn = set_wild_aside(projected.times(simulator.draws), projected)
+    squares = _quadratic(problem, drawn)
+    observed_squares = float(_quadratic(problem, observed)[0])
     structure = Structure(forms, projected)
-    seen = structure.surprises(observed)
+    seen = structure.surprises(structure.loads(residual[None], observed.taken))
     # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
-    hopeless = not signatures and observed_squares > HOPELESS * squares.max()
-    simulated = np.zeros((len(pulls), seen.shape[1])) if hopeless else structure.surprises(pulls)
+    if not signatures and observed_squares > HOPELESS * squares.max():
+        simulated = np.zeros((len(squares), seen.shape[1]))
+    else:
+        known = forms.of_draws(simulator.draws)
+        simulated = structure.surprises(structure.loads(simulator.draws, drawn.taken, known))
     # Rows: the data, then every draw; columns: what may look bad, larger is worse.
     looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
     if signatures:
-        looks.append(np.concatenate([[gain], largest_gain(pulls, projected, signatures)]))
+        looks.append(np.concatenate([[gain], largest_gain(drawn.pulls, projected, signatures)]))
     ranked = np.stack([_tail(look, look[1:]) for look in looks], axis=1)
     smallest = ranked.min(axis=1)
-    probability = float(max((smallest[1:] <= smallest[0] + 1e-12).mean(), 0.5 / len(pulls)))
-    worst = structure.names[int(np.argmax(seen[0]))] if structure.names else ""
+    probability = float(max((smallest[1:] <= smallest[0] + 1e-12).mean(), 0.5 / len(squares)))
+    worst = forms.names[int(np.argmax(seen[0]))] if forms.names else ""
     return Gate(
         probability,
         observed_squares,
@@ -179,14 +252,25 @@ def absolute_gate(
         float(ranked[0, 1]),
         worst,
         float(ranked[0, 2]) if signatures else 1.0,
-        float(np.quantile(looks[2][1:], 0.95)) if signatures else 0.0,
+        float(np.quantile(looks[2][1:], 1.0 - CHANCE)) if signatures else 0.0,
     )
 
 
-def _quadratic(problem: Problem, pulls: FloatArray) -> FloatArray:
-    """(s,) r^T P r from the pulls P r: P V P = P but for the law's prior, which is next to nothing."""
-    covariance = problem.covariance
-    return np.asarray(np.einsum("si,si->s", pulls @ covariance, pulls))
+def gain_threshold(
+    problem: Problem, jacobian: FloatArray, simulator: Simulator, signatures: Sequence[Sequence[FloatArray]]
+) -> float:
+    """Twice-log-likelihood gain that the best of all candidates reaches by chance in one campaign of twenty."""
+    projected = problem.projected(jacobian)
+    drawn = set_wild_aside(projected.times(simulator.draws), projected)
+    return float(np.quantile(largest_gain(drawn.pulls, projected, signatures), 1.0 - CHANCE))
+
+
+def _quadratic(problem: Problem, aside: Aside) -> FloatArray:
+    """(s,) r^T P r from the pulls P r, wild readings at their price.
+
+    P V P = P but for the law's prior, which is next to nothing.
+    """
+    return problem.scatter.covariance.squares(aside.pulls) + WILD_SQUARED * aside.count
 
 
 def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:
@@ -196,13 +280,13 @@ def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(count, 0.5) / len(ordered))
 
 
-def largest_gain(pulls: FloatArray, projected: FloatArray, signatures: Sequence[Sequence[FloatArray]]) -> FloatArray:
+def largest_gain(pulls: FloatArray, projected: Precision, signatures: Sequence[Sequence[FloatArray]]) -> FloatArray:
     """(s,) largest likelihood-ratio gain over candidates; each a list of matrices (n, p) with sizes >= 0."""
     best = np.zeros(len(pulls))
     for subsets in signatures:
         for columns in subsets:
             slope = pulls @ columns
-            information = columns.T @ projected @ columns
+            information = projected.times(columns.T) @ columns
             scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
             try:
                 sizes = np.linalg.solve(information / np.outer(scale, scale), (slope / scale).T).T
@@ -226,62 +310,78 @@ def largest_gain(pulls: FloatArray, projected: FloatArray, signatures: Sequence[
 RANGE_POSITION, RANGE_ANGLE, RANGE_LENGTH, RANGE_ORDER = 0.25, np.radians(15.0), 0.05, 0.3
 
 
+# Features of a form, and of the one that has one for each point and direction: what varies faster is left out.
+MOST_FEATURES, MOST_POINTS = 300, 2000
+
+
 def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
-    """What a discrepancy may look like, in words -> covariance (n, n) with mean diagonal 1; only forms that vary."""
+    """What a discrepancy may look like, in words -> features (n, r) of its covariance; only forms that vary.
+
+    Worked out once for a set of readings.
+    """
+    key = ("forms of discrepancy",)
+    if key not in predictor.tables:
+        kernels = {words: kernel for words, kernel in _kernels(predictor).items() if kernel.varies}
+        predictor.tables[key] = {
+            words: kernel.features(MOST_POINTS if words == POINT_TO_POINT else MOST_FEATURES)
+            for words, kernel in kernels.items()
+        }
+    found: dict[str, FloatArray] = predictor.tables[key]
+    return found
+
+
+POINT_TO_POINT = "from point to point, different by direction"
+
+
+def _kernels(predictor: Predictor) -> dict[str, Kernel]:
+    """Every form in words, and its covariance."""
     data = predictor.data
-    n = len(data)
-    same_direction = (data.direction @ data.direction.T) ** 2
-    near = np.exp(-0.5 * _squared(data.position / RANGE_POSITION))
-    near = near * np.exp(-0.5 * _squared(data.angles / RANGE_ANGLE))
+    same_direction = linear_kernel(data.direction, 2)
+    near = gaussian_kernel(np.concatenate([data.position / RANGE_POSITION, data.angles / RANGE_ANGLE], axis=1))
     place = np.concatenate([_centred(data.position / RANGE_POSITION), _centred(data.angles / RANGE_ANGLE)], axis=1)
-    linear = place @ place.T
-    order = np.linspace(0.0, 1.0, n)[:, None]
-    in_order = np.exp(-0.5 * _squared(order / RANGE_ORDER))
-    # Point by point: the same pose and tool, whatever the repeat.
-    same_point = _same(data.point)
+    linear = linear_kernel(place)
+    in_order = gaussian_kernel(np.linspace(0.0, 1.0, len(data))[:, None] / RANGE_ORDER)
+    share = predictor.strut_columns()
+    struts = linear_kernel(share)
     forms = {
         "smooth over the workspace": near,
         "smooth over the workspace, different by direction": near * same_direction,
         "linear over the workspace, different by direction": linear * same_direction,
-        "curved over the workspace, different by direction": linear**2 * same_direction,
-        "from point to point, different by direction": same_point * same_direction,
+        "curved over the workspace, different by direction": linear_kernel(place, 2) * same_direction,
+        # Point by point: the same pose and tool, whatever the repeat.
+        POINT_TO_POINT: same_kernel(data.point) * same_direction,
         "in the course of the campaign": in_order,
         "in the course of the campaign, different by direction": in_order * same_direction,
         "in the course of the campaign, over the workspace": in_order * linear * same_direction,
+        "of single struts in the course of the campaign": struts * in_order,
+        "of single struts with their length": _by_length(share, predictor.strut_lengths() / RANGE_LENGTH),
+        "of struts in tension against compression": linear_kernel(share * np.sign(predictor.strut_forces())),
+        "of single struts over the workspace": struts * near,
     }
-    share = predictor.strut_columns()
-    lengths = predictor.strut_lengths()
-    sign = np.sign(predictor.strut_forces())
-    forms["of single struts in the course of the campaign"] = (share @ share.T) * in_order
-    forms["of single struts with their length"] = sum(
-        np.outer(share[:, i], share[:, i]) * np.exp(-0.5 * _squared(lengths[:, [i]] / RANGE_LENGTH)) for i in range(6)
-    )
-    forms["of struts in tension against compression"] = (share * sign) @ (share * sign).T
-    forms["of single struts over the workspace"] = (share @ share.T) * near
-    for name, words in (("force_N", "with the load"), ("tool_extension_mm", "with the tool length")):
-        column = np.log(data.force) if name == "force_N" else data.tool_extension
-        forms |= _by_column(column, words, same_direction, near)
+    columns = {"with the load": np.log(data.force), "with the tool length": data.tool_extension}
     if "time_min" not in data.missing:
-        forms |= _by_column(data.time, "with the time since zeroing", same_direction, near)
+        columns["with the time since zeroing"] = data.time
     if "temperature_C" not in data.missing:
-        forms |= _by_column(data.temperature, "with the temperature", same_direction, near)
-    for name, column in data.extra.items():
-        forms |= _by_column(column, f"with the column {name}", same_direction, near)
+        columns["with the temperature"] = data.temperature
+    columns |= {f"with the column {name}": column for name, column in data.extra.items()}
+    for words, column in columns.items():
+        forms |= _by_column(column, words, same_direction, near)
     if len(set(data.setup.tolist())) > 1:
-        forms["between set-ups, different by direction"] = _same(data.setup) * same_direction
-    scaled = {}
-    for name, form in forms.items():
-        scale = float(np.trace(form)) / n
-        if scale > 1e-12 and np.isfinite(form).all() and float(np.abs(form - form[0, 0]).max()) > 1e-9 * scale:
-            scaled[name] = form / scale
-    return scaled
+        forms["between set-ups, different by direction"] = same_kernel(data.setup) * same_direction
+    return forms
 
 
-def _by_column(column: FloatArray, words: str, same_direction: FloatArray, near: FloatArray) -> dict[str, FloatArray]:
+def _by_length(share: FloatArray, length: FloatArray) -> Kernel:
+    """Each strut's own course over its length (n, 6), as far as the strut has a share (n, 6) in the compliance."""
+    return Kernel(
+        lambda i: (share * share[i] * np.exp(-0.5 * (length - length[i]) ** 2)).sum(axis=1), (share**2).sum(axis=1)
+    )
+
+
+def _by_column(column: FloatArray, words: str, same_direction: Kernel, near: Kernel) -> dict[str, Kernel]:
     if not np.isfinite(column).all() or np.ptp(column) == 0.0:
         return {}
-    centred = _centred(column[:, None] / float(np.ptp(column)))
-    product = centred @ centred.T
+    product = linear_kernel(_centred(column[:, None] / float(np.ptp(column))))
     return {
         words: product,
         f"{words}, different by direction": product * same_direction,
@@ -289,14 +389,5 @@ def _by_column(column: FloatArray, words: str, same_direction: FloatArray, near:
     }
 
 
-def _squared(x: FloatArray) -> FloatArray:
-    """(n, n) squared distances of rows."""
-    return np.asarray(((x[:, None, :] - x[None, :, :]) ** 2).sum(axis=-1))
-
-
 def _centred(x: FloatArray) -> FloatArray:
     return np.asarray(x - x.mean(axis=0))
-
-
-def _same(labels: NDArray[np.str_]) -> FloatArray:
-    return np.asarray(labels[:, None] == labels[None, :], dtype=float)

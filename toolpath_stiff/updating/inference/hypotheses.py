@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.inference.candidates import Table, candidates_of, table_of, tabulate
+from toolpath_stiff.updating.inference.covariances import Precision
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
-from toolpath_stiff.updating.inference.gates import Structure, set_wild_aside
+from toolpath_stiff.updating.inference.gates import Forms, Structure, set_wild_aside
 
 FloatArray = NDArray[np.float64]
 
@@ -50,15 +51,10 @@ class Family:
 
 def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
     """Search one effect; None if it does nothing to these data."""
-    data = problem.predictor.data
-    tables, evidences = [], []
+    tables, evidences = tables_of(problem, effect), []
     best: Fit | None = None
     subsets: tuple[tuple[Fit, float], ...] = ()
-    for candidate in candidates_of(effect, data):
-        table = table_of(candidate, problem.predictor)
-        if table is None:
-            continue
-        tables.append(table)
+    for table in tables:
         scores = _scores(problem, table, base)
         for score, log_weight in scores:
             evidences.append(score.log_evidence + log_weight)
@@ -95,18 +91,23 @@ def score_families(
     return sorted(found, key=lambda family: (-family.log_evidence, family.name))
 
 
-def signatures(problem: Problem, families: Sequence[Family]) -> list[list[FloatArray]]:
+def tables_of(problem: Problem, effect: Effect) -> list[Table]:
+    """The tables of an effect, one a choice that does something to these data."""
+    found = (table_of(candidate, problem.predictor) for candidate in candidates_of(effect, problem.predictor.data))
+    return [table for table in found if table is not None]
+
+
+def signatures(problem: Problem, tables: Iterable[Table]) -> list[list[FloatArray]]:
     """One-sided small-size signatures d ln k / d size of every candidate: subsets of columns (n, p), sizes >= 0."""
     found = []
-    for family in families:
-        for table in family.tables:
-            columns = -table.columns / problem.base_compliance[:, None]
-            components = table.candidate.components
-            if len(components) == 1:
-                found.append([columns * sign for sign in components[0].signs])
-            else:
-                toward = np.array([c.signs[-1] for c in components])
-                found.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
+    for table in tables:
+        columns = -table.columns / problem.base_compliance[:, None]
+        components = table.candidate.components
+        if len(components) == 1:
+            found.append([columns * sign for sign in components[0].signs])
+        else:
+            toward = np.array([c.signs[-1] for c in components])
+            found.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
     return found
 
 
@@ -217,7 +218,7 @@ def score_pairs(problem: Problem, families: Sequence[Family], starts: Sequence[F
     for first in [family for family in starts if family.best is not None][:STARTS]:
         assert first.best is not None
         projected = problem.projected(first.best.jacobian)
-        pulls, _ = set_wild_aside((first.best.residual @ projected)[None], projected)
+        pulls = set_wild_aside(projected.times(first.best.residual[None]), projected).pulls
         partners = [(name, table) for name, table in tables if name != first.name]
         gains = [_gain(table, pulls[0], projected, problem) for _, table in partners]
         for index in np.argsort(gains)[::-1][:PARTNERS]:
@@ -245,11 +246,11 @@ def _beside(problem: Problem, first: Fit, table: Table) -> Table:
     return tabulate(table.candidate, problem.predictor, first.law, beside) or table
 
 
-def _gain(table: Table, pulls: FloatArray, projected: FloatArray, problem: Problem) -> float:
+def _gain(table: Table, pulls: FloatArray, projected: Precision, problem: Problem) -> float:
     """Largest linear gain of a partner's components, signs respected one by one."""
     columns = -table.columns / problem.base_compliance[:, None]
     slopes = columns.T @ pulls
-    information = np.einsum("np,nm,mp->p", columns, projected, columns)
+    information = projected.squares(columns.T)
     gains = []
     for slope, own, component in zip(slopes, information, table.candidate.components, strict=True):
         if own > 0.0 and np.sign(slope) in component.signs:
@@ -279,7 +280,7 @@ def _replace_evidence(score: Fit, log_evidence: float) -> Fit:
     return replace(score, log_evidence=log_evidence)
 
 
-def discrepancy_evidence(problem: Problem, score: Fit, forms: Mapping[str, FloatArray]) -> tuple[float, str]:
+def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[float, str]:
     """Log evidence of a fit plus a discrepancy of unknown form and amplitude, and the likeliest form.
 
     The gain over the fit alone is, for one form K and amplitude t, with P the projected inverse covariance and z = P r,
@@ -289,24 +290,22 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Mapping[str, Float
     averaged over amplitudes and forms.
     """
     projected = problem.projected(score.jacobian)
-    pulls, _ = set_wild_aside((score.residual @ projected)[None], projected)
-    surprises = Structure(forms, projected).surprises(pulls)[0]
-    gains, names = [], list(forms)
-    order = np.argsort(surprises)[::-1][:FORMS]
-    for index in order:
-        values, vectors = np.linalg.eigh(forms[names[int(index)]])
-        kept = values > 1e-9 * values[-1]
-        root = vectors[:, kept] * np.sqrt(values[kept])
-        own, turn = np.linalg.eigh(root.T @ projected @ root)
+    taken = set_wild_aside(projected.times(score.residual[None]), projected).taken
+    structure = Structure(forms, projected)
+    loads = structure.loads(score.residual[None], taken)
+    gains = []
+    order = np.argsort(structure.surprises(loads)[0])[::-1][:FORMS] if forms.names else np.zeros(0, dtype=int)
+    for index in order.tolist():
+        own, turn = np.linalg.eigh(structure.inner(index))
         own = np.maximum(own, 0.0)
-        loads = (turn.T @ (root.T @ pulls[0])) ** 2
+        turned = (turn.T @ loads[0, forms.slices[index]]) ** 2
         squared = AMPLITUDES[:, None] ** 2
-        each = -0.5 * np.log1p(squared * own).sum(axis=1) + 0.5 * (squared * loads / (1.0 + squared * own)).sum(axis=1)
+        each = -0.5 * np.log1p(squared * own).sum(axis=1) + 0.5 * (squared * turned / (1.0 + squared * own)).sum(axis=1)
         gains.append(float(np.logaddexp.reduce(each)) - np.log(len(AMPLITUDES)))
     if not gains:
         return score.log_evidence, ""
-    likeliest = names[int(order[int(np.argmax(gains))])]
-    return score.log_evidence + float(np.logaddexp.reduce(gains)) - np.log(len(forms)), likeliest
+    likeliest = forms.names[int(order[int(np.argmax(gains))])]
+    return score.log_evidence + float(np.logaddexp.reduce(gains)) - np.log(len(forms.names)), likeliest
 
 
 # -- what these data cannot tell ---------------------------------------------------------------------------------------
@@ -341,14 +340,12 @@ class Confounding:
 
 def confounding(problem: Problem, families: Sequence[Family]) -> Confounding:
     """The confounding of effects on these data; for an effect with choices, that of its worst choice."""
-    values, vectors = np.linalg.eigh(problem.sight.projected)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
     names = sorted(family.name for family in families)
     bases: dict[str, list[FloatArray]] = {}
     for family in families:
         bases[family.name] = []
         for table in family.tables:
-            columns = root.T @ (table.columns / problem.base_compliance[:, None])
+            columns = problem.sight.projected.white((table.columns / problem.base_compliance[:, None]).T).T
             lengths = np.linalg.norm(columns, axis=0)
             if lengths.max() > 0.0:
                 kept = columns[:, lengths > 1e-9 * lengths.max()] / lengths[lengths > 1e-9 * lengths.max()]

@@ -24,8 +24,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.defaults import CLAMPING, STRUT_SPREAD
+from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -38,11 +39,13 @@ OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0  # share of wild readings, and how much wide
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
 LOW_GUESS, HIGH_GUESS = 0.02, 0.10
 LARGEST = 0.5  # relative sd that a user may state
+# Relative sd of a reading below which nobody measures: the paper's best readings, not clamped anew, scatter by 44 N/mm,
+# 0.1 %. With less, the last digit of the readings would decide.
+LEAST = 1e-3
 # Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
 # states it, within a third where it is guessed; assumed.
 STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
-MEAN_OVER_SD = 0.80  # mean size of a normal deviate over its standard deviation: sqrt(2 / pi), to two digits
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
@@ -129,6 +132,9 @@ def noise_models(
     """
 
     def model(name: str, repeat: FloatArray, clamping: float, freedom: float, origin: str) -> Noise:
+        if repeat.min() < LEAST:
+            repeat = np.maximum(repeat, LEAST)
+            origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
         return Noise(name, repeat, clamping, strut_spread, joint_error, OUTLIERS, OUTLIER_WIDTH, freedom, origin)
 
     n = len(data)
@@ -137,7 +143,7 @@ def noise_models(
         if not (0.0 < both[0] <= LARGEST and 0.0 <= both[1] <= LARGEST):
             raise InputError(f"a noise of {stated!r}", expected=f"more than 0 and at most {100 * LARGEST:g} %")
         return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}"),)
-    repeats = estimate_from_repeats(data)
+    repeats = None if copied(data) else estimate_from_repeats(data)
     if repeats is not None:
         repeat, clamping, freedom, clamps = repeats
         origin = f"estimated from {freedom} differences between repeats: {_percent(repeat, clamping)}"
@@ -152,10 +158,11 @@ def noise_models(
             f"{100 * clamping:.2g} % is assumed to be clamping"
         )
         return (model("stated", repeat, float(clamping), STATED_FREEDOM, origin),)
+    why = "the repeats agree exactly, as copies do" if copied(data) else "the data hold neither repeats nor sd_N_per_mm"
     guesses = []
     for name, guess in (("low", LOW_GUESS), ("high", HIGH_GUESS)):
         both = _shared(guess)
-        origin = f"a {name} guess, {_percent(*both)}: the data hold neither repeats nor sd_N_per_mm"
+        origin = f"a {name} guess, {_percent(*both)}: {why}"
         guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
     return tuple(guesses)
 
@@ -170,14 +177,12 @@ def _percent(repeat: float, clamping: float) -> str:
     return f"{100 * repeat:.2g} % a reading, {100 * clamping:.2g} % a clamping"
 
 
-def covariance(noise: Noise, predictor: Predictor, joints: FloatArray | None = None) -> FloatArray:
-    """(n, n) covariance of ln readings. `joints`: `predictor.joint_columns()`, if known already."""
-    same = predictor.data.clamp[:, None] == predictor.data.clamp[None, :]
+def covariance(noise: Noise, predictor: Predictor) -> Covariance:
+    """Of ln readings."""
     struts = noise.strut_spread * predictor.strut_columns()
-    shifted = noise.joint_error * (predictor.joint_columns() if joints is None else joints)
-    return np.asarray(
-        np.diag(noise.repeat**2) + noise.clamping**2 * same + struts @ struts.T + shifted @ shifted.T, dtype=float
-    )
+    shifted = noise.joint_error * predictor.joint_columns()
+    shared = np.ascontiguousarray(np.concatenate([struts, shifted], axis=1).T)
+    return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, shared)
 
 
 def repeat_groups(data: Measurements) -> NDArray[np.int64]:
@@ -188,6 +193,14 @@ def repeat_groups(data: Measurements) -> NDArray[np.int64]:
         columns.append(np.unique(labels, return_inverse=True)[1].reshape(-1, 1).astype(float))
     groups = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
     return np.asarray(groups.reshape(-1), dtype=np.int64)
+
+
+def copied(data: Measurements) -> bool:
+    """Whether every repeat is the same number as the reading that it repeats: that tells nothing of any scatter."""
+    groups = repeat_groups(data)
+    _, first = np.unique(groups, return_index=True)
+    again = np.bincount(groups)[groups] > 1
+    return bool(again.any() and (data.stiffness == data.stiffness[first][groups])[again].all())
 
 
 def estimate_from_repeats(data: Measurements) -> tuple[float, float, int, bool] | None:
@@ -202,16 +215,12 @@ def estimate_from_repeats(data: Measurements) -> tuple[float, float, int, bool] 
     for _ in range(4):
         if not kept.any():
             return result
-        contrasts, left, same = _contrasts(data.select(kept), groups[kept])
-        if len(left) < FEWEST_CONTRASTS:
+        contrasts = _Contrasts.of(data.select(kept), groups[kept])
+        if contrasts.count < FEWEST_CONTRASTS:
             return result
-        repeat, clamping, found = _maximum_likelihood(left, contrasts, same)
-        result = (repeat, clamping if found else min(CLAMPING, repeat), len(left), found)
-        spread = contrasts.T @ (np.eye(len(same)) * repeat**2 + result[1] ** 2 * same) @ contrasts
-        solved = np.linalg.inv(spread)
-        weighted = contrasts @ (solved @ left)
-        scale = np.sqrt(np.einsum("ij,jk,ik->i", contrasts, solved, contrasts))
-        wild = np.abs(weighted) > WILD * np.maximum(scale, 1e-12)
+        repeat, clamping, found = _maximum_likelihood(contrasts)
+        result = (repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found)
+        wild = contrasts.deviations(*result[:2]) > WILD
         if not wild.any():
             return result
         indices = np.flatnonzero(kept)
@@ -220,51 +229,113 @@ def estimate_from_repeats(data: Measurements) -> tuple[float, float, int, bool] 
     return result
 
 
-def _contrasts(data: Measurements, groups: NDArray[np.int64]) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Orthonormal contrasts (n, m) free of group means, time and order; the data in them (m,); same clamp (n, n)."""
-    n = len(data)
-    fixed = [(groups[:, None] == np.unique(groups)[None, :]).astype(float)]
-    regressors = [np.linspace(-1.0, 1.0, n)]
+@dataclass(frozen=True)
+class _Contrasts:
+    """Differences between repeats: what is left of n ln readings y beside group means, time and order, M y.
+
+    M takes least squares' residuals. Their covariance is M (repeat^2 + clamping^2 Z Z^T) M, Z with a column of ones and
+    noughts a clamping; all that a likelihood asks of it are the eigenvalues of Z^T M Z, as many as there are
+    clampings, and the shares of M y along its eigenvectors.
+
+    Attributes
+    ----------
+    left, own
+        (n,) M y; diagonal of M.
+    reached, values
+        (n, k) M Z E for eigenvectors E of Z^T M Z, and its eigenvalues (k,) that are not 0. None where every reading
+        was clamped by itself, which cannot be told from repeat noise.
+    count
+        Rank of M: degrees of freedom.
+    """
+
+    left: FloatArray
+    own: FloatArray
+    reached: FloatArray
+    values: FloatArray
+    count: int
+
+    @classmethod
+    def of(cls, data: Measurements, groups: NDArray[np.int64]) -> _Contrasts:
+        """Of readings in groups (n,) of repeats."""
+        means, clamps = Groups.by(groups), Groups.by(data.clamp)
+
+        def centred(columns: FloatArray) -> FloatArray:
+            sizes = np.bincount(means.of)
+            return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
+
+        axes, size, _ = np.linalg.svd(centred(_drifts(data)), full_matrices=False)
+        fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(np.bincount(means.of).max()))]
+
+        def left(columns: FloatArray) -> FloatArray:
+            found = centred(columns)
+            return np.asarray(found - fixed @ (fixed.T @ found))
+
+        n, count = len(groups), len(groups) - means.count - fixed.shape[1]
+        clamped = np.zeros((n, 0)) if clamps.alone else left((clamps.of[:, None] == np.arange(clamps.count)) * 1.0)
+        values, vectors = np.linalg.eigh(clamped.T @ clamped)
+        kept = values > values.max(initial=0.0) * n * np.finfo(float).eps
+        own = 1.0 - 1.0 / np.bincount(means.of)[means.of] - (fixed**2).sum(axis=1)
+        return cls(left(np.log(data.stiffness)[:, None])[:, 0], own, clamped @ vectors[:, kept], values[kept], count)
+
+    @property
+    def tells(self) -> bool:
+        """Whether the differences tell clamping from repeat noise."""
+        rank = len(self.values)
+        spread = float(np.ptp(self.values)) if rank == self.count else float(self.values.max(initial=0.0))
+        return spread > 1e-6 and rank >= 3
+
+    @property
+    def loads(self) -> FloatArray:
+        """(k,) squared shares of M y along the eigenvectors."""
+        return np.asarray((self.left @ self.reached) ** 2 / self.values)
+
+    def deviations(self, repeat: float, clamping: float) -> FloatArray:
+        """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
+        repeat, alone = max(repeat, 1e-12), self.reached.shape[1] == 0
+        ratio, own = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if alone else 0.0)
+        weights = ratio / (1.0 + ratio * self.values)
+        pull = (self.left - self.reached @ (weights * (self.left @ self.reached))) / own
+        scale = np.sqrt(np.maximum(self.own - self.reached**2 @ weights, 0.0) / own)
+        return np.asarray(np.abs(pull) / np.maximum(scale, 1e-12))
+
+
+def _drifts(data: Measurements) -> FloatArray:
+    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing."""
+    regressors = [np.linspace(-1.0, 1.0, len(data))]
     if "time_min" not in data.missing:
         # A drift adds rate * time to the deflection: to the logarithm, rate * time * k / F and its square.
         drift = data.time * data.stiffness / data.force
         drift = drift / max(float(np.abs(drift).max()), 1e-300)
         regressors += [drift, drift**2, data.time / max(float(data.time.max()), 1e-300)]
-    fixed.append(np.stack(regressors, axis=1))
-    left, singular, _ = np.linalg.svd(np.concatenate(fixed, axis=1), full_matrices=True)
-    rank = int((singular > 1e-9 * singular[0]).sum())
-    contrasts = left[:, rank:]
-    return contrasts, contrasts.T @ np.log(data.stiffness), data.clamp[:, None] == data.clamp[None, :]
+    return np.stack(regressors, axis=1)
 
 
-def _maximum_likelihood(left: FloatArray, contrasts: FloatArray, same: NDArray[np.bool_]) -> tuple[float, float, bool]:
+def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
     """Repeat noise and clamping that make the contrasts most likely, and whether they tell of clamping at all."""
     from scipy.optimize import minimize_scalar
 
-    clamped = contrasts.T @ same @ contrasts
-    values, vectors = np.linalg.eigh(clamped)
-    rotated = vectors.T @ left
-    rank = int((np.abs(values) > np.abs(values).max() * len(values) * np.finfo(float).eps).sum())
-    values = np.maximum(values, 0.0)
-    tells = float(np.ptp(values)) > 1e-6 and rank >= 3
+    values, loads = contrasts.values, contrasts.loads
+    rest = max(float(contrasts.left @ contrasts.left) - float(loads.sum()), 0.0)
 
     def repeat_at(ratio: float) -> float:
-        return float(np.sqrt(np.mean(rotated**2 / (1.0 + ratio * values))))
+        return float(np.sqrt((rest + (loads / (1.0 + ratio * values)).sum()) / contrasts.count))
 
     def minus_log_likelihood(root: float) -> float:
         ratio = root**2
-        return len(left) * float(np.log(max(repeat_at(ratio), 1e-12))) + 0.5 * float(np.log1p(ratio * values).sum())
+        return contrasts.count * float(np.log(max(repeat_at(ratio), 1e-12))) + 0.5 * float(
+            np.log1p(ratio * values).sum()
+        )
 
-    if not tells:
+    if not contrasts.tells:
         return repeat_at(0.0), 0.0, False
     best = minimize_scalar(minus_log_likelihood, bounds=(0.0, 5.0), method="bounded")
     root = float(best.x) if best.fun < minus_log_likelihood(0.0) else 0.0
     return repeat_at(root**2), root * repeat_at(root**2), True
 
 
-# -- scatter as matrices -----------------------------------------------------------------------------------------------
+# -- scatter with wild readings ----------------------------------------------------------------------------------------
 #
-# The scatter of the readings as matrices, with wild readings found out fit by fit.
+# The scatter of the readings, with wild ones found out fit by fit.
 
 MOST_WILD = 0.05  # share of readings that may be taken for wild
 NEVER = 1e12  # price of a wild reading where there are none
@@ -272,14 +343,12 @@ NEVER = 1e12  # price of a wild reading where there are none
 
 @dataclass(frozen=True)
 class Scatter:
-    """The noise as matrices, with some readings taken for wild.
+    """The scatter of ln readings, with some readings taken for wild.
 
     Attributes
     ----------
-    inverse
-        (n, n) inverse covariance of ln readings.
-    log_determinant
-        Of the covariance.
+    covariance
+        With the wild readings' own scatter widened.
     widening
         (n,) variance that a wild reading adds.
     price
@@ -288,57 +357,54 @@ class Scatter:
         Readings taken for wild.
     """
 
-    inverse: FloatArray
-    log_determinant: float
+    covariance: Covariance
     widening: FloatArray
     price: float
     wild: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, noise: Noise, covariance: FloatArray) -> Scatter:
-        """From a noise model and its covariance (n, n)."""
-        from scipy.linalg import cho_factor, cho_solve
-
-        factor = cho_factor(covariance, lower=True)
-        inverse = cho_solve(factor, np.eye(len(covariance)))
+    def of(cls, noise: Noise, covariance: Covariance) -> Scatter:
+        """From a noise model and its covariance."""
         widening = (noise.outlier_width**2 - 1.0) * noise.repeat**2
         price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
-        return cls(0.5 * (inverse + inverse.T), float(2.0 * np.log(np.diag(factor[0])).sum()), widening, float(price))
+        return cls(covariance, widening, float(price))
+
+    @property
+    def precision(self) -> Precision:
+        """Inverse covariance."""
+        return self.covariance.precision
 
     def with_wild(self, residual: FloatArray, known: Scatter | None = None) -> Scatter:
         """With those readings taken for wild whose widening pays its price at these residuals (n,).
 
-        Where these are the wild readings of `known`, that is the answer: the matrix is not worked out again.
+        Where these are the wild readings of `known`, that is the answer: nothing is worked out again. One by one, the
+        most wild first, each by Sherman and Morrison's formula beside those before it.
         """
-        diagonal, determinant, wild = np.diag(self.inverse).copy(), self.log_determinant, list(self.wild)
-        pull = self.inverse @ residual
-        taken: list[tuple[FloatArray, float]] = []  # the inverse falls by column column^T times a factor
-        for _ in range(int(MOST_WILD * len(residual)) + 1):
+        diagonal, wild = self.precision.diagonal, list(self.wild)
+        pull = self.precision.times(residual)
+        most = int(MOST_WILD * len(residual)) + 1
+        taken = np.zeros((most, len(residual)))  # the inverse falls by row^T row of each
+        for k in range(most):
             own = 1.0 + self.widening * diagonal
             gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
             gain[wild] = -np.inf
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            column = self.inverse[:, row].copy()
-            for earlier, factor in taken:
-                column -= earlier * earlier[row] * factor
-            taken.append((column, self.widening[row] / own[row]))
-            diagonal -= column * column * taken[-1][1]
+            column = self.precision.columns(np.array([row]))[0] - taken[:k, row] @ taken[:k]
             pull = pull - column * (self.widening[row] * pull[row] / own[row])
-            determinant += float(np.log(own[row]))
+            taken[k] = column * np.sqrt(self.widening[row] / own[row])
+            diagonal = diagonal - taken[k] ** 2
             wild.append(row)
         if known is not None and set(known.wild) == set(wild):
             return known
-        inverse = self.inverse.copy()
-        for column, factor in taken:
-            inverse -= np.outer(column, column) * factor
-        return Scatter(inverse, determinant, self.widening, self.price, tuple(wild))
+        rows = np.array(wild[len(self.wild) :], dtype=np.int64)
+        return replace(self, covariance=self.covariance.widened(rows, self.widening[rows]), wild=tuple(wild))
 
     def log_likelihood(self, residual: FloatArray) -> FloatArray:
         """(...,) of residuals (..., n), the price of wild readings included, without the constant n ln(2 pi) / 2."""
-        squared = np.einsum("...i,...i->...", residual @ self.inverse, residual)
-        return np.asarray(-0.5 * (squared + self.log_determinant) - len(self.wild) * self.price)
+        squared = self.precision.squares(residual)
+        return np.asarray(-0.5 * (squared + self.covariance.log_determinant) - len(self.wild) * self.price)
 
 
 # -- least squares under this scatter ----------------------------------------------------------------------------------

@@ -26,6 +26,7 @@ from toolpath_stiff.updating.measurements import Measurements, measured_path
 FloatArray = NDArray[np.float64]
 
 NO_CHANGE = (0.0, 0.0)  # of the strut law
+ANSWERS_KEPT = 64
 JOINT_STEP = 0.5e-3  # m, for differences: the size of the joint errors that the columns are used for
 
 
@@ -78,9 +79,15 @@ class Predictor:
         self._timeless = _prepare(self.base, data, timed=False)
         self._timed = _prepare(self.base, data, timed=True)
         self.tables: dict[tuple[Any, ...], Any] = {}
+        self._answers: dict[tuple[Any, ...], FloatArray] = {}
 
     def __len__(self) -> int:
         return len(self.data)
+
+    @property
+    def distinct(self) -> NDArray[np.int64]:
+        """(n,) number of what mechanics sees of each reading: repeats share it."""
+        return self._timeless.which
 
     @property
     def effects_that_act(self) -> list[str]:
@@ -91,8 +98,18 @@ class Predictor:
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
         """(n,) ln(N/m) that the readings should show; nan where the model has no answer.
 
-        `effects` come on top of those of the machine file; instruments among them change the readings only.
+        `effects` come on top of those of the machine file; instruments among them change the readings only. The last
+        answers are kept: a fit begins where the one before it ended, and asks for the same again.
         """
+        chosen = tuple((active.effect.name, *active.values.items()) for active in effects)
+        key = (*np.asarray(law, dtype=float).tolist(), chosen)
+        if key not in self._answers:
+            while len(self._answers) >= ANSWERS_KEPT:
+                self._answers.pop(next(iter(self._answers)))
+            self._answers[key] = self._solved(law, effects)
+        return self._answers[key].copy()
+
+    def _solved(self, law: ArrayLike, effects: Sequence[ActiveEffect]) -> FloatArray:
         machine = self.machine.with_changes(strut_law=scaled_law(self.machine.strut_law, law))
         model = build_model(machine, self.effect_files, effects)
         prepared = self._timed if any("time_min" in a.effect.needs for a in model.effects) else self._timeless
@@ -162,18 +179,21 @@ class Predictor:
 
     def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
-        first_term, second_term = self._law_terms(law)
-        return np.asarray((self._squared_forces / (first_term + second_term)).sum(axis=-1)[..., self._timeless.which])
+        first, second = self._law_terms(law)
+        return np.asarray((self._squared_forces / (first + second)).sum(axis=-2)[..., self._timeless.which])
 
-    def strut_slopes(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
-        """(..., n, 2) derivatives of `strut_part` to the law's logarithms."""
-        terms = self._law_terms(law)
-        energy = self._squared_forces / (terms[0] + terms[1]) ** 2
-        slopes = [-(energy * term).sum(axis=-1)[..., self._timeless.which] for term in terms]
-        return np.stack(slopes, axis=-1)
+    def strut_part_and_slopes(self, law: ArrayLike = NO_CHANGE) -> tuple[FloatArray, FloatArray]:
+        """`strut_part`, and its derivatives (..., 2, n) to the law's logarithms: they add up to minus the part."""
+        first, second = self._law_terms(law)
+        stiffness = first + second
+        energy = self._squared_forces / stiffness
+        part = energy.sum(axis=-2)
+        by_first = (energy * (first / stiffness)).sum(axis=-2)
+        which = self._timeless.which
+        return part[..., which], -np.stack([by_first, part - by_first], axis=-2)[..., which]
 
     def _law_terms(self, law: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """(..., m, 6) N/m each: what the law's two constants, scaled by laws (..., 2), give each strut."""
+        """(..., 6, m) N/m each: what the law's two constants, scaled by laws (..., 2), give each strut."""
         logs = np.asarray(law, dtype=float)
         rule, (first, second) = self.machine.strut_law, self._law_shares
         return (
@@ -183,14 +203,16 @@ class Predictor:
 
     @cached_property
     def _law_shares(self) -> tuple[FloatArray, FloatArray]:
-        """(m, 6) shares of the law's two constants in each strut's stiffness, by its length."""
+        """(6, m) shares of the law's two constants in each strut's stiffness, by its length."""
         rule = self.machine.strut_law
-        second = (self._timeless.path.struts.lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        lengths = np.ascontiguousarray(self._timeless.path.struts.lengths.T)
+        second = (lengths - rule.length_1) / (rule.length_2 - rule.length_1)
         return 1.0 - second, second
 
     @cached_property
     def _squared_forces(self) -> FloatArray:
-        return np.asarray(self._timeless.forces**2)
+        """(6, m) squared strut forces per unit load."""
+        return np.ascontiguousarray(self._timeless.forces.T**2)
 
     def joint_columns(self) -> FloatArray:
         """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.

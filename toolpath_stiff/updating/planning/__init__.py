@@ -24,18 +24,18 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.updating.inference import Judgement, judge
+from toolpath_stiff.updating.inference import Judgement, judge, question
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.noise import Noise, noise_models
+from toolpath_stiff.updating.inference.noise import LEAST, Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning.campaign import RISER, TABLE, Campaign, first_campaign
 from toolpath_stiff.updating.planning.gaps import (
     SETTLED,
-    Outcome,
+    Expectation,
+    GapShares,
     ReadingNoise,
-    Shares,
     choose,
     enough,
     expectation,
@@ -63,7 +63,6 @@ FloatArray = NDArray[np.float64]
 
 MOST_RIVALS = 6  # a plan that separates more would separate none well
 MOST_VISITS = 200
-LEAST_NOISE = 1e-3  # relative; the paper's best readings, not clamped anew, scatter by 44 N/mm, 0.1 %
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart
 
 # Where an indicator reads a link's own deflection.
@@ -138,12 +137,12 @@ class Plan:
 
     visits: Visits
     chosen: tuple[int, ...]
-    shares: dict[tuple[str, str], Shares]
+    shares: dict[tuple[str, str], GapShares]
     pairs: tuple[PairGap, ...]
     kinds: tuple[str, ...]
     why: tuple[str, ...]
-    before: Outcome
-    after: Outcome
+    before: Expectation
+    after: Expectation
     enough: int | None
     repeats: int | None
     minutes: float
@@ -199,9 +198,9 @@ def plan_measurements(
         raise InputError(f"a plan of {n} poses", expected=f"1 to {MOST_VISITS}")
     repeat, clamping = repeat_and_clamping(noise_relative)
     ranked, notes = _ranked(rivals)
-    if repeat < LEAST_NOISE:
-        repeat = LEAST_NOISE
-        notes.append(f"planned for a noise of {100 * LEAST_NOISE:g} % a reading: nobody measures better")
+    if repeat < LEAST:
+        repeat = LEAST
+        notes.append(f"planned for a noise of {100 * LEAST:g} % a reading: nobody measures better")
     menu, costs = menu or Menu(), costs or Costs()
     visits = possible_visits(machine, menu, matters(ranked), np.random.default_rng(seed))
     forecasts, good, scatter = forecast_all(machine, ranked, visits.readings, effect_files, strut_spread)
@@ -233,7 +232,7 @@ def plan_measurements(
         pairs=pairs,
         kinds=kinds,
         why=why,
-        before=Outcome(before, float(max(weights.values()) >= SETTLED)),
+        before=Expectation(before, float(max(weights.values()) >= SETTLED)),
         after=after,
         enough=enough(visits, picked, forecasts, noise, seed),
         repeats=repeats_needed(visits, picked, forecasts, noise, seed),
@@ -293,7 +292,7 @@ def random_visits(plan: Plan, n: int, seed: int) -> tuple[int, ...]:
 
 def _pair(
     names: tuple[str, str],
-    share: Shares,
+    share: GapShares,
     chosen: Sequence[int],
     usable: NDArray[np.bool_],
     rivals: Sequence[Rival],
@@ -459,7 +458,7 @@ def _rivals_after(
         # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
         scatter = noise_models(data, noise, strut_spread)[-1]
         problem = Problem.of(Predictor(machine, data, effect_files), scatter)
-    notes = [f"noise: {scatter.origin}"]
+    notes = [*filter(None, [question(problem.predictor)]), f"noise: {scatter.origin}"]
     if between:
         return fitted_rivals(problem, between, effects), "", scatter, problem, notes
     if judgement is None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.units import certain, deg_from_rad, mm_from_m
 from toolpath_stiff.updating.planning import Plan, Proposal, matters
 from toolpath_stiff.updating.planning.campaign import Campaign
 from toolpath_stiff.updating.planning.gaps import MOST_REPEATS, SETTLED, ReadingNoise, pair_shares
@@ -151,7 +151,7 @@ def document(proposal: Proposal, command: str = "") -> PlanDocument:
         "costs_minutes": {name: getattr(proposal.costs, name) for name in COSTS},
         "command": command,
     }
-    return cast(PlanDocument, whole)
+    return cast(PlanDocument, certain(whole))
 
 
 def rows_of(proposal: Proposal) -> list[dict[str, Any]]:
@@ -305,7 +305,7 @@ def plan_rows(
     visits, chosen
         The visits in measuring order; each is one clamping.
     taken
-        Names of points that new points must not bear.
+        Names of points that new points must not have.
     repeats
         Which repeat of its place each visit is, where places are clamped several times; else the rounds of a visit.
     """

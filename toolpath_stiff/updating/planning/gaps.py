@@ -51,7 +51,7 @@ def repeat_and_clamping(relative: float | tuple[float, float]) -> tuple[float, f
 
 
 @dataclass(frozen=True)
-class Shares:
+class GapShares:
     """What each of v visits adds to the gap of a pair: a (v,), h (v, q), M (v, q, q)."""
 
     a: FloatArray
@@ -91,7 +91,7 @@ def _summed_products(columns: FloatArray, starts: IntArray) -> FloatArray:
     return products
 
 
-def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: ReadingNoise) -> Shares:
+def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: ReadingNoise) -> GapShares:
     """What every visit adds to the gap of two rivals."""
     difference = first.mean - second.mean
     F = np.concatenate([first.factor, second.factor, np.sqrt(2.0) * noise.machine], axis=1)
@@ -102,14 +102,14 @@ def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: Readin
     # Inverse of 2 (r^2 1 + c^2 11^T) by Sherman and Morrison.
     common = noise.clamping**2 / (noise.repeat**2 + counts * noise.clamping**2)
     form = (products - common[:, None, None] * sums[:, :, None] * sums[:, None, :]) / (2.0 * noise.repeat**2)
-    return Shares(form[:, 0, 0], form[:, 1:, 0], form[:, 1:, 1:])
+    return GapShares(form[:, 0, 0], form[:, 1:, 0], form[:, 1:, 1:])
 
 
 # -- what would come of it ---------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Expectation:
     """What is to be expected of readings: mean probability of the truth, and how often one rival exceeds `SETTLED`."""
 
     truth: float
@@ -126,7 +126,7 @@ def expected_outcome(
     visit_of: IntArray,
     noise: ReadingNoise,
     seed: int,
-) -> Outcome:
+) -> Expectation:
     """Simulate the readings under every rival in turn and judge them by Bayes' rule.
 
     All rivals scatter by the mean of their covariances here, as in the gap: that one rival is vaguer than another is
@@ -163,7 +163,7 @@ def expected_outcome(
         probability /= probability.sum(axis=1, keepdims=True)
         truth += weight * float(probability[:, i].mean())
         settled += weight * float((probability.max(axis=1) >= SETTLED).mean())
-    return Outcome(truth, settled)
+    return Expectation(truth, settled)
 
 
 def expectation(
@@ -173,7 +173,7 @@ def expectation(
     noise: ReadingNoise,
     seed: int,
     repeats: int = 1,
-) -> Outcome:
+) -> Expectation:
     """What is to be expected of these visits, each made so often."""
     rows = [visits.rows(visit) for visit in chosen]
     visit_of = np.repeat(np.arange(len(chosen)), [len(own) for own in rows])
@@ -221,7 +221,7 @@ def log_confusion(gaps: dict[tuple[str, str], FloatArray], weights: dict[str, fl
 def choose(
     visits: Visits,
     usable: NDArray[np.bool_],
-    shares: dict[tuple[str, str], Shares],
+    shares: dict[tuple[str, str], GapShares],
     weights: dict[str, float],
     n: int,
     costs: Costs,
@@ -299,7 +299,7 @@ def kind_of(visits: Visits, visit: int, menu: Menu) -> str:
     return "tilted" if visits.tilt(visit) > 1e-6 else "vertical"
 
 
-def why_of(visits: Visits, visit: int, shares: dict[tuple[str, str], Shares], menu: Menu) -> str:
+def why_of(visits: Visits, visit: int, shares: dict[tuple[str, str], GapShares], menu: Menu) -> str:
     """What the visit is for, a sentence."""
     pair = max(shares, key=lambda p: shares[p].gap([visit]))
     what = [f"tilted {np.degrees(visits.tilt(visit)):.3g} deg" if visits.tilt(visit) > 1e-6 else "vertical"]

@@ -35,6 +35,7 @@ IntArray = NDArray[np.int64]
 
 LAW_STEP = 1e-4  # of the strut law's logarithms, for differences
 LARGEST_STEP = 0.3  # of a size, for differences: a secant over the posterior's width where that is wide
+ALIKE = 1e-6  # relative difference within which two variances are equal
 SMALL_SHARE = 1e-3  # of the largest usual size: the step where the size is nothing
 
 
@@ -149,8 +150,9 @@ def joint_columns(model: StiffnessModel, readings: Measurements) -> FloatArray:
 def principal(columns: FloatArray, share: float = 1e-3) -> FloatArray:
     """(m, k) columns with the same covariance as (m, q), but for a share of the variance at most."""
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = np.cumsum(values) > share * values.sum()
-    return np.asarray(columns @ vectors[:, kept])
+    least = values[np.cumsum(values) > share * values.sum()][0]
+    # Of equal values, which a symmetric machine has, all or none: which of them comes first is chance.
+    return np.asarray(columns @ vectors[:, values >= (1.0 - ALIKE) * least])
 
 
 def _forecast(rival: Rival, predictor: Predictor) -> Forecast:

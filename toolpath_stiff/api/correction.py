@@ -1,4 +1,4 @@
-"""The model against measurements: reduce, compare, diagnose, update, plan."""
+"""About a diagnosis: what to measure (plan), raw records reduced (reduce), the model corrected (update)."""
 
 from __future__ import annotations
 
@@ -6,151 +6,25 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.inputs import FARTHEST_MM, Program, origin_word, pose_si, positive, program_from, whole
-from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
+from toolpath_stiff.api.inputs import FARTHEST_MM, positive
+from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.results import FolderResult, Progress, Result, one_of, teller
-from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
-from toolpath_stiff.hints import Asked, options
+from toolpath_stiff.hints import options
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.machine.model import Machine as MachineModel
-    from toolpath_stiff.updating.comparison import Comparison as Compared
     from toolpath_stiff.updating.correction import Correction
-    from toolpath_stiff.updating.diagnosis import Diagnosis as Diagnosed
-    from toolpath_stiff.updating.measurements import Measurements as Readings
     from toolpath_stiff.updating.planning import Proposal
     from toolpath_stiff.updating.raw import Reduction as Reduced
 
-Noise = float | tuple[float, float] | None
-LARGEST_SPREAD_PERCENT = 50.0
 STEEPEST_TILT_DEG = 90.0
 COSTS = ("reading", "pose", "tool", "setup")
-
-
-class Measurements:
-    """Measured stiffnesses of a machine: the files that hold them.
-
-    A machine says what the readings mean (its reference tool, which poses it has), so each function reads them for its
-    own.
-
-    Attributes
-    ----------
-    files
-        Their names: CSV, "FILE.xlsx#SHEET", or "nist-table1", the paper's Table 1.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> data = tps.Measurements.read("nist-table1")
-    >>> len(data.to_frame())
-    42
-    """
-
-    def __init__(self, files: Sequence[str]) -> None:
-        self.files = tuple(files)
-        self._last: tuple[MachineModel, Readings] | None = None
-
-    @classmethod
-    def read(cls, *files: str | Path) -> Measurements:
-        """Measurement files, several as one set of readings.
-
-        Raises
-        ------
-        InputError, InputErrors
-            A file cannot be read, or has not the right columns; every bad row.
-        """
-        found = cls([str(file) for file in files])
-        found.on(Machine.load())
-        return found
-
-    def on(self, machine: Machine) -> Readings:
-        """The readings as arrays in SI, checked against a machine.
-
-        Raises `InputError` or `InputErrors`, for poses that the machine cannot have too.
-        """
-        from toolpath_stiff.updating.measurements import read_measurements
-
-        model = machine.model.given or machine.model.machine
-        if self._last is None or self._last[0] is not model:
-            self._last = (model, read_measurements(self.files, model))
-        return self._last[1]
-
-    def to_frame(self, machine: Machine | str | Path = MACHINE) -> pd.DataFrame:
-        """One row a reading: file, line, point, pose, direction, measured stiffness, force."""
-        import pandas as pd
-
-        from toolpath_stiff.updating.measurements import reading_columns
-
-        return pd.DataFrame(reading_columns(self.on(machine_from(machine))))
-
-    def __repr__(self) -> str:
-        return f"<Measurements {', '.join(self.files)}>"
-
-
-Data = Measurements | str | Path | Sequence[str | Path]
-
-
-def measurements_from(data: Data) -> Measurements:
-    """Measurements; of a file's name or several, those in the files."""
-    if isinstance(data, Measurements):
-        return data
-    return Measurements([str(data)] if isinstance(data, str | Path) else [str(one) for one in data])
-
-
-class _Question:
-    """What the functions on measurements are asked in common, checked and in SI."""
-
-    def __init__(
-        self,
-        machine: Machine | str | Path,
-        data: Data | None,
-        noise_percent: Noise,
-        strut_spread_percent: float,
-        seed: int,
-    ) -> None:
-        self.on = machine_from(machine)
-        self.model = self.on.model.given or self.on.model.machine
-        self.data = None if data is None else measurements_from(data)
-        self.noise = _noise(noise_percent)
-        if not 0.0 <= strut_spread_percent <= LARGEST_SPREAD_PERCENT:
-            raise InputError(f"strut spread {strut_spread_percent:g} %", expected=f"0 to {LARGEST_SPREAD_PERCENT:g} %")
-        self.strut_spread = strut_spread_percent / 100.0
-        self.seed = whole("--seed", seed, 0)
-        self.files = self.data.files if self.data else ()
-        self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread)
-        self.inputs = (*self.files, *self.on.inputs)
-
-    @property
-    def readings(self) -> Readings:
-        assert self.data is not None
-        return self.data.on(self.on)
-
-    @property
-    def common(self) -> dict[str, Any]:
-        """What every function below takes by these names."""
-        return {
-            "noise": self.noise,
-            "strut_spread": self.strut_spread,
-            "effect_files": self.on.effect_files,
-            "seed": self.seed,
-        }
-
-
-def _noise(percent: Noise) -> Noise:
-    """Percentages as relative standard deviations."""
-    if percent is None:
-        return None
-    parts = [percent] if isinstance(percent, int | float) else list(percent)
-    shares = [float(part) / 100.0 for part in parts]
-    if len(shares) not in (1, 2) or not all(0.0 <= part <= 0.5 for part in shares) or shares[0] <= 0.0:
-        raise InputError(f"noise {percent} %", expected="one or two percentages, more than 0 and at most 50")
-    return shares[0] if len(shares) == 1 else (shares[0], shares[1])
 
 
 class Reduction(Result):
@@ -180,23 +54,23 @@ class Reduction(Result):
 
     def plot(self) -> Figure:
         """Force against deflection of each loop."""
-        from toolpath_stiff.report.reduce import loops_png
+        from toolpath_stiff.report.measuring import loops_png
 
         return loops_png.figure(self.reduced.loops, self.reduced.figures, Path(self.raw).name)
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.reduce import text
+        from toolpath_stiff.report.measuring import loops_text
 
-        return text(self.to_dict()["loops"])
+        return loops_text(self.to_dict()["loops"])
 
     def _short(self) -> str:
         return f"{Path(self.raw).name}, {len(self.reduced.loops)} loops"
 
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
         """The measurement file, and the picture of the loops beside it."""
-        from toolpath_stiff.report.reduce import files
+        from toolpath_stiff.report.measuring import loop_files
 
-        return files(self.reduced, Path(file), Path(self.raw).name, plots=plots)
+        return loop_files(self.reduced, Path(file), Path(self.raw).name, plots=plots)
 
     def save(self, file: str | Path, *, plots: bool = True) -> list[Path]:
         """Write the measurement file and, beside it, the picture of the loops."""
@@ -236,227 +110,6 @@ def reduce(raw: str | Path) -> Reduction:
     return Reduction(reduce_records(raw), str(raw))
 
 
-class Comparison(FolderResult):
-    """How far the model is from measurements, where, and how much of it is more than scatter.
-
-    Attributes
-    ----------
-    compared
-        Residuals and scatter as arrays in SI.
-    """
-
-    command: ClassVar[str] = "compare"
-
-    def __init__(self, compared: Compared, inputs: tuple[str, ...]) -> None:
-        self.compared, self.inputs = compared, inputs
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of compare.json."""
-        return dict(self.compared.document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and what it may vary with."""
-        from toolpath_stiff.report.compare import residuals_csv
-
-        return _table(residuals_csv(self.compared))
-
-    def plot(self) -> Figure:
-        """Measured against modelled."""
-        from toolpath_stiff.report.compare.pictures import measured_modelled_png
-
-        return measured_modelled_png.figure(self.compared)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.compare import text
-
-        return "\n".join([text(self.compared.document), *self.compared.document["next"]])
-
-    def _short(self) -> str:
-        found = self.compared.document["baseline"]["mean_abs_error_percent"]
-        return f"{self.compared.document['machine']}, mean error {found:.2f} %"
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps compare`."""
-        from toolpath_stiff.report.compare import files
-
-        return files(self.compared, plots=plots)
-
-
-def compare(
-    machine: Machine | str | Path,
-    data: Data,
-    *,
-    noise_percent: Noise = None,
-    strut_spread_percent: float = 1.0,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> Comparison:
-    """See where the model fails: the machine as its file has it, against measurements.
-
-    Parameters
-    ----------
-    machine, data
-        The machine; measurements, or the files that hold them.
-    noise_percent
-        Standard deviation of one reading, re-clamping included; or of the reading alone and of a clamping. Unless
-        given, from repeats, else from the column sd_N_per_mm, else a low and a high guess.
-    strut_spread_percent
-        Standard deviation of the struts' stiffness.
-    seed
-        Of every random draw.
-    progress
-        Called with what is being done.
-
-    Raises
-    ------
-    InputError, InputErrors
-        A file cannot be read; the model has no stiffness at a measured pose.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.compare("nist", "nist-table1", noise_percent=5)
-    <Comparison: nist, mean error 9.62 %>
-    """
-    from toolpath_stiff.updating.comparison import compare as compare_readings
-
-    asked = _Question(machine, data, noise_percent, strut_spread_percent, seed)
-    teller(progress)("comparing")
-    return Comparison(compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common), asked.inputs)
-
-
-class Diagnosis(FolderResult):
-    """Which physical effect the model lacks, if any.
-
-    Attributes
-    ----------
-    diagnosed
-        Hypotheses, fits, probabilities, with arrays in SI.
-    """
-
-    command: ClassVar[str] = "diagnose"
-
-    def __init__(self, diagnosed: Diagnosed, inputs: tuple[str, ...]) -> None:
-        from toolpath_stiff.updating.diagnosis.document import document
-
-        self.diagnosed, self.inputs = diagnosed, inputs
-        self._document = document(diagnosed)
-
-    @property
-    def verdict(self) -> str:
-        """adequate, identified, ambiguous or unexplained."""
-        return self.diagnosed.verdict
-
-    @property
-    def plausible(self) -> list[str]:
-        """Effects that may be what is missing, the most likely first."""
-        return list(self.diagnosed.plausible)
-
-    @property
-    def best(self) -> str | None:
-        """The explanation that fits best among those left standing."""
-        return self.diagnosed.best
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of diagnose.json."""
-        return dict(self._document)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The candidates, one a row: probability, errors, why not."""
-        import pandas as pd
-
-        return pd.DataFrame(self._document["candidates"])
-
-    def plot(self) -> Figure:
-        """The error as given, with the strut law refitted, and with each candidate."""
-        from toolpath_stiff.report.diagnose.pictures import ladder_png
-
-        return ladder_png.figure(self._document)
-
-    def __str__(self) -> str:
-        from toolpath_stiff.report.diagnose import text
-
-        return text(self._document)
-
-    def _short(self) -> str:
-        names = ", ".join(self.plausible)
-        return f"{self.verdict}: {names}" if names else self.verdict
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps diagnose`."""
-        from toolpath_stiff.report.diagnose import files
-
-        return files(self.diagnosed, self._document, plots=plots)
-
-
-def diagnose(
-    machine: Machine | str | Path,
-    data: Data,
-    *,
-    noise_percent: Noise = None,
-    strut_spread_percent: float = 1.0,
-    seed: int = 0,
-    program: Program | str | Path | None = None,
-    origin_mm_deg: Sequence[float] | None = None,
-    progress: Progress | None = None,
-) -> Diagnosis:
-    """Find out which physical effect the model lacks, if any.
-
-    Parameters
-    ----------
-    machine, data
-        The machine, whose effect files take part; measurements, or the files that hold them.
-    noise_percent, strut_spread_percent, seed
-        As of `compare`.
-    program, origin_mm_deg
-        Where several explanations remain, how much the choice matters is worked out on this program, placed there;
-        unless given, on the packaged case study.
-    progress
-        Called with what is being done.
-
-    Raises
-    ------
-    InputError, InputErrors
-        A file cannot be read; too few readings.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.diagnose("nist", "nist-table1", noise_percent=10)
-    >>> found.verdict
-    'ambiguous'
-    """
-    from toolpath_stiff.placement.case_study import case_study_program
-    from toolpath_stiff.updating.diagnosis import diagnose as diagnose_readings
-
-    asked = _Question(machine, data, noise_percent, strut_spread_percent, seed)
-    part = None if program is None else program_from(program)
-    origin = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
-    conditions = asked.on.running(part).conditions
-    default = asked.model.default_origin
-    own = options(
-        program=None if part is None else part.file,
-        origin=None if origin is None else origin_word(origin),
-        setup=asked.on.setup,
-        temperature=asked.on.temperature_C,
-        seed=seed or None,
-    )
-    found = diagnose_readings(
-        asked.model,
-        asked.readings,
-        program=lambda: case_study_program() if part is None else part.moves(origin, default),
-        origin=origin,
-        setup=conditions.setup,
-        temperature=conditions.temperature,
-        files=asked.files,
-        command=asked.asked.command("diagnose", *own, *(part.words if part else ())),
-        asked=asked.asked,
-        progress=teller(progress),
-        **asked.common,
-    )
-    return Diagnosis(found, (*asked.inputs, *(part.inputs if part else ())))
-
-
 class Update(FolderResult):
     """A machine's model corrected by measurements, or why it was not.
 
@@ -468,7 +121,7 @@ class Update(FolderResult):
 
     command: ClassVar[str] = "update"
 
-    def __init__(self, correction: Correction, asked: _Question) -> None:
+    def __init__(self, correction: Correction, asked: Question) -> None:
         from toolpath_stiff.updating.correction.document import document
 
         self.correction, self._asked, self.inputs = correction, asked, asked.inputs
@@ -485,8 +138,10 @@ class Update(FolderResult):
         from toolpath_stiff.stiffness.model import build_model
 
         if self.correction.machine is None:
+            worse = self.correction.update.worse
             raise InputError(
-                f"the update was refused: {self._document['text']}", hint="force=True keeps it all the same"
+                f"the update was refused: {self._document['text']}",
+                hint="" if worse else "force=True keeps it all the same",
             )
         files = self._asked.on.effect_files
         return Machine(build_model(self.correction.machine, files), self._asked.on.asked, files)
@@ -575,7 +230,7 @@ def update(
     auto
         Go on adding effects while the data support them.
     force
-        Keep what the data do not support.
+        Keep what the data do not support; never what fits worse than the machine given.
     objective
         "likelihood"; or "mean-error", the strut law alone, as the paper fitted it.
     machine_file
@@ -600,7 +255,7 @@ def update(
     from toolpath_stiff.updating.correction import OBJECTIVES
     from toolpath_stiff.updating.correction import update as update_machine
 
-    asked = _Question(machine, data, noise_percent, strut_spread_percent, seed)
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
     found = update_machine(
         asked.model,
         asked.readings,
@@ -630,7 +285,7 @@ class Plan(FolderResult):
 
     command: ClassVar[str] = "plan"
 
-    def __init__(self, proposal: Proposal, asked: _Question, line: str) -> None:
+    def __init__(self, proposal: Proposal, asked: Question, line: str) -> None:
         from toolpath_stiff.updating.planning.document import document
 
         self.proposal, self.inputs = proposal, asked.inputs
@@ -650,12 +305,12 @@ class Plan(FolderResult):
 
     def plot(self) -> Figure:
         """The visits in the workspace."""
-        from toolpath_stiff.report.plan import picture_arguments, plan_picture
+        from toolpath_stiff.report.measuring import picture_arguments, plan_picture
 
         return plan_picture.figure(*picture_arguments(self.proposal))
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.plan import text
+        from toolpath_stiff.report.measuring import text
 
         return text(self._document)
 
@@ -664,7 +319,7 @@ class Plan(FolderResult):
 
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps plan`."""
-        from toolpath_stiff.report.plan import files
+        from toolpath_stiff.report.measuring import files
 
         return files(self.proposal, self._document, plots=plots)
 
@@ -722,7 +377,7 @@ def plan(
     from toolpath_stiff.updating.planning import plan as plan_visits
     from toolpath_stiff.updating.planning.visits import Costs
 
-    asked = _Question(machine, data, noise_percent, strut_spread_percent, seed)
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
     costs = _costs(minutes or {})
     if max_tilt_deg is not None and not 0.0 <= max_tilt_deg < STEEPEST_TILT_DEG:
         raise InputError(f"{max_tilt_deg:g} degrees", expected="0 or more and less than 90")
@@ -784,12 +439,3 @@ def _own_words(**given: object) -> list[str]:
 def _word(value: object) -> str:
     """A value as an option takes it."""
     return f"{value:.10g}" if isinstance(value, int | float) else str(value)
-
-
-def _table(csv: str) -> pd.DataFrame:
-    """CSV text as a DataFrame."""
-    import io
-
-    import pandas as pd
-
-    return pd.read_csv(io.StringIO(csv))

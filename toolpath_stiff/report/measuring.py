@@ -1,18 +1,23 @@
-"""What to measure next, drawn: how far the rivals would be apart over the workspace, and the planned poses by kind."""
+"""Measuring, in files, figures and pictures: what to measure next, and raw records reduced to stiffnesses.
+
+The plan is drawn as how far the rivals would be apart over the workspace, with the planned poses by kind.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.files import Content
-from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, house_style, new_figure, picture
+from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.report.words import plain, shortened
-from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.planning import Plan, Proposal
 from toolpath_stiff.updating.planning.document import (
     GapMap,
@@ -23,12 +28,14 @@ from toolpath_stiff.updating.planning.document import (
     rows_of,
 )
 from toolpath_stiff.updating.planning.visits import Visits
+from toolpath_stiff.updating.raw import measurement_csv
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from toolpath_stiff.updating.planning.document import PlanDocument
+    from toolpath_stiff.updating.raw import Loop, LoopFigures, Reduction
 
 FloatArray = NDArray[np.float64]
 
@@ -250,3 +257,73 @@ def text(document: PlanDocument) -> str:
     lines += ["", *document["text"]]
     lines += [f"note: {note}" for note in document["notes"]]
     return "\n".join(lines)
+
+
+# -- raw records reduced -----------------------------------------------------------------------------------------------
+
+COLUMNS = 4
+MOST = 60  # loops in one picture; further ones are counted in its heading
+
+
+@picture
+def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str) -> Figure:
+    """One small diagram a loop, in the order of the file, as PNG."""
+    shown = min(len(loops), MOST)
+    columns = min(COLUMNS, shown)
+    rows = math.ceil(shown / columns)
+    with house_style():
+        figure = new_figure(max(6.0, 3.4 * columns), 2.9 * rows + 0.9)
+        more = f"; the first {MOST} of {len(loops)} loops" if len(loops) > MOST else ""
+        figure.suptitle(f"{title}: force over deflection{more}", x=0.02, ha="left", weight="bold", color=INK)
+        axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        for ax, loop, one in zip(axes, loops, figures, strict=False):
+            deflection = um_from_m(loop.deflection)
+            ends = [int(np.argmin(loop.jog)), int(np.argmax(loop.jog))]
+            ax.plot(deflection[ends], loop.force[ends], color=SECOND_ORANGE, linewidth=1.6, label="secant")
+            ax.plot(deflection, loop.force, color=MUTED, linewidth=1.0, marker="o", markersize=3.5)
+            ax.set_title(loop.title, fontsize=8.5)
+            ax.text(
+                0.04,
+                0.95,
+                f"{n_per_mm_from_n_per_m(one.stiffness):,.0f} N/mm",
+                transform=ax.transAxes,
+                va="top",
+                fontsize=9,
+                color=SECOND_ORANGE,
+            )
+            ax.set_xlabel("deflection in \u00b5m", fontsize=8)
+            ax.set_ylabel("force in N", fontsize=8)
+            ax.tick_params(labelsize=8)
+        for ax in axes[shown:]:
+            ax.set_axis_off()
+        height = figure.get_size_inches()[1]
+        figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.35 / height))
+        return figure
+
+
+def loop_names(out: Path, *, plots: bool = True) -> tuple[Path, ...]:
+    """The files that `loop_files` makes: `out` itself, and the picture of the loops beside it."""
+    return (out, out.with_name(f"{out.stem}_loops.png")) if plots else (out,)
+
+
+def loop_files(reduction: Reduction, out: Path, title: str, *, plots: bool = True) -> dict[Path, Content]:
+    """The measurement file, and with `plots` the loops drawn under `title`."""
+    contents: list[Content] = [measurement_csv(reduction.loops, reduction.figures)]
+    contents += [loops_png(reduction.loops, reduction.figures, title)] if plots else []
+    return dict(zip(loop_names(out, plots=plots), contents, strict=True))
+
+
+def loops_text(entries: Sequence[Mapping[str, Any]]) -> str:
+    """The figures for people: a line a loop."""
+    heading = ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
+    rows: list[tuple[str, ...]] = [heading]
+    for one in entries:
+        cells = [one["loop"], f"{one['stiffness_N_per_mm']:.0f}", f"{one['force_N']:.0f}"]
+        for name in ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um"):
+            cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")
+        rows.append(tuple(cells))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    )

@@ -1,0 +1,378 @@
+"""The model against measurements: where it fails (compare), which physical effect it lacks (diagnose)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from toolpath_stiff.api.inputs import Program, origin_word, pose_si, program_from, whole
+from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.api.results import FolderResult, Progress, teller
+from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import Content
+from toolpath_stiff.hints import Asked, options
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from toolpath_stiff.machine.model import Machine as MachineModel
+    from toolpath_stiff.updating.comparison import Comparison as Compared
+    from toolpath_stiff.updating.diagnosis import Diagnosis as Diagnosed
+    from toolpath_stiff.updating.measurements import Measurements as Readings
+
+Noise = float | tuple[float, float] | None
+LARGEST_SPREAD_PERCENT = 50.0
+
+
+class Measurements:
+    """Measured stiffnesses of a machine: the files that hold them.
+
+    A machine says what the readings mean (its reference tool, which poses it has), so each function reads them for its
+    own.
+
+    Attributes
+    ----------
+    files
+        Their names: CSV, "FILE.xlsx#SHEET", or "nist-table1", the paper's Table 1.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> data = tps.Measurements.read("nist-table1")
+    >>> len(data.to_frame())
+    42
+    """
+
+    def __init__(self, files: Sequence[str]) -> None:
+        self.files = tuple(files)
+        self._last: tuple[MachineModel, Readings] | None = None
+
+    @classmethod
+    def read(cls, *files: str | Path) -> Measurements:
+        """Measurement files, several as one set of readings.
+
+        Raises
+        ------
+        InputError, InputErrors
+            A file cannot be read, or has not the right columns; every bad row.
+        """
+        found = cls([str(file) for file in files])
+        found.on(Machine.load())
+        return found
+
+    def on(self, machine: Machine) -> Readings:
+        """The readings as arrays in SI, checked against a machine.
+
+        Raises `InputError` or `InputErrors`, for poses that the machine cannot have too.
+        """
+        from toolpath_stiff.updating.measurements import read_measurements
+
+        model = machine.model.given or machine.model.machine
+        if self._last is None or self._last[0] is not model:
+            self._last = (model, read_measurements(self.files, model))
+        return self._last[1]
+
+    def to_frame(self, machine: Machine | str | Path = MACHINE) -> pd.DataFrame:
+        """One row a reading: file, line, point, pose, direction, measured stiffness, force."""
+        import pandas as pd
+
+        from toolpath_stiff.updating.measurements import reading_columns
+
+        return pd.DataFrame(reading_columns(self.on(machine_from(machine))))
+
+    def __repr__(self) -> str:
+        return f"<Measurements {', '.join(self.files)}>"
+
+
+Data = Measurements | str | Path | Sequence[str | Path]
+
+
+def measurements_from(data: Data) -> Measurements:
+    """Measurements; of a file's name or several, those in the files."""
+    if isinstance(data, Measurements):
+        return data
+    return Measurements([str(data)] if isinstance(data, str | Path) else [str(one) for one in data])
+
+
+class Question:
+    """What the functions on measurements are asked in common, checked and in SI."""
+
+    def __init__(
+        self,
+        machine: Machine | str | Path,
+        data: Data | None,
+        noise_percent: Noise,
+        strut_spread_percent: float,
+        seed: int,
+    ) -> None:
+        self.on = machine_from(machine)
+        self.model = self.on.model.given or self.on.model.machine
+        self.data = None if data is None else measurements_from(data)
+        self.noise = _noise(noise_percent)
+        if not 0.0 <= strut_spread_percent <= LARGEST_SPREAD_PERCENT:
+            raise InputError(f"strut spread {strut_spread_percent:g} %", expected=f"0 to {LARGEST_SPREAD_PERCENT:g} %")
+        self.strut_spread = strut_spread_percent / 100.0
+        self.seed = whole("--seed", seed, 0)
+        self.files = self.data.files if self.data else ()
+        self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread)
+        self.inputs = (*self.files, *self.on.inputs)
+
+    @property
+    def readings(self) -> Readings:
+        """Of the measurement files, on this machine."""
+        assert self.data is not None
+        return self.data.on(self.on)
+
+    @property
+    def common(self) -> dict[str, Any]:
+        """What every function below takes by these names."""
+        return {
+            "noise": self.noise,
+            "strut_spread": self.strut_spread,
+            "effect_files": self.on.effect_files,
+            "seed": self.seed,
+        }
+
+
+def _noise(percent: Noise) -> Noise:
+    """Percentages as relative standard deviations."""
+    if percent is None:
+        return None
+    parts = [percent] if isinstance(percent, int | float) else list(percent)
+    shares = [float(part) / 100.0 for part in parts]
+    if len(shares) not in (1, 2) or not all(0.0 <= part <= 0.5 for part in shares) or shares[0] <= 0.0:
+        raise InputError(f"noise {percent} %", expected="one or two percentages, more than 0 and at most 50")
+    return shares[0] if len(shares) == 1 else (shares[0], shares[1])
+
+
+class Comparison(FolderResult):
+    """How far the model is from measurements, where, and how much of it is more than scatter.
+
+    Attributes
+    ----------
+    compared
+        Residuals and scatter as arrays in SI.
+    """
+
+    command: ClassVar[str] = "compare"
+
+    def __init__(self, compared: Compared, inputs: tuple[str, ...]) -> None:
+        self.compared, self.inputs = compared, inputs
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of compare.json."""
+        return dict(self.compared.document)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and what it may vary with."""
+        from toolpath_stiff.report.compare import residuals_csv
+
+        return _table(residuals_csv(self.compared))
+
+    def plot(self) -> Figure:
+        """Measured against modelled."""
+        from toolpath_stiff.report.compare.pictures import measured_modelled_png
+
+        return measured_modelled_png.figure(self.compared)
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.compare import text
+
+        return "\n".join([text(self.compared.document), *self.compared.document["next"]])
+
+    def _short(self) -> str:
+        found = self.compared.document["baseline"]["mean_abs_error_percent"]
+        return f"{self.compared.document['machine']}, mean error {found:.2f} %"
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """The files of `tps compare`."""
+        from toolpath_stiff.report.compare import files
+
+        return files(self.compared, plots=plots)
+
+
+def compare(
+    machine: Machine | str | Path,
+    data: Data,
+    *,
+    noise_percent: Noise = None,
+    strut_spread_percent: float = 1.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Comparison:
+    """See where the model fails: the machine as its file has it, against measurements.
+
+    Parameters
+    ----------
+    machine, data
+        The machine; measurements, or the files that hold them.
+    noise_percent
+        Standard deviation of one reading, re-clamping included; or of the reading alone and of a clamping. Unless
+        given, from repeats, else from the column sd_N_per_mm, else a low and a high guess.
+    strut_spread_percent
+        Standard deviation of the struts' stiffness.
+    seed
+        Of every random draw.
+    progress
+        Called with what is being done.
+
+    Raises
+    ------
+    InputError, InputErrors
+        A file cannot be read; the model has no stiffness at a measured pose.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.compare("nist", "nist-table1", noise_percent=5)
+    <Comparison: nist, mean error 9.62 %>
+    """
+    from toolpath_stiff.updating.comparison import compare as compare_readings
+
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    teller(progress)("comparing")
+    return Comparison(compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common), asked.inputs)
+
+
+class Diagnosis(FolderResult):
+    """Which physical effect the model lacks, if any.
+
+    Attributes
+    ----------
+    diagnosed
+        Hypotheses, fits, probabilities, with arrays in SI.
+    """
+
+    command: ClassVar[str] = "diagnose"
+
+    def __init__(self, diagnosed: Diagnosed, inputs: tuple[str, ...]) -> None:
+        from toolpath_stiff.updating.diagnosis.document import document
+
+        self.diagnosed, self.inputs = diagnosed, inputs
+        self._document = document(diagnosed)
+
+    @property
+    def verdict(self) -> str:
+        """adequate, identified, ambiguous or unexplained."""
+        return self.diagnosed.verdict
+
+    @property
+    def plausible(self) -> list[str]:
+        """Effects that may be what is missing, the most likely first."""
+        return list(self.diagnosed.plausible)
+
+    @property
+    def best(self) -> str | None:
+        """The explanation that fits best among those left standing."""
+        return self.diagnosed.best
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of diagnose.json."""
+        return dict(self._document)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The candidates, one a row: probability, errors, why not."""
+        import pandas as pd
+
+        return pd.DataFrame(self._document["candidates"])
+
+    def plot(self) -> Figure:
+        """The error as given, with the strut law refitted, and with each candidate."""
+        from toolpath_stiff.report.diagnose.pictures import ladder_png
+
+        return ladder_png.figure(self._document)
+
+    def __str__(self) -> str:
+        from toolpath_stiff.report.diagnose import text
+
+        return text(self._document)
+
+    def _short(self) -> str:
+        names = ", ".join(self.plausible)
+        return f"{self.verdict}: {names}" if names else self.verdict
+
+    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
+        """The files of `tps diagnose`."""
+        from toolpath_stiff.report.diagnose import files
+
+        return files(self.diagnosed, self._document, plots=plots)
+
+
+def diagnose(
+    machine: Machine | str | Path,
+    data: Data,
+    *,
+    noise_percent: Noise = None,
+    strut_spread_percent: float = 1.0,
+    seed: int = 0,
+    program: Program | str | Path | None = None,
+    origin_mm_deg: Sequence[float] | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Find out which physical effect the model lacks, if any.
+
+    Parameters
+    ----------
+    machine, data
+        The machine, whose effect files take part; measurements, or the files that hold them.
+    noise_percent, strut_spread_percent, seed
+        As of `compare`.
+    program, origin_mm_deg
+        Where several explanations remain, how much the choice matters is worked out on this program, placed there;
+        unless given, on the packaged case study.
+    progress
+        Called with what is being done.
+
+    Raises
+    ------
+    InputError, InputErrors
+        A file cannot be read; too few readings.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.diagnose("nist", "nist-table1", noise_percent=10)
+    >>> found.verdict
+    'ambiguous'
+    """
+    from toolpath_stiff.placement.case_study import case_study_program
+    from toolpath_stiff.updating.diagnosis import diagnose as diagnose_readings
+
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    part = None if program is None else program_from(program)
+    origin = None if origin_mm_deg is None else pose_si("origin", origin_mm_deg)
+    conditions = asked.on.running(part).conditions
+    default = asked.model.default_origin
+    own = options(
+        program=None if part is None else part.file,
+        origin=None if origin is None else origin_word(origin),
+        setup=asked.on.setup,
+        temperature=asked.on.temperature_C,
+        seed=seed or None,
+    )
+    found = diagnose_readings(
+        asked.model,
+        asked.readings,
+        program=lambda: case_study_program() if part is None else part.moves(origin, default),
+        origin=origin,
+        setup=conditions.setup,
+        temperature=conditions.temperature,
+        files=asked.files,
+        command=asked.asked.command("diagnose", *own, *(part.words if part else ())),
+        asked=asked.asked,
+        progress=teller(progress),
+        **asked.common,
+    )
+    return Diagnosis(found, (*asked.inputs, *(part.inputs if part else ())))
+
+
+def _table(csv: str) -> pd.DataFrame:
+    """CSV text as a DataFrame."""
+    import io
+
+    import pandas as pd
+
+    return pd.read_csv(io.StringIO(csv))
