@@ -14,8 +14,8 @@ from matplotlib.image import imread
 
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.report.analysis import path as path_module
-from toolpath_stiff.report.analysis.path import path_picture
-from toolpath_stiff.report.figure import CLASSES, PLUNGE_SLATE, UNREACHABLE, new_figure, scale_limits, segment_classes
+from toolpath_stiff.report.analysis.path import UNREACHABLE, path_picture, scale_limits, segment_classes
+from toolpath_stiff.report.figure import CLASSES, PLUNGE_SLATE, new_figure
 from toolpath_stiff.report.profile import MOST_OPERATIONS, _set_limits, extremes_by_column, profile_picture
 
 

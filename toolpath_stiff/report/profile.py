@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,9 +19,11 @@ from toolpath_stiff.report.figure import (
     SECOND_ORANGE,
     UNREACHABLE_RED,
     add_heading,
-    house_style,
+    add_scales,
     label_places,
     new_figure,
+    paint,
+    paint_scale,
     picture,
 )
 from toolpath_stiff.report.words import number, plain, shortened
@@ -29,6 +32,7 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.path import Path
 
     from toolpath_stiff.analysis import Analysis
 
@@ -66,40 +70,39 @@ def profile_picture(
         The axis holds the plunges beside the headline, and they belong to the curve; else they are grey, and arrows
         say where they leave the axis.
     """
-    with house_style():
-        strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
-        figure = new_figure(WIDTH, HEIGHT)
-        frame = HEIGHT - TOP - BOTTOM - strip
-        axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
-        s, k = profile_curve(analysis, show_plunges)
-        band = profile_band(analysis, show_plunges)
-        _set_limits(axes, analysis, other, required, band, show_plunges)
-        _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
-        _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
-        columns = int(axes.get_window_extent().width)
-        if other is not None:
-            s2, k2 = profile_curve(other, show_plunges)
-            keep = extremes_by_column(s2, k2, columns)
-            name = shortened(plain(other.machine.name), 30)
-            axes.plot(s2[keep], k2[keep], color=SECOND_ORANGE, linewidth=1.3, label=name, zorder=3)
-            _draw_plunges(axes, other, columns, SECOND_ORANGE, show_plunges, "_")
-        if band is not None:
-            _draw_band(axes, s, band, columns)
-        keep = extremes_by_column(s, k, columns)
-        name = shortened(plain(analysis.machine.name), 30)
-        axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
-        _draw_plunges(axes, analysis, columns, PLUNGE_SLATE, show_plunges, "plunges")
-        _levels(axes, analysis, required)
-        _tool_changes(axes, analysis)
-        if strip:
-            _operations(axes, analysis, strip / frame)
-        _line_numbers(axes, analysis, 1.0 + strip / frame)
-        places = weakest_places(analysis)
-        spots = [(float(s[row]), float(k[row])) for row in places]
-        label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
-        _legend(axes)
-        add_heading(figure, analysis)
-        return figure
+    strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
+    figure = new_figure(WIDTH, HEIGHT)
+    frame = HEIGHT - TOP - BOTTOM - strip
+    axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
+    s, k = profile_curve(analysis, show_plunges)
+    band = profile_band(analysis, show_plunges)
+    _set_limits(axes, analysis, other, required, band, show_plunges)
+    _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
+    _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
+    columns = int(axes.get_window_extent().width)
+    if other is not None:
+        s2, k2 = profile_curve(other, show_plunges)
+        keep = extremes_by_column(s2, k2, columns)
+        name = shortened(plain(other.machine.name), 30)
+        axes.plot(s2[keep], k2[keep], color=SECOND_ORANGE, linewidth=1.3, label=name, zorder=3)
+        _draw_plunges(axes, other, columns, SECOND_ORANGE, show_plunges, "_")
+    if band is not None:
+        _draw_band(axes, s, band, columns)
+    keep = extremes_by_column(s, k, columns)
+    name = shortened(plain(analysis.machine.name), 30)
+    axes.plot(s[keep], k[keep], color=CURVE_BLUE, linewidth=1.3, label=name, zorder=4)
+    _draw_plunges(axes, analysis, columns, PLUNGE_SLATE, show_plunges, "plunges")
+    _levels(axes, analysis, required)
+    _tool_changes(axes, analysis)
+    if strip:
+        _operations(axes, analysis, strip / frame)
+    _line_numbers(axes, analysis, 1.0 + strip / frame)
+    places = weakest_places(analysis)
+    spots = [(float(s[row]), float(k[row])) for row in places]
+    label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
+    _legend(axes)
+    add_heading(figure, analysis)
+    return figure
 
 
 def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray]:
@@ -129,16 +132,20 @@ def _draw_plunges(axes: Axes, analysis: Analysis, columns: int, colour: str, sho
     axes.plot([], [], color=colour, linewidth=1.3, linestyle=(0, (2, 1)), marker=marker, markersize=5, label=label)
     for beyond, edge, tail in ((above, 1.0, -20.0), (below, 0.0, 20.0)):
         start, stop = _runs(beyond)
-        for x in ((s[start] + s[stop]) / 2.0)[:MOST_ARROWS].tolist():
-            axes.annotate(
-                "",
-                (x, edge),
-                xycoords=axes.get_xaxis_transform(),
-                xytext=(0.0, tail),
-                textcoords="offset points",
-                arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.1, "shrinkA": 0.0, "shrinkB": 0.0},
-                zorder=6,
-            )
+        middles = ((s[start] + s[stop]) / 2.0)[:MOST_ARROWS]
+        axes.plot(
+            middles, np.full(len(middles), edge), linestyle="none", marker=_arrow(tail), markersize=2.0 * abs(tail),
+            color=colour, markeredgewidth=1.1, transform=axes.get_xaxis_transform(), clip_on=False, zorder=6,
+        )  # fmt: skip
+
+
+def _arrow(tail: float) -> Path:
+    """A marker whose tip is the place: from `tail`, points above it, to a filled head."""
+    from matplotlib.path import Path
+
+    head = np.sign(tail) * 7.0
+    points = [(0.0, tail), (0.0, head), (-2.8, head), (0.0, 0.0), (2.8, head), (0.0, head), (0.0, tail)]
+    return Path(points, [Path.MOVETO, *[Path.LINETO] * 5, Path.CLOSEPOLY])
 
 
 def _runs(rows: BoolArray) -> tuple[IntArray, IntArray]:
@@ -216,6 +223,7 @@ def _set_limits(
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if end > 20 else 2)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if high - low > 5 else 2)))
     axes.grid(axis="x", visible=False)
+    add_scales(axes)
 
 
 def _shade(axes: Axes, s: FloatArray, rows: BoolArray, colour: str, label: str) -> None:
@@ -320,11 +328,11 @@ def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
     end = float(analysis.samples.s[-1])
     where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
     rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
-    upper = axes.secondary_xaxis(height)
-    upper.set_xticks(mm_from_m(where), [str(line) for line in analysis.samples.line[rows]])
-    upper.tick_params(length=3, labelsize=9)
-    upper.spines["top"].set_visible(False)
-    upper.set_xlabel("program line", fontsize=9, color=MUTED)
+    shown = partial(
+        paint_scale, side="top", values=mm_from_m(where), words=[str(line) for line in analysis.samples.line[rows]],
+        name="program line", size=9.0, colour=MUTED, edge=height,
+    )  # fmt: skip
+    paint(axes, shown, zorder=2.0)
 
 
 def _legend(axes: Axes) -> None:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
 from toolpath_stiff.nc.moves import MOTION_NAMES
-from toolpath_stiff.report.figure import legend_extend, page_colours, scale_limits
+from toolpath_stiff.report.analysis.path import legend_extend, scale_limits
+from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import bullets, markup, render, table
 from toolpath_stiff.report.profile import extremes_by_column, profile_curve
 from toolpath_stiff.report.words import (

@@ -12,19 +12,15 @@ from toolpath_stiff.report.figure import (
     CLASSES,
     COLOUR_MAP,
     MUTED,
-    PLUNGE,
     PLUNGE_SLATE,
     RAPID_GREY,
-    UNREACHABLE,
     UNREACHABLE_RED,
     add_heading,
-    house_style,
+    add_scales,
+    add_strokes,
     label_places,
-    legend_extend,
     new_figure,
     picture,
-    scale_limits,
-    segment_classes,
 )
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
@@ -41,6 +37,9 @@ BoolArray = NDArray[np.bool_]
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views
 MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
+FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
+UNREACHABLE, PLUNGE = -1, CLASSES  # without a colour of the scale; a lower class wins where segments are joined
+STROKE = 1.5  # points
 THINNEST = 0.38  # a view's shorter side, of the longest: a flat part still gets a readable side view
 
 
@@ -53,31 +52,33 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     first: a weak one is never hidden beneath. Plunges beside the headline are grey and end in a dot, which is all
     that is seen of them from above; with `show_plunges` they are on the colour scale like the rest.
     """
-    with house_style():
-        from matplotlib import colormaps
+    from matplotlib import colormaps
 
-        samples, limits = analysis.samples, scale_limits(analysis, show_plunges)
-        lines = _coloured_lines(analysis, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)), show_plunges)
-        middle, span = _frame(mm_from_m(samples.position[samples.cutting]))
-        figure, views, corner = _lay_out(span)
-        places = weakest_places(analysis)
-        for axes, (across, up, title) in zip(
-            views, ((0, 1, "XY  top"), (0, 2, "XZ  front"), (1, 2, "YZ  side, from +X")), strict=True
-        ):
-            _set_up(axes, across, up, title, middle, span)
-            for xyz, style in lines:
-                axes.plot(xyz[:, across], xyz[:, up], **style)
-            spots = [(float(x), float(y)) for x, y in mm_from_m(samples.position[places][:, [across, up]])]
-            label_places(axes, spots, [f"line {samples.line[row]}" for row in places])
-        add_heading(figure, analysis)
-        _legend(figure, corner, analysis, limits, show_plunges)
-        return figure
+    samples, limits = analysis.samples, scale_limits(analysis, show_plunges)
+    strokes, lines = _coloured_lines(
+        analysis, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)), show_plunges
+    )
+    middle, span = _frame(mm_from_m(samples.position[samples.cutting]))
+    figure, views, corner = _lay_out(span)
+    places = weakest_places(analysis)
+    for axes, (across, up, title) in zip(
+        views, ((0, 1, "XY  top"), (0, 2, "XZ  front"), (1, 2, "YZ  side, from +X")), strict=True
+    ):
+        _set_up(axes, across, up, title, middle, span)
+        add_strokes(axes, [(xyz[:, [across, up]], colour) for xyz, colour in strokes], STROKE, zorder=3)
+        for xyz, style in lines:
+            axes.plot(xyz[:, across], xyz[:, up], **style)
+        spots = [(float(x), float(y)) for x, y in mm_from_m(samples.position[places][:, [across, up]])]
+        label_places(axes, spots, [f"line {samples.line[row]}" for row in places])
+    add_heading(figure, analysis)
+    _legend(figure, corner, analysis, limits, show_plunges)
+    return figure
 
 
 def _coloured_lines(
     analysis: Analysis, limits: tuple[float, float], colours: FloatArray, show_plunges: bool
-) -> list[tuple[FloatArray, dict[str, Any]]]:
-    """Points and style of one line for each class of segments, in drawing order."""
+) -> tuple[list[tuple[FloatArray, Any]], list[tuple[FloatArray, dict[str, Any]]]]:
+    """Points and colour of one line for each class of segments, in drawing order; points and style of the others."""
     # A corner is two samples at one point: one of them is enough, and the line through it stays one line.
     samples, stiffness = analysis.samples, analysis.at.stiffness
     moved = np.flatnonzero((samples.position[1:] != samples.position[:-1]).any(axis=1))
@@ -88,6 +89,11 @@ def _coloured_lines(
         classes[analysis.set_aside[moved + 1]] = PLUNGE
     if len(points) > MOST_POINTS:
         points, rapid, classes = _merged(points, rapid, classes)
+    strokes = [
+        (_polyline(points, rows), colours[which])
+        for which in range(CLASSES - 1, -1, -1)
+        if len(rows := np.flatnonzero(~rapid & (classes == which)))
+    ]
     found: list[tuple[FloatArray, dict[str, Any]]] = []
 
     def add(rows: BoolArray, **style: object) -> None:
@@ -95,17 +101,15 @@ def _coloured_lines(
             found.append((_polyline(points, np.flatnonzero(rows)), style))
 
     add(rapid, color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), zorder=2)
-    for which in range(CLASSES - 1, -1, -1):
-        add(~rapid & (classes == which), color=colours[which], linewidth=1.5, zorder=3, solid_capstyle="round")
     plunge = ~rapid & (classes == PLUNGE)
-    add(plunge, color=PLUNGE_SLATE, linewidth=1.5, zorder=2.5, solid_capstyle="round")
+    add(plunge, color=PLUNGE_SLATE, linewidth=STROKE, zorder=2.5, solid_capstyle="round")
     if plunge.any():
         ends = points[1:][plunge & ~np.append(plunge[1:], False)]
         found.append(
             (ends, {"color": PLUNGE_SLATE, "linestyle": "none", "marker": ".", "markersize": 6, "zorder": 3.5})
         )
     add(~rapid & (classes == UNREACHABLE), color=UNREACHABLE_RED, linewidth=2.2, zorder=4)
-    return found
+    return strokes, found
 
 
 def _merged(points: FloatArray, rapid: BoolArray, classes: IntArray) -> tuple[FloatArray, BoolArray, IntArray]:
@@ -169,7 +173,7 @@ def _set_up(axes: Axes, across: int, up: int, title: str, middle: FloatArray, sp
     from matplotlib.ticker import MaxNLocator
 
     names = "XYZ"
-    axes.set_title(title)
+    axes.set_title(title, y=1.0)  # given: it need not be looked for
     axes.set_xlabel(f"{names[across]} mm")
     axes.set_ylabel(f"{names[up]} mm")
     axes.set_xlim(middle[across] - span[across] / 2, middle[across] + span[across] / 2)
@@ -177,6 +181,7 @@ def _set_up(axes: Axes, across: int, up: int, title: str, middle: FloatArray, sp
     box = axes.get_window_extent()
     axes.xaxis.set_major_locator(MaxNLocator(max(2, int(box.width // 75)), steps=[1, 2, 2.5, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(max(2, int(box.height // 50)), steps=[1, 2, 2.5, 5, 10]))
+    add_scales(axes)
 
 
 def _legend(
@@ -207,6 +212,7 @@ def _legend(
     bar.xaxis.set_major_locator(MaxNLocator(max(2, int(across / 0.75)), steps=[1, 2, 2.5, 5, 10]))
     bar.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)))
     bar.grid(False)
+    add_scales(bar)
     entries = []
     if not analysis.samples.cutting.all():
         entries.append(Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), label="rapid"))
@@ -226,3 +232,55 @@ def _legend(
         labelcolor=MUTED,
         borderaxespad=0.0,
     )
+
+
+def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:
+    """Ends of the colour scale in N/mm: lowest and highest of the headline, values far out (`FENCE`) set aside.
+
+    A few short cuts, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
+    that values lie beyond. With `show_plunges` the plunges beside the headline are on the scale, all of them.
+    """
+    stiffness, weight = _scaled_samples(analysis)
+    order = np.argsort(stiffness, kind="stable")
+    length = np.cumsum(weight[order])
+    lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
+    reach = FENCE * (upper - lower)
+    inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
+    values = inside if np.ptp(inside) > 0.0 else stiffness
+    low, high = float(values.min()), float(values.max())
+    if show_plunges and analysis.set_aside.any():
+        plunges = n_per_mm_from_n_per_m(analysis.at.stiffness[analysis.set_aside])
+        low, high = min(low, float(plunges.min())), max(high, float(plunges.max()))
+    if high - low < 1e-6 * high:  # a constant: keep the scale from collapsing
+        low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
+    return low, high
+
+
+def _scaled_samples(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
+    """Stiffness in N/mm and length of the headline samples.
+
+    A program that only turns rotary axes has none: then every reachable cutting sample counts alike.
+    """
+    about, weight = analysis.headline, analysis.samples.weight
+    if not about.any():
+        about, weight = analysis.samples.cutting & analysis.at.reachable, np.ones(len(weight))
+    return n_per_mm_from_n_per_m(analysis.at.stiffness[about]), weight[about]
+
+
+def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntArray:
+    """(n,) class 0 to CLASSES - 1 of segments of the path.
+
+    `stiffness` and `limits` in N/mm; values beyond the limits take the end classes; UNREACHABLE where there is none.
+    """
+    low, high = limits
+    missing = np.isnan(stiffness)
+    part = (np.where(missing, low, stiffness) - low) / (high - low)
+    classes = np.clip((part * CLASSES).astype(np.int64), 0, CLASSES - 1)
+    return np.where(missing, UNREACHABLE, classes)
+
+
+def legend_extend(analysis: Analysis, limits: tuple[float, float]) -> str:
+    """Which ends of the scale headline values lie beyond: "neither", "min", "max" or "both" (matplotlib's words)."""
+    stiffness = _scaled_samples(analysis)[0]
+    below, above = bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])
+    return {(False, False): "neither", (True, False): "min", (False, True): "max"}.get((below, above), "both")
