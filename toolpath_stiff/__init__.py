@@ -18,6 +18,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from toolpath_stiff.api.case import Case as Case
     from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.api.effects import EffectCheck as EffectCheck
     from toolpath_stiff.api.effects import EffectFile as EffectFile
@@ -37,20 +38,24 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.measuring import Diagnosis as Diagnosis
     from toolpath_stiff.api.measuring import Measurements as Measurements
     from toolpath_stiff.api.measuring import Plan as Plan
+    from toolpath_stiff.api.measuring import Preview as Preview
     from toolpath_stiff.api.measuring import Reduction as Reduction
     from toolpath_stiff.api.measuring import Update as Update
     from toolpath_stiff.api.measuring import compare as compare
     from toolpath_stiff.api.measuring import diagnose as diagnose
     from toolpath_stiff.api.measuring import plan as plan
+    from toolpath_stiff.api.measuring import preview as preview
     from toolpath_stiff.api.measuring import reduce as reduce
     from toolpath_stiff.api.measuring import update as update
     from toolpath_stiff.api.placements import CaseStudy as CaseStudy
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
+    from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
     from toolpath_stiff.api.placements import case_study as case_study
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
+    from toolpath_stiff.api.placements import try_placement as try_placement
     from toolpath_stiff.api.poses import PoseStiffness as PoseStiffness
     from toolpath_stiff.api.poses import StiffnessMap as StiffnessMap
     from toolpath_stiff.api.poses import map_stiffness as map_stiffness
@@ -81,6 +86,7 @@ __version__ = "0.2.0"
 
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
+    "api.case": ("Case",),
     "api.effects": (
         "EffectCatalogue", "EffectCheck", "EffectFile", "check_effects", "effect_template", "effects",
     ),
@@ -90,10 +96,13 @@ _PUBLIC = {
     ),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.measuring": (
-        "Comparison", "Diagnosis", "Measurements", "Plan", "Reduction", "Update", "compare", "diagnose", "plan",
-        "reduce", "update",
+        "Comparison", "Diagnosis", "Measurements", "Plan", "Preview", "Reduction", "Update", "compare", "diagnose",
+        "plan", "preview", "reduce", "update",
     ),
-    "api.placements": ("CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite"),
+    "api.placements": (
+        "CaseStudy", "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "case_study", "place", "rewrite",
+        "try_placement",
+    ),
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
     "errors": (
