@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from toolpath_stiff.machine.model import EffectEntry
     from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.updating.comparison import Comparison as Compared
     from toolpath_stiff.updating.correction import Correction
@@ -338,6 +339,26 @@ class Preview:
             strut_spread=asked.strut_spread,
             effect_files=asked.on.effect_files,
         )
+        self._on = asked.on
+
+    def machine(self, effects: Mapping[str, Mapping[str, Any]]) -> Machine:
+        """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
+        from dataclasses import replace
+
+        from toolpath_stiff.stiffness.effects import find_effect
+        from toolpath_stiff.stiffness.model import build_model
+        from toolpath_stiff.updating.inference.prediction import scaled_law
+
+        entries, given = _entries(effects), self._on.model.given or self._on.model.machine
+        law = scaled_law(given.strut_law, self._hand.fit(entries).law)
+        read = [one for one in entries if find_effect(one.name, self._on.effect_files).is_instrument]
+        added = given.with_changes(
+            strut_law=law,
+            effects=(*given.effects, *(one for one in entries if one not in read)),
+            instruments=(*given.instruments, *read),
+        )
+        model = build_model(added, self._on.effect_files, conditions=self._on.model.conditions)
+        return replace(self._on, model=model)
 
     def at(self, effects: Mapping[str, Mapping[str, Any]] | None = None, *, strut_law: bool = True) -> dict[str, Any]:
         """Errors in per cent with these effects beside those of the machine file.
@@ -362,18 +383,23 @@ class Preview:
         """
         import numpy as np
 
-        from toolpath_stiff.machine.model import EffectEntry
         from toolpath_stiff.units import n_per_mm_from_n_per_m
         from toolpath_stiff.updating.inference.fits import deviation_percent, error_figures
 
-        entries = [EffectEntry(name, dict(keys)) for name, keys in (effects or {}).items()]
-        fit = self._hand.fit(entries, strut_law)
+        fit = self._hand.fit(_entries(effects or {}), strut_law)
         modelled = n_per_mm_from_n_per_m(np.exp(self._hand.problem.observed - fit.residual))
         return {
             **error_figures(fit.residual),
             "deviation_percent": deviation_percent(fit.residual).tolist(),
             "modelled_N_per_mm": modelled.tolist(),
         }
+
+
+def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:
+    """Effects as a machine file would have them."""
+    from toolpath_stiff.machine.model import EffectEntry
+
+    return [EffectEntry(name, dict(keys)) for name, keys in effects.items()]
 
 
 def preview(
