@@ -279,7 +279,11 @@ class Case:
         )
 
     def switch(self, effect: str, values: Mapping[str, Any] | None) -> None:
-        """Switch an effect on with these values (keys as in a machine file), or off with None."""
+        """Switch an effect on with these values (keys as in a machine file), or off with None.
+
+        Raises `InputError` for an effect that is unknown or in the machine, and for values that it cannot have.
+        """
+        self._check_effect(effect, values or {}, values is not None)
         on = {name: dict(keys) for name, keys in self.state.on.items() if name != effect}
         if values is not None:
             on[effect] = dict(values)
@@ -397,12 +401,15 @@ class Case:
 
     # -- a blind exercise ---------------------------------------------------------------------------------------------
 
-    def start_exercise(self, seed: int, hidden: str | None = None) -> None:
-        """Begin a blind exercise: a simulated machine that hides something, and what was measured on it."""
+    def start_exercise(self, seed: int, hidden: str | None = None, layout: str = "tilted") -> None:
+        """Begin a blind exercise: a simulated machine that hides something, and what was measured on it.
+
+        `hidden` and `layout` as of `tps rig new`.
+        """
         from toolpath_stiff.rig import new_exercise
 
         folder = self._free("exercise")
-        new_exercise(self.folder / folder, seed, hidden=hidden)
+        new_exercise(self.folder / folder, seed, layout, hidden)
         machine, data = self._free("machines/machine.toml"), self._free("data/measurements.csv")
         self._write(
             {
@@ -411,14 +418,15 @@ class Case:
             }
         )
         change = {"machine": machine, "data": (data,), "aside": (), "on": {}, "exercise": folder}
-        own = options(hidden=hidden)
+        other = {"hidden": hidden, "layout": layout if layout != "tilted" else None}
+        words = "".join(f", {name}={value!r}" for name, value in other.items() if value)
         self.record(
             "exercise",
             f"blind exercise, seed {seed}",
             change=change,
             files=[machine, data],
-            command=command_line("rig", "new", *options(seed=seed, out=folder), *own),
-            python=f"case.start_exercise({seed}{f', {hidden!r}' if hidden else ''})",
+            command=command_line("rig", "new", *options(seed=seed, out=folder, **other)),
+            python=f"case.start_exercise({seed}{words})",
         )
 
     def measure(self, plan_file: str | Path) -> None:
@@ -464,20 +472,24 @@ class Case:
     # -- steps --------------------------------------------------------------------------------------------------------
 
     def undo(self) -> Step | None:
-        """Take back the last step; None where there is none but the first machine."""
-        if self._done < 2:
+        """Take back the last step that changed something, and what was found since; None where there is none."""
+        at = next((n for n in range(self._done - 1, 0, -1) if self._steps[n].change), None)
+        if at is None:
             return None
-        self._done -= 1
+        self._done = at
         self._save()
-        return self._steps[self._done]
+        return self._steps[at]
 
     def redo(self) -> Step | None:
-        """Do again what was undone; None where nothing was."""
-        if not self.undone:
+        """Do again the next step that was undone, and what was found after it; None where nothing was."""
+        found = next((step for step in self.undone if step.change), None)
+        if found is None:
             return None
-        self._done += 1
+        first = self._steps.index(found, self._done)
+        later = (n for n in range(first + 1, len(self._steps)) if self._steps[n].change)
+        self._done = next(later, len(self._steps))
         self._save()
-        return self._steps[self._done - 1]
+        return found
 
     def record(
         self,
@@ -490,10 +502,14 @@ class Case:
         python: str = "",
         result: str = "",
     ) -> None:
-        """Add a step and write the case; what was undone is forgotten. `files`: those that the step wrote."""
+        """Add a step and write the case. `files`: those that the step wrote.
+
+        A step that changes something forgets what was undone; one that only finds something out does not.
+        """
         sums = {name: _sha256((self.folder / name).read_bytes()) for name in files}
-        self._steps = [*self.history, Step(kind, text, command, python, dict(change or {}), sums, result)]
-        self._done = len(self._steps)
+        step = Step(kind, text, command, python, dict(change or {}), sums, result)
+        self._steps = [*self.history, step, *(() if change else self.undone)]
+        self._done += 1
         self._rewrite_used()
         self._save()
 
@@ -533,6 +549,17 @@ class Case:
         return command_line(
             name, program, *options(machine=state.machine, origin=word, require=require, effects=list(state.effects))
         )
+
+    def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
+        from toolpath_stiff.machine.model import EffectEntry
+        from toolpath_stiff.stiffness.effects import find_effect
+        from toolpath_stiff.stiffness.effects.contract import read_parameters
+
+        effect = find_effect(name, [self.path(one) for one in self.state.effects])
+        if on:
+            read_parameters(effect, EffectEntry(name, dict(values)), "by hand")
+            if name in self.machine.effects:
+                raise InputError(f"{name} is in the machine already")
 
     def _check_aside(self, file: str, line: int) -> None:
         machine = self.machine

@@ -1,1 +1,1 @@
-"""The studio: a case in the browser. What it shows comes from the public functions; it adds no physics, no statistics."""
+"""The studio: a case in the browser. It shows what the public functions give; no physics, no statistics here."""

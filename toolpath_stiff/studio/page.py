@@ -44,7 +44,8 @@ def _document(state: str, connect: str, title: str) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
         f"<title>{html.escape(title)}</title>\n<style>\n{asset('page.css')}{_own('studio.css')}</style>\n</head>\n<body>\n"
-        f'{body}<script type="application/json" id="state">{state}</script>\n<script>{script}</script>\n</body>\n</html>\n'
+        f'{body}<script type="application/json" id="state">{state}</script>\n'
+        f"<script>{script}</script>\n</body>\n</html>\n"
     )
 
 

@@ -102,7 +102,7 @@ def gauge(session: Session, now: dict[str, Any]) -> dict[str, Any]:
     """Mean errors in per cent: as the file stands, refitted, now, at left-out points; the noise floor."""
     hand, on = session.preview, session.case.state.on
     key = session.data_key
-    base = session._once(
+    base = session.once(
         "base", key, lambda: [hand.at(strut_law=law)["mean_abs_error_percent"] for law in (False, True)]
     )
     found = session.found("diagnose")
@@ -152,8 +152,22 @@ def verdict(session: Session) -> dict[str, Any] | None:
         sentence = SENTENCES[said["verdict"]]
     else:
         sentence = f"Several explain it: {', '.join(names)}" if len(names) > 1 else said["text"].split(". ")[0]
-    keys = ("verdict", "text", "why", "plausible", "best", "gates", "detectable", "confounding", "assumptions", "warnings",
-            "notes", "noise", "cannot_test", "readings")  # fmt: skip
+    keys = (
+        "verdict",
+        "text",
+        "why",
+        "plausible",
+        "best",
+        "gates",
+        "detectable",
+        "confounding",
+        "assumptions",
+        "warnings",
+        "notes",
+        "noise",
+        "cannot_test",
+        "readings",
+    )
     kept = {key: said[key] for key in keys}
     kept["gates"] = {name: value for name, value in kept["gates"].items() if name != "simulated_squares"}
     return {"sentence": sentence, **kept}
@@ -176,8 +190,15 @@ def effects(session: Session) -> list[dict[str, Any]]:
 def _effect(effect: Any, candidate: dict[str, Any] | None, on: Any, session: Session) -> dict[str, Any]:
     fitted = _values(candidate) if candidate else {}
     sliders = [_slider(one, candidate, fitted, session) for one in effect.parameters]
-    row = {"name": effect.name, "title": effect.title, "link": effect.link, "equation": effect.equation,
-           "source": effect.source, "sliders": sliders, "on": on}  # fmt: skip
+    row = {
+        "name": effect.name,
+        "title": effect.title,
+        "link": effect.link,
+        "equation": effect.equation,
+        "source": effect.source,
+        "sliders": sliders,
+        "on": on,
+    }
     names = ("probability", "mean_abs_error_percent", "held_out_error_percent", "finding", "words", "remark", "offered")
     return row | {name: candidate[name] if candidate else None for name in names}
 
@@ -222,7 +243,7 @@ def _setups(session: Session) -> list[str]:
         frame = session.case.data.to_frame(session.machine)
         return [name for name in frame["setup"].unique().tolist() if name] if "setup" in frame else []
 
-    found: list[str] = session._once("setups", session.data_key, make) if session.case.state.data else []
+    found: list[str] = session.once("setups", session.data_key, make) if session.case.state.data else []
     return found
 
 
@@ -233,9 +254,15 @@ def fit(session: Session) -> dict[str, Any] | None:
         return None
     said = found["document"]
     return {
-        "verdict": said["verdict"], "text": said["text"], "steps": said["steps"], "support": said["support"],
-        "warnings": said["warnings"], "accepted": found["accepted"], "holds": session.is_fitted, "result": found["result"],
-    }  # fmt: skip
+        "verdict": said["verdict"],
+        "text": said["text"],
+        "steps": said["steps"],
+        "support": said["support"],
+        "warnings": said["warnings"],
+        "accepted": found["accepted"],
+        "holds": session.is_fitted,
+        "result": found["result"],
+    }
 
 
 def plan(session: Session) -> dict[str, Any] | None:
@@ -263,9 +290,8 @@ def program(session: Session) -> dict[str, Any] | None:
     state = session.case.state
     if not state.program:
         return None
-    lines = session._once("lines", state.program, lambda: list(session.case.program.lines))
-    found, failed = session.found("analyze"), session._failed.get("analyze", (None, ""))
-    error = failed[1] if failed[0] == session.path_key else ""
+    lines = session.once("lines", state.program, lambda: list(session.case.program.lines))
+    found, error = session.found("analyze"), session.failed("analyze")
     shown = {
         "name": state.program.rpartition("/")[2],
         "lines": lines[:MOST_LINES],
@@ -275,8 +301,18 @@ def program(session: Session) -> dict[str, Any] | None:
     if not found:
         return {**shown, "path": None, "error": error}
     said = found["document"]
-    names = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "weakest", "plunges", "warnings", "out_of_reach_samples",
-             "per_operation", "required")  # fmt: skip
+    names = (
+        "mean_N_per_mm",
+        "min_N_per_mm",
+        "max_N_per_mm",
+        "range_N_per_mm",
+        "weakest",
+        "plunges",
+        "warnings",
+        "out_of_reach_samples",
+        "per_operation",
+        "required",
+    )
     return {
         **shown,
         "path": found["path"],
@@ -301,17 +337,16 @@ def placement(session: Session) -> dict[str, Any] | None:
     if not state.program:
         return None
     try:
-        now = session._once(
+        now = session.once(
             "placed",
             (session.data_key, state.program, tuple(origin(session))),
             lambda: session.trial().at(origin(session)),
         )
     except TpsError:
         now = None
-    entry = session._found.get("place")
-    held = entry and entry[0][0] == session.path_key[0] and entry[0][2] == state.program
-    if not entry or not held:
+    entry = session.found("place")
+    if not entry:
         return {"now": now, "front": None}
-    said = entry[1]["document"]
+    said = entry["document"]
     names = ("front", "chosen", "before", "worse", "warnings")
-    return {"now": now, "result": entry[1]["result"], **{name: said.get(name) for name in names}}
+    return {"now": now, "result": entry["result"], **{name: said.get(name) for name in names}}

@@ -24,8 +24,17 @@ from toolpath_stiff.studio.session import Session
 LARGEST_FILE = 64 * 1024 * 1024  # bytes of a dropped file
 LARGEST_QUESTION = 1024 * 1024
 BEAT = 15.0  # s between two signs of life of an event stream
-PLAIN = {".json": "application/json", ".csv": "text/csv", ".png": "image/png", ".html": "text/html", ".toml": "text/plain",
-         ".nc": "text/plain", ".txt": "text/plain", ".svg": "image/svg+xml", ".ngc": "text/plain"}  # fmt: skip
+PLAIN = {
+    ".json": "application/json",
+    ".csv": "text/csv",
+    ".png": "image/png",
+    ".html": "text/html",
+    ".toml": "text/plain",
+    ".nc": "text/plain",
+    ".txt": "text/plain",
+    ".svg": "image/svg+xml",
+    ".ngc": "text/plain",
+}
 SANDBOX = "sandbox allow-scripts"  # a page among the results has an origin of its own and cannot ask the studio
 REFUSED = "This is a studio of toolpath_stiff. Open the address that `tps studio` has printed, with its token."
 
@@ -88,7 +97,7 @@ class Handler(BaseHTTPRequestHandler):
                 return self._send(HTTPStatus.FORBIDDEN, REFUSED, "text/plain")
             answer()
         except TpsError as error:
-            self._json({"error": str(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
+            self._json({"error": str(error)})
         except (BrokenPipeError, ConnectionError):  # the tab was closed
             self.close_connection = True
         return None
@@ -115,8 +124,10 @@ class Handler(BaseHTTPRequestHandler):
         except CookieError:
             cookie = None
         known = self.server.token.encode()
-        return not (hmac.compare_digest(given.encode(), known) or
-                    (cookie is not None and hmac.compare_digest(cookie.value.encode(), known)))  # fmt: skip
+        return not (
+            hmac.compare_digest(given.encode(), known)
+            or (cookie is not None and hmac.compare_digest(cookie.value.encode(), known))
+        )
 
     # -- answers -------------------------------------------------------------------------------------------------------
 

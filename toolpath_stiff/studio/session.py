@@ -9,6 +9,7 @@ from typing import Any
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.case import Case, Step
+from toolpath_stiff.api.results import one_of
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.studio import picture
@@ -33,9 +34,10 @@ class Session:
         self._version = self._beat = 0
         self._jobs: list[tuple[str, dict[str, Any]]] = []
         self._running: Job | None = None
-        self._found: dict[str, tuple[Any, dict[str, Any]]] = {}  # kind -> what it was found for, what was found
+        self._found: dict[tuple[str, Any], dict[str, Any]] = {}  # kind and what it was found for -> what was found
         self._failed: dict[str, tuple[Any, str]] = {}
         self._message = ""
+        self._revealed: dict[str, Any] | None = None
         self._kept: dict[str, tuple[Any, Any]] = {}  # name -> key, value: what is worked out once for a state
         self._resume()
         self._follow_up()
@@ -80,7 +82,8 @@ class Session:
         own = tuple((name, tuple(keys.items())) for name, keys in state.on.items())
         return (self.data_key if own else state.machine, own, state.program, state.origin, state.require)
 
-    def _once(self, name: str, key: Any, make: Callable[[], Any]) -> Any:
+    def once(self, name: str, key: Any, make: Callable[[], Any]) -> Any:
+        """What `make` gives, worked out once for a key."""
         if name not in self._kept or self._kept[name][0] != key:
             self._kept[name] = (key, make())
         return self._kept[name][1]
@@ -89,20 +92,18 @@ class Session:
     def machine(self) -> tps.Machine:
         """The machine of the case."""
         state = self.case.state
-        found: tps.Machine = self._once("machine", (state.machine, state.effects), lambda: self.case.machine)
+        found: tps.Machine = self.once("machine", (state.machine, state.effects), lambda: self.case.machine)
         return found
 
     @property
     def preview(self) -> tps.Preview:
         """Errors for effects of any size."""
-        found: tps.Preview = self._once("preview", self.data_key, lambda: tps.preview(self.machine, self.case.data))
+        found: tps.Preview = self.once("preview", self.data_key, lambda: tps.preview(self.machine, self.case.data))
         return found
 
     def found(self, kind: str) -> dict[str, Any] | None:
         """What was found last, if it still holds."""
-        key = self.path_key if kind in ("analyze", "place") else self.data_key
-        entry = self._found.get(kind)
-        return entry[1] if entry and entry[0] == key else None
+        return self._found.get((kind, self.key(kind)))
 
     def state(self) -> dict[str, Any]:
         """Everything that a page shows."""
@@ -112,7 +113,7 @@ class Session:
     def catalogue(self) -> tps.EffectCatalogue:
         """The effects that can be switched on."""
         files = self.case.state.effects
-        found: tps.EffectCatalogue = self._once(
+        found: tps.EffectCatalogue = self.once(
             "catalogue", files, lambda: tps.effects([self.case.path(name) for name in files])
         )
         return found
@@ -120,7 +121,7 @@ class Session:
     def trial(self) -> tps.PlacementTrial:
         """The program that can be put anywhere."""
         state = self.case.state
-        found: tps.PlacementTrial = self._once(
+        found: tps.PlacementTrial = self.once(
             "trial", (state.machine, state.effects, state.program),
             lambda: tps.try_placement(self.machine, self.case.program),
         )  # fmt: skip
@@ -138,7 +139,7 @@ class Session:
             self._message = ""
             try:
                 answer = ACTIONS[name](self, **given)
-            except TypeError as error:
+            except (TypeError, ValueError, KeyError) as error:  # arguments that a page of ours does not send
                 raise InputError(f"{name}: {error}") from None
             if name not in LOOKS:
                 self._follow_up()
@@ -149,11 +150,6 @@ class Session:
         found = self.preview.at(on, strut_law=bool(on))
         return {**found, "deviation_percent": [round(one, 3) for one in found["deviation_percent"]],
                 "modelled_N_per_mm": [round(one) for one in found["modelled_N_per_mm"]]}  # fmt: skip
-
-    def _switch(self, effect: str, values: Mapping[str, Any] | None) -> None:
-        if values is not None and self.case.data_files:
-            self.preview.at({effect: values})  # refuses what cannot be
-        self.case.switch(effect, values)
 
     def _aside(self, file: str, line: int) -> None:
         back = f"{file}:{line}" in self.case.state.aside
@@ -180,13 +176,13 @@ class Session:
         self.case.measure(str(self.case.folder / plan / "plan.csv"))
 
     def _claim(self, effects: str) -> None:
-        self._found["reveal"] = (None, self.case.claim(str(effects)))
+        self._revealed = self.case.claim(str(effects))
 
-    def _exercise(self, seed: int) -> None:
+    def _exercise(self, seed: int, layout: str = "tilted") -> None:
         if not isinstance(seed, int) or not 0 <= seed <= MOST_SEED:
             raise InputError(f"seed {seed}", expected="a whole number, 0 or more")
-        self.case.start_exercise(seed)
-        self._found.pop("reveal", None)
+        self.case.start_exercise(seed, layout=one_of("layout", layout, ("tilted", "paper")))
+        self._revealed = None
 
     def _place(self, **bounds: Any) -> None:
         allowed = ("x_mm", "y_mm", "z_mm", "rotate_deg")
@@ -212,7 +208,11 @@ class Session:
             file = Path(folder) / plain
             file.write_bytes(content)
             try:
-                add = {"data": self.case.add_data, "effects": self.case.add_effects, "machine": self.case.set_machine}
+                add: dict[str, Callable[[Path], None]] = {
+                    "data": self.case.add_data,
+                    "effects": self.case.add_effects,
+                    "machine": self.case.set_machine,
+                }
                 add.get(kind, self.case.add_program)(file)
             except TpsError as error:
                 raise InputError(
@@ -233,7 +233,7 @@ class Session:
         """Stop what has lost its reason; ask for what the state wants; start the next."""
         state = self.case.state
         running = self._running
-        if running and running.key != self._key(running.kind):
+        if running and running.key != self.key(running.kind):
             running.stop()
         wanted = []
         if state.data:
@@ -241,14 +241,18 @@ class Session:
         if state.program:
             wanted.append("analyze")
         for kind in wanted:
-            busy = running and running.kind == kind and running.key == self._key(kind)
-            tried = self._failed.get(kind, (None, ""))[0] == self._key(kind)
+            busy = running and running.kind == kind and running.key == self.key(kind)
+            tried = self._failed.get(kind, (None, ""))[0] == self.key(kind)
             if self.found(kind) is None and not busy and not tried and kind not in [k for k, _ in self._jobs]:
                 self._jobs.append((kind, {}))
         self._start()
 
-    def _key(self, kind: str) -> Any:
-        return self.path_key if kind in ("analyze", "place") else self.data_key
+    def key(self, kind: str) -> Any:
+        """What the state holds of that on which this kind of result hangs."""
+        state = self.case.state
+        if kind == "place":
+            return (state.machine, state.effects, state.program)
+        return self.path_key if kind == "analyze" else self.data_key
 
     def _start(self) -> None:
         if self._running or not self._jobs:
@@ -257,23 +261,23 @@ class Session:
         own = dict(given)
         if kind == "analyze":
             fit = self.found("update")
-            fitted = fit["result"] + "/machine.toml" if fit and fit.get("accepted") and self._is_fitted() else ""
+            fitted = fit["result"] + "/machine.toml" if fit and fit.get("accepted") and self.is_fitted else ""
             own = {"on": self.case.state.on, "fitted": fitted, "first": self.first_machine}
-        job = Job(self.case.folder, kind, {"result": self.case.next_result(kind), **own}, self._key(kind))
+        job = Job(self.case.folder, kind, {"result": self.case.next_result(kind), **own}, self.key(kind))
         self._running = job
         job.follow(lambda: self._tell(state=False), self._done)
 
     def _done(self, job: Job, answer: dict[str, Any] | None, error: str) -> None:
         with self._lock:
             self._running = None
-            if answer is not None and job.key == self._key(job.kind):
+            if answer is not None and job.key == self.key(job.kind):
                 result = job.options["result"]
-                self._found[job.kind] = (job.key, {**answer, "result": result})
+                self._found[job.kind, job.key] = {**answer, "result": result}
                 self.case.record(job.kind, _said(answer["text"]), command=self._command(job, answer), result=result,
                                  python=f"case.{job.kind}({_python(job)})")  # fmt: skip
                 if job.kind == "update":
                     self._take_sizes(answer["document"])
-            elif error and job.key == self._key(job.kind):
+            elif error and job.key == self.key(job.kind):
                 self._failed[job.kind] = (job.key, error)
                 self._message = "" if error == "stopped" else f"{job.kind}: {error}"
             self._follow_up()
@@ -286,7 +290,8 @@ class Session:
                 sizes = {key: one["value"] if isinstance(one, dict) else one for key, one in values.items()}
                 self.case.switch(name, {**self.case.state.on[name], **sizes})
 
-    def _is_fitted(self) -> bool:
+    @property
+    def is_fitted(self) -> bool:
         """Whether the switches stand as the last fit has them."""
         fit = self.found("update")
         steps = fit["document"]["steps"] if fit else []
@@ -296,11 +301,6 @@ class Session:
             for name, keys in values.items()
         }
         return bool(steps) and {n: dict(k) for n, k in self.case.state.on.items()} == same
-
-    @property
-    def is_fitted(self) -> bool:
-        """Whether the switches stand as the last fit has them."""
-        return self._is_fitted()
 
     @property
     def first_machine(self) -> str:
@@ -351,18 +351,22 @@ class Session:
             except (OSError, ValueError):
                 continue
             if kind == "reveal":
-                self._found[kind] = (None, document)
+                self._revealed = document
                 continue
             accepted = (self.case.folder / step.result / "machine.toml").is_file()
             rows = _plan_rows(self.case.folder / step.result) if kind == "plan" else []
             entry = {"text": step.text, "document": document, "result": step.result, "accepted": accepted, "rows": rows}
-            self._found[kind] = (self.data_key, entry)
+            self._found[kind, self.data_key] = entry
+
+    def failed(self, kind: str) -> str:
+        """Why the last attempt for this state failed; "" where it did not."""
+        key, text = self._failed.get(kind, (None, ""))
+        return text if key == self.key(kind) else ""
 
     def reveal(self) -> dict[str, Any] | None:
         """What the opened seal has shown."""
-        entry = self._found.get("reveal")
         opened = any(step.kind == "reveal" for step in self.case.history)
-        return entry[1] if entry and opened else None
+        return self._revealed if opened else None
 
     def readings(self) -> dict[str, list[Any]]:
         """All readings of the case, those set aside too, as columns."""
@@ -389,7 +393,7 @@ class Session:
             return {"file": frame["file"].tolist(), "line": frame["line"].tolist(), "point": frame["point"].tolist(),
                     **{name: frame[name].round(4).tolist() for name in columns}}  # fmt: skip
 
-        found: dict[str, list[Any]] = self._once("readings", (state.machine, state.data), make)
+        found: dict[str, list[Any]] = self.once("readings", (state.machine, state.data), make)
         return found
 
 
@@ -429,7 +433,7 @@ def _python(job: Job) -> str:
 ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
     "hand": Session._by_hand,
     "at": lambda self, origin: self.trial().at(origin),
-    "switch": Session._switch,
+    "switch": lambda self, effect, values: self.case.switch(str(effect), values),
     "aside": Session._aside,
     "fit": Session._fit,
     "accept": Session._accept,

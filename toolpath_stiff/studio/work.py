@@ -128,7 +128,7 @@ def analyze(case: Any, tell: Tell, result: str, on: Mapping[str, Any], fitted: s
     """The program on the first machine of the case and on the present one with the effects that are on."""
     import toolpath_stiff as tps
 
-    asked = {
+    asked: dict[str, Any] = {
         "origin_mm_deg": case.state.origin or None,
         "partial": True,
         "require_N_per_mm": case.state.require or None,
@@ -168,18 +168,17 @@ def _columns(found: Any, before: Any) -> dict[str, Any]:
 
 
 def _thinned(values: Any, starts: Any) -> Any:
-    """Rows of a drawing: all, or the lowest and highest of each of many stretches and, if there is room, line starts."""
+    """Rows of a drawing: all, or the lowest and highest of each of many stretches, and starts of lines."""
+    from itertools import pairwise
+
     import numpy as np
 
     if len(values) <= COARSE_SAMPLES:
         return np.arange(len(values))
     edges = np.linspace(0, len(values), COARSE_SAMPLES // 3 + 1).astype(int)
     filled = np.nan_to_num(values, nan=np.inf)
-    low = [a + int(np.argmin(filled[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-    high = [
-        a + int(np.argmax(np.where(np.isfinite(filled[a:b]), filled[a:b], -1)))
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    low = [a + int(np.argmin(filled[a:b])) for a, b in pairwise(edges)]
+    high = [a + int(np.argmax(np.where(np.isfinite(filled[a:b]), filled[a:b], -1))) for a, b in pairwise(edges)]
     some = starts[:: max(1, len(starts) // (COARSE_SAMPLES // 3))]
     return np.unique(np.concatenate([low, high, edges[:-1], some, [len(values) - 1]]))
 
@@ -195,9 +194,10 @@ def place(case: Any, tell: Tell, result: str, **bounds: Any) -> dict[str, Any]:
     """Where the work should sit."""
     import toolpath_stiff as tps
 
+    wanted: dict[str, Any] = {name: tuple(one) if isinstance(one, list) else one for name, one in bounds.items()}
     found = tps.place(
         case.machine, case.program, origin_mm_deg=case.state.origin or None, progress=tell,
-        **{name: tuple(value) if isinstance(value, list) else value for name, value in bounds.items()},
+        **wanted,
     )  # fmt: skip
     found.save(case.folder / result, plots=False)
     return {"text": repr(found), "document": found.to_dict()}

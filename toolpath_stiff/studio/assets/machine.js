@@ -40,7 +40,8 @@ class MachineScene {
     if (!this.state) return box.map(() => [-1, 1]);
     if (this.focus === "machine") this.joints.frame.forEach(see);
     for (const row of this.state.machine.reach) row.forEach(see);
-    if (this.focus === "work") this.platform().joints.forEach(see);
+    // The boundary is round: a view that holds three quarters of its box holds all of it.
+    if (this.focus === "work") return box.map(([low, high]) => [low + 0.13 * (high - low), high - 0.13 * (high - low)]);
     return box;
   }
   platform() {

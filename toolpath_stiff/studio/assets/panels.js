@@ -227,10 +227,11 @@ function dragMap(state, act) {
 // ---------------------------------------------------------------- the exercise, the history
 function exercisePanel(state, act) {
   const seed = h("input", { type: "number", id: "seed", min: 0, value: 7 }), r = state.exercise.reveal;
+  const layout = h("select", { id: "layout", "aria-label": "Campaign" }, h("option", { value: "tilted" }, "24 tilted poses, 288 readings"), h("option", { value: "paper" }, "14 points along X, Y, Z, 42 readings"));
   const claim = h("select", { id: "claim" }, ["none", "outside", ...state.effects.map((one) => one.name), ...state.machine.effects].map((name) => h("option", { value: name, selected: name === state.verdict?.best }, name)));
   return [
     h("h2", {}, "Blind exercise"), h("p", { class: "muted" }, "A simulated machine hides something. It shares no stiffness code with the model. Find out what, say it, then open the seal."),
-    h("div", { class: "actions live" }, h("label", { for: "seed" }, "seed "), seed, button("Start an exercise", () => act({ do: "exercise", seed: Number(seed.value) }), { id: "start-exercise", class: state.exercise.folder ? "live" : "main live" })),
+    h("div", { class: "actions live" }, h("label", { for: "seed" }, "seed "), seed, layout, button("Start an exercise", () => act({ do: "exercise", seed: Number(seed.value), layout: layout.value }), { id: "start-exercise", class: state.exercise.folder ? "live" : "main live" })),
     state.exercise.folder ? [h("div", { class: "actions live" }, h("label", { for: "claim" }, "what is hidden? "), claim, button("Reveal", () => act({ do: "claim", effects: claim.value }), { id: "reveal", class: "main live" }))] : null,
     r ? [h("p", { id: "revealed", class: r.verdict === "wrong" ? "bad" : "good" }, `claim ${r.claim.join(", ")}: ${r.verdict}`),
       r.effects.length ? list(r.effects.map((e) => `hidden: ${e.effect} (${Object.entries(e.parameters).map(([k, v]) => `${k} ${short(v)}`).join(", ")}); changes the readings by ${percent(100 * e.size, 1)} (rms)`)) : h("p", {}, "nothing was hidden")] : null,

@@ -183,8 +183,8 @@ function play() {
 // ---------------------------------------------------------------- drawing the state
 function drawLegend() {
   const parts = [];
-  if (state.readings) parts.push(h("span", {}, `softer -${scene.scale} %`), h("span", { class: "ramp", style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }), h("span", {}, `+${scene.scale} % stiffer than modelled; larger dots: larger errors; rings: set aside`));
-  if (state.program?.path) parts.push(h("span", {}, `path ${group(scene.ends[0])}`), h("span", { class: "ramp", style: `background:${ramp(theme.dark ? COLOURS.dark : COLOURS.light)}` }), h("span", {}, `${group(scene.ends[1])} N/mm`));
+  if (state.readings) parts.push(h("div", { title: "Larger dots: larger errors. Rings: set aside." }, `softer -${scene.scale} %`, h("span", { class: "ramp", style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }), `+${scene.scale} % stiffer than modelled`));
+  if (state.program?.path) parts.push(h("div", {}, `path ${group(scene.ends[0])}`, h("span", { class: "ramp", style: `background:${ramp(theme.dark ? COLOURS.dark : COLOURS.light)}` }), `${group(scene.ends[1])} N/mm`));
   $("legend").replaceChildren(...parts);
 }
 function drawPanel() {
@@ -280,6 +280,7 @@ async function take(file, run = false) {
     if (state.program && !/\.(csv|xlsx|toml|py)$/i.test(file.name)) open("program");
   } catch (error) { tell(error.message); }
 }
+window.tpsStudio = { spots: () => scene.spots.map((spot) => [...spot]) };  // where readings stand on the screen
 if (readonly) draw();
 else {
   for (const name of ["undo", "redo", "cancel"]) $(name).addEventListener("click", () => act({ do: name }));
