@@ -348,5 +348,5 @@ def placement(session: Session) -> dict[str, Any] | None:
     if not entry:
         return {"now": now, "front": None}
     said = entry["document"]
-    names = ("front", "chosen", "before", "worse", "warnings")
+    names = ("front", "chosen", "before", "worse", "warnings", "offset_blocks")
     return {"now": now, "result": entry["result"], **{name: said.get(name) for name in names}}

@@ -104,14 +104,14 @@ function whyPanel(state, act) {
   ];
 }
 function residuals(state, act) {
-  const r = state.readings, values = r[against], W = 520, H = 210, pad = 42, dev = act.scene.deviation;
+  const r = state.readings, values = r[against], W = 520, H = 210, pad = 42, end = 24, dev = act.scene.deviation;
   const used = values.map((_, i) => i).filter((i) => !r.aside[i]), low = Math.min(...used.map((i) => values[i])), high = Math.max(...used.map((i) => values[i]));
-  const most = Math.max(1, ...used.map((i) => Math.abs(dev[i] ?? 0))) * 1.08, x = (v) => pad + (v - low) / (high - low || 1) * (W - pad - 12), y = (v) => H / 2 - 8 - v / most * (H / 2 - 26);
+  const most = Math.max(1, ...used.map((i) => Math.abs(dev[i] ?? 0))) * 1.08, x = (v) => pad + (v - low) / (high - low || 1) * (W - pad - end), y = (v) => H / 2 - 8 - v / most * (H / 2 - 26);
   const pick = h("select", { id: "against", "aria-label": "Variable", onchange: (e) => { against = e.target.value; act.redraw(); } }, AGAINST.map(([key, label]) => h("option", { value: key, selected: key === against }, label)));
-  const marks = ticks(-most, most, 4).values.map((v) => [h("line", { x1: pad, x2: W - 12, y1: y(v), y2: y(v), stroke: "var(--line)" }), h("text", { x: pad - 6, y: y(v) + 4, "text-anchor": "end" }, String(Number(v.toPrecision(3))))]);
+  const marks = ticks(-most, most, 4).values.map((v) => [h("line", { x1: pad, x2: W - end, y1: y(v), y2: y(v), stroke: "var(--line)" }), h("text", { x: pad - 6, y: y(v) + 4, "text-anchor": "end" }, String(Number(v.toPrecision(3))))]);
   const across = ticks(low, high > low ? high : low + 1, 6), feet = across.values.map((v) => h("text", { x: x(v), y: H - 16, "text-anchor": "middle" }, v.toFixed(across.digits)));
   return [h("div", { class: "bar" }, h("label", { for: "against" }, "against "), pick), h("svg", { viewBox: `0 0 ${W} ${H}`, class: "drag", style: "cursor:default", role: "img", "aria-label": `Errors of ${used.length} readings against ${against}` },
-    marks, feet, h("line", { x1: pad, x2: W - 12, y1: y(0), y2: y(0), stroke: "var(--muted)" }), h("text", { x: 4, y: 12 }, "error %"),
+    marks, feet, h("line", { x1: pad, x2: W - end, y1: y(0), y2: y(0), stroke: "var(--muted)" }), h("text", { x: 4, y: 12 }, "error %"),
     used.map((i) => h("circle", { cx: x(values[i]).toFixed(1), cy: y(dev[i] ?? 0).toFixed(1), r: 3, fill: errorColour(dev[i] ?? 0, act.scene.scale), "fill-opacity": 0.8 })))];
 }
 
@@ -164,7 +164,7 @@ function placementPanel(state, act) {
     })),
     h("div", { class: "actions live" }, button("Best", () => act({ do: "place" }), { id: "best", class: "main live" }), h("span", { class: "muted" }, "searches the whole workspace; none of mean, range and weakest gets worse where that can be avoided")),
     p.front ? [(p.warnings ?? []).map((text) => h("p", { class: "warning" }, text)), h("h3", {}, "Front"),
-      h("a", { class: "live", href: `/case/${p.result}/placement.json` }, "placement.json with the offset blocks"),
+      Object.entries(p.offset_blocks ?? {}).filter(([name]) => !name.endsWith("_reason")).map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" }, p.offset_blocks[`${name}_reason`] ?? "no block can say it"))),
       table(["", "mean", "range", "weakest N/mm", "X", "Y", "Z mm", "C deg", ""], p.front.map((row) => [`${row.number}${row.number === p.chosen?.number ? " recommended" : ""}`, group(row.mean_N_per_mm), group(row.range_N_per_mm), group(row.min_N_per_mm), ...["x_mm", "y_mm", "z_mm", "rotation_deg"].map((k) => row[k].toFixed(1)),
         button("use", () => act({ do: "place_at", origin: [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg] }), { id: `use-${row.number}`, "aria-label": `use point ${row.number}` })]))] : null,
   ];
@@ -172,7 +172,7 @@ function placementPanel(state, act) {
 function placementFigures(now, state, id) {
   const v = (value, digits = 0) => (value === null || value === undefined ? "\u2013" : group(value, digits));
   return h("div", { id }, figures([["mean N/mm", v(now?.mean_N_per_mm), "pl-mean"], ["range N/mm", v(now?.range_N_per_mm), "pl-range"], ["weakest N/mm", v(now?.min_N_per_mm), "pl-min"],
-    ["margin of cuts, % of a limit's span", now ? v(100 * now.margin, 1) : "\u2013", "pl-margin"], ["of rapids", now ? v(100 * now.rapid_margin, 1) : "\u2013"]]),
+    ["margin of cuts, %", now ? v(100 * now.margin, 1) : "\u2013", "pl-margin"], ["margin of rapids, %", now ? v(100 * now.rapid_margin, 1) : "\u2013"]]),
     now && now.mean_N_per_mm === null ? h("p", { class: "warning" }, "A cut is out of reach here.") : null);
 }
 // The boundary of the reach at the height of program zero, from above: the farthest crossing of each meridian.
@@ -202,7 +202,7 @@ function dragMap(state, act) {
   const put = () => work.setAttribute("transform", `translate(${act.origin[0]} ${act.origin[1]}) rotate(${act.origin[5]})`);
   put();
   act.put = put;
-  const svg = h("svg", { viewBox: `${-size} ${-size * 0.8} ${2 * size} ${1.6 * size}`, class: "drag live", id: "drag", role: "img", tabindex: "0", "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
+  const svg = h("svg", { viewBox: `${-size} ${-size * 0.94} ${2 * size} ${1.88 * size}`, class: "drag live", id: "drag", role: "img", tabindex: "0", "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
     h("g", { transform: "scale(1 -1)" }, h("polygon", { points: reach.map((p) => p.map((v) => v.toFixed(0)).join(",")).join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": 4 }), h("line", { x1: -60, x2: 60, y1: 0, y2: 0, stroke: "var(--muted)", "stroke-width": 3 }), h("line", { y1: -60, y2: 60, x1: 0, x2: 0, stroke: "var(--muted)", "stroke-width": 3 }), work));
   const where = (e) => { const m = svg.getScreenCTM().inverse(), p = new DOMPoint(e.clientX, e.clientY).matrixTransform(m); return [p.x, -p.y]; };
   let last = null;
@@ -243,4 +243,4 @@ function historyPanel(state, act) {
   const step = (one, undone) => h("div", { class: undone ? "step undone" : "step" }, h("b", {}, one.text), undone ? " (undone)" : null, line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" }, "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."), [...state.history].reverse().map((one) => step(one, false)), state.undone.map((one) => step(one, true))];
 }
-const PANELS = [["effects", "Effects", effectsPanel], ["why", "Why believe it?", whyPanel], ["next", "Measure next", nextPanel], ["program", "Program", programPanel], ["placement", "Placement", placementPanel], ["exercise", "Exercise", exercisePanel], ["history", "History", historyPanel]];
+const PANELS = [["effects", "Effects", effectsPanel], ["why", "Why believe it?", whyPanel], ["next", "Next", nextPanel], ["program", "Program", programPanel], ["placement", "Placement", placementPanel], ["exercise", "Exercise", exercisePanel], ["history", "History", historyPanel]];
