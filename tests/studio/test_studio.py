@@ -152,6 +152,16 @@ def test_code_is_loaded_on_an_explicit_yes_alone(running, tmp_path):
     assert not (running.folder / "effects").exists()
 
 
+def test_a_broken_effect_is_told_with_its_line(running):
+    text = "from toolpath_stiff import Effect\n\nclass Screw(Effect):\n    name = 1 +\n"
+    status, content, _ = running.ask("POST", "/file?name=screw.py&run=yes", text.encode())
+    assert status == 200
+    said = json.loads(content)["error"]
+    assert "screw.py" in said
+    assert "4" in said
+    assert running.state()["history"][-1]["kind"] != "effects"
+
+
 def test_a_second_studio_of_the_same_case_is_refused(running):
     words = [sys.executable, "-m", "toolpath_stiff", "studio", "--case", str(running.folder), "--no-browser"]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
@@ -273,6 +283,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     kept = json.loads((running.folder / tps.Case.open(running.folder).latest("update") / "update.json").read_text())
     assert tab.number("#g-now") == pytest.approx(kept["steps"][-1]["mean_abs_error_percent"], abs=0.006)
     assert state["fit"]["text"] == kept["text"]
+    assert state["fit"]["holds"] or kept["verdict"] != "updated"
     # A plan, measured on the exercise's machine.
     tab.go("next")
     page.fill("#poses", "2")
@@ -310,6 +321,42 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     tab.close()
 
 
+def test_by_keyboard(running, browser):
+    tab = Tab(browser, running.address)
+    page = tab.page
+    page.wait_for_selector("#sw-table_compliance")
+    page.focus("#tab-effects")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowLeft")
+    tab.until("document.activeElement.id === 'tab-effects'")
+    page.focus("#sw-table_compliance")
+    page.keyboard.press("Space")
+    page.wait_for_selector("#table_compliance-x_nm_per_N")
+    before = page.input_value("#table_compliance-x_nm_per_N")
+    page.focus("#table_compliance-x_nm_per_N")
+    page.keyboard.press("ArrowRight")
+    settled(running)
+    assert float(page.input_value("#table_compliance-x_nm_per_N")) > float(before)
+    tab.until("document.activeElement.id === 'table_compliance-x_nm_per_N'")
+    page.focus("#scene .overlay")
+    page.keyboard.press(".")
+    tab.until("document.querySelector('#status').textContent.includes('measured')")
+    for _ in range(2):
+        page.keyboard.press("Control+z")
+        settled(running)
+    page.wait_for_selector("#sw-table_compliance:not(:checked)")
+    page.focus("#scene .overlay")
+    page.keyboard.press("Enter")
+    tab.until("document.querySelector('#status').textContent.length > 0")
+    settled(running)
+    assert len(tps.Case.open(running.folder).state.aside) == 1
+    page.keyboard.press("Control+z")
+    settled(running)
+    assert tps.Case.open(running.folder).state.aside == ()
+    assert tab.faults == []
+    tab.close()
+
+
 def test_two_tabs_see_the_same(running, browser):
     one, two = Tab(browser, running.address), Tab(browser, running.address)
     for tab in (one, two):
@@ -321,6 +368,19 @@ def test_two_tabs_see_the_same(running, browser):
     assert one.faults + two.faults == []
     one.close()
     two.close()
+
+
+def test_a_program_out_of_reach_is_told(running, browser, tmp_path):
+    tab = Tab(browser, running.address)
+    tab.page.wait_for_selector("#sw-table_compliance")
+    (tmp_path / "far.nc").write_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X2500\nM2\n")
+    tab.page.set_input_files("#file", tmp_path / "far.nc")
+    tab.page.wait_for_selector("#out-of-reach")
+    assert "out of reach" in tab.text("#out-of-reach")
+    tab.page.click("#undo")
+    tab.until("!document.querySelector('#machine-name').textContent.includes('far.nc')")
+    assert tab.faults == []
+    tab.close()
 
 
 def test_broken_files_are_told_and_change_nothing(running, browser, tmp_path):

@@ -80,7 +80,8 @@ class Session:
         """What the analysis of the program hangs on."""
         state = self.case.state
         own = tuple((name, tuple(keys.items())) for name, keys in state.on.items())
-        return (self.data_key if own else state.machine, own, state.program, state.origin, state.require)
+        fitted = bool(own) and self.is_fitted  # a fit knows how well it knows: its machine has a band
+        return (self.data_key if own else state.machine, own, fitted, state.program, state.origin, state.require)
 
     def once(self, name: str, key: Any, make: Callable[[], Any]) -> Any:
         """What `make` gives, worked out once for a key."""
@@ -273,8 +274,10 @@ class Session:
             if answer is not None and job.key == self.key(job.kind):
                 result = job.options["result"]
                 self._found[job.kind, job.key] = {**answer, "result": result}
-                self.case.record(job.kind, _said(answer["text"]), command=self._command(job, answer), result=result,
-                                 python=f"case.{job.kind}({_python(job)})")  # fmt: skip
+                command = self._command(job)
+                if not self._said_already(job.kind, command):
+                    line, text = f"case.{job.kind}({_python(job)})", answer["text"].strip("<>")
+                    self.case.record(job.kind, text, command=command, python=line, result=result)
                 if job.kind == "update":
                     self._take_sizes(answer["document"])
             elif error and job.key == self.key(job.kind):
@@ -282,6 +285,15 @@ class Session:
                 self._message = "" if error == "stopped" else f"{job.kind}: {error}"
             self._follow_up()
         self._tell()
+
+    def _said_already(self, kind: str, command: str) -> bool:
+        """Whether the history has this since the last change: a studio that resumes works some things out again."""
+        for step in reversed(self.case.history):
+            if step.change:
+                return False
+            if (step.kind, step.command) == (kind, command):
+                return True
+        return False
 
     def _take_sizes(self, document: Mapping[str, Any]) -> None:
         """The switches take what was fitted; the fit holds for them."""
@@ -308,7 +320,7 @@ class Session:
         given = [step.change["machine"] for step in self.case.history if step.kind in ("machine", "exercise")]
         return str(given[-1])
 
-    def _command(self, job: Job, answer: Mapping[str, Any]) -> str:
+    def _command(self, job: Job) -> str:
         state = self.case.state
         if job.kind in ("analyze", "place"):
             origin = ",".join(f"{one:.10g}" for one in state.origin) or None
@@ -419,10 +431,6 @@ def _word(effect: tps.Effect, keys: Mapping[str, Any]) -> str:
         if one.discrete and keys.get(one.key) not in ("", None)
     ]
     return f"{effect.name}:{','.join(chosen)}" if chosen else effect.name
-
-
-def _said(text: str) -> str:
-    return text.strip("<>")
 
 
 def _python(job: Job) -> str:

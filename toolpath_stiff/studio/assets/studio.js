@@ -146,6 +146,8 @@ function drawProfile() {
   }
   $("scrub").max = path.s_mm.length - 1;
   $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])].map((name) => h("button", { type: "button", "aria-pressed": String(which === name), onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
+  const other = which === "now" && path.given?.some((v, i) => v !== path.now[i]);
+  $("curves").textContent = [other ? "orange: as given" : "", which === "now" && path.sd ? "grey: 95 % band of what was fitted" : "", state.program.require ? "dashed: required" : ""].filter(Boolean).join(", ");
 }
 function goTo(i) {
   const path = state.program?.path;
