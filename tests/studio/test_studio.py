@@ -341,17 +341,17 @@ def test_by_keyboard(running, browser):
     page.focus("#scene .overlay")
     page.keyboard.press(".")
     tab.until("document.querySelector('#status').textContent.includes('measured')")
-    for _ in range(2):
-        page.keyboard.press("Control+z")
-        settled(running)
+    page.keyboard.press("Control+z")
+    tab.until(f"document.querySelector('#table_compliance-x_nm_per_N').value === {before!r}")
+    page.keyboard.press("Control+z")
     page.wait_for_selector("#sw-table_compliance:not(:checked)")
     page.focus("#scene .overlay")
+    title = tab.text("#machine-name")
     page.keyboard.press("Enter")
-    tab.until("document.querySelector('#status').textContent.length > 0")
-    settled(running)
+    tab.until(f"document.querySelector('#machine-name').textContent !== {title!r}")
     assert len(tps.Case.open(running.folder).state.aside) == 1
     page.keyboard.press("Control+z")
-    settled(running)
+    tab.until(f"document.querySelector('#machine-name').textContent === {title!r}")
     assert tps.Case.open(running.folder).state.aside == ()
     assert tab.faults == []
     tab.close()

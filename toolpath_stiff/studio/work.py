@@ -28,7 +28,7 @@ class Job:
     def __init__(self, folder: Path, kind: str, options: Mapping[str, Any], key: object) -> None:
         self.kind, self.options, self.key = kind, dict(options), key
         self.progress: tuple[str, int, int] = (kind, 0, 0)
-        context = multiprocessing.get_context("spawn")
+        context = _context()
         self._pipe, theirs = context.Pipe()
         arguments = (str(folder), kind, self.options, theirs)
         self._process = context.Process(target=work, args=arguments, daemon=True)
@@ -57,6 +57,18 @@ class Job:
     def stop(self) -> None:
         """End it at once; nothing of it is kept."""
         self._process.kill()
+
+
+PRELOADED = ("toolpath_stiff.studio.work", "toolpath_stiff.api.case", "toolpath_stiff.updating.correction", "pandas")
+
+
+def _context() -> Any:
+    """Processes that begin with the libraries loaded where the system can do that, from scratch elsewhere."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([*PRELOADED, "toolpath_stiff.updating.diagnosis", "toolpath_stiff.analysis"])
+    return context
 
 
 def work(folder: str, kind: str, options: Mapping[str, Any], pipe: Connection) -> None:
