@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from toolpath_stiff import __version__
 from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import asset, json_for_script, script_hash
+from toolpath_stiff.studio.picture import document
 
 if TYPE_CHECKING:
     from toolpath_stiff.studio.session import Session
@@ -25,7 +26,7 @@ def page() -> str:
 
 def exported(session: Session) -> str:
     """The case as one file that needs neither the studio nor a network."""
-    return _document(json_for_script(session.state()), "", f"{session.name}: a case of toolpath_stiff")
+    return _document(json_for_script(document(session)), "", f"{session.name}: a case of toolpath_stiff")
 
 
 def _document(state: str, connect: str, title: str) -> str:

@@ -17,7 +17,12 @@ MOST_LINES = 400_000  # of a program's text in the page
 
 
 def document(session: Session) -> dict[str, Any]:
-    """Everything but what changes by the second."""
+    """Everything that a page shows."""
+    with session.lock:
+        return _document(session) | session.news()
+
+
+def _document(session: Session) -> dict[str, Any]:
     case, state = session.case, session.case.state
     has_data = bool(state.data)
     now = session.preview.at(state.on, strut_law=bool(state.on)) if has_data else None

@@ -19,6 +19,7 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.studio.page import exported, page
+from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
 
 LARGEST_FILE = 64 * 1024 * 1024  # bytes of a dropped file
@@ -142,7 +143,7 @@ class Handler(BaseHTTPRequestHandler):
         if parts.path == "/":
             return self._send(HTTPStatus.OK, page(), "text/html")
         if parts.path == "/state":
-            return self._json(session.state())
+            return self._json(document(session))
         if parts.path == "/events":
             return self._events()
         if parts.path == "/export":

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.case import Case, Step
+from toolpath_stiff.api.case import Case
 from toolpath_stiff.api.results import one_of
+from toolpath_stiff.api.steps import Step
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.studio import picture
 from toolpath_stiff.studio.work import Job
 
 MOST_POSES, MOST_SEED = 60, 2**31 - 1
@@ -26,11 +26,13 @@ class Session:
     ----------
     case
         The case; changed by `do` alone.
+    lock
+        Held by whoever reads or changes the state.
     """
 
     def __init__(self, case: Case) -> None:
         self.case, self.name = case, case.folder.resolve().name
-        self._lock, self._changed = threading.RLock(), threading.Condition()
+        self.lock, self._changed = threading.RLock(), threading.Condition()
         self._version = self._beat = 0
         self._jobs: list[tuple[str, dict[str, Any]]] = []
         self._running: Job | None = None
@@ -56,7 +58,7 @@ class Session:
 
     def close(self) -> None:
         """End the work under way."""
-        with self._lock:
+        with self.lock:
             self._jobs = []
             if self._running:
                 self._running.stop()
@@ -106,11 +108,6 @@ class Session:
         """What was found last, if it still holds."""
         return self._found.get((kind, self.key(kind)))
 
-    def state(self) -> dict[str, Any]:
-        """Everything that a page shows."""
-        with self._lock:
-            return picture.document(self) | self.news()
-
     def catalogue(self) -> tps.EffectCatalogue:
         """The effects that can be switched on."""
         files = self.case.state.effects
@@ -136,7 +133,7 @@ class Session:
         if name not in ACTIONS:
             raise InputError(f"nothing called {name!r} can be done")
         given = {key: value for key, value in asked.items() if key != "do"}
-        with self._lock:
+        with self.lock:
             self._message = ""
             try:
                 answer = ACTIONS[name](self, **given)
@@ -205,7 +202,7 @@ class Session:
         kind = SUFFIXES.get(Path(plain).suffix.lower(), "program")
         if kind == "effects" and not run:
             return {"confirm": f"{plain} is code. It is run when it is loaded. Load it?"}
-        with tempfile.TemporaryDirectory() as folder, self._lock:
+        with tempfile.TemporaryDirectory() as folder, self.lock:
             file = Path(folder) / plain
             file.write_bytes(content)
             try:
@@ -269,7 +266,7 @@ class Session:
         job.follow(lambda: self._tell(state=False), self._done)
 
     def _done(self, job: Job, answer: dict[str, Any] | None, error: str) -> None:
-        with self._lock:
+        with self.lock:
             self._running = None
             if answer is not None and job.key == self.key(job.kind):
                 result = job.options["result"]
