@@ -1,15 +1,21 @@
 # make demo: set up and run the main job on a real program. make test: set up and run every check.
+# make studio: set up and open the studio on a blind exercise and a program.
 # make docs: build the site. make dist: build the packages and try them.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PROGRAM ?= programs/pocket.nc
 
-.PHONY: demo test lint docs dist benchmark clean
+.PHONY: demo studio test lint docs dist benchmark clean
 
 demo: $(VENV)/.run
 	$(BIN)/tps analyze $(PROGRAM) --out reports/demo --replace
 	@echo "Report: $(CURDIR)/reports/demo/report.html"
+
+# The case stays in reports/studio: a second call goes on where the first was left.
+studio: $(VENV)/.run
+	@if [ -f reports/studio/case.toml ]; then $(BIN)/tps studio --case reports/studio; \
+	else $(BIN)/tps studio --case reports/studio --exercise 7 --program $(PROGRAM); fi
 
 # One thread of linear algebra a process: the processes share the cores already. Each process takes a run of neighbouring
 # tests, so that what the tests of a module share is computed once; who is done takes over from the others.

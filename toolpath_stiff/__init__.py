@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
+    from toolpath_stiff.api.case import Case as Case
     from toolpath_stiff.api.correction import Plan as Plan
     from toolpath_stiff.api.correction import Reduction as Reduction
     from toolpath_stiff.api.correction import Update as Update
@@ -29,8 +30,10 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.diagnosis import Comparison as Comparison
     from toolpath_stiff.api.diagnosis import Diagnosis as Diagnosis
     from toolpath_stiff.api.diagnosis import Measurements as Measurements
+    from toolpath_stiff.api.diagnosis import Preview as Preview
     from toolpath_stiff.api.diagnosis import compare as compare
     from toolpath_stiff.api.diagnosis import diagnose as diagnose
+    from toolpath_stiff.api.diagnosis import preview as preview
     from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.api.effects import EffectCheck as EffectCheck
     from toolpath_stiff.api.effects import EffectFile as EffectFile
@@ -49,10 +52,12 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.placements import CaseStudy as CaseStudy
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
+    from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
     from toolpath_stiff.api.placements import case_study as case_study
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
+    from toolpath_stiff.api.placements import try_placement as try_placement
     from toolpath_stiff.api.poses import PoseStiffness as PoseStiffness
     from toolpath_stiff.api.poses import StiffnessMap as StiffnessMap
     from toolpath_stiff.api.poses import map_stiffness as map_stiffness
@@ -83,6 +88,7 @@ __version__ = _VERSION
 
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
+    "api.case": ("Case",),
     "api.effects": (
         "EffectCatalogue", "EffectCheck", "EffectFile", "check_effects", "effect_template", "effects",
     ),
@@ -92,8 +98,11 @@ _PUBLIC = {
     ),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
-    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
-    "api.placements": ("CaseStudy", "KeepOut", "Placement", "RewrittenProgram", "case_study", "place", "rewrite"),
+    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "Preview", "compare", "diagnose", "preview"),
+    "api.placements": (
+        "CaseStudy", "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "case_study", "place", "rewrite",
+        "try_placement",
+    ),
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
     "errors": (

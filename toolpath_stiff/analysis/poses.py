@@ -469,3 +469,28 @@ def turning_points(model: StiffnessModel, radius: float, height: float, load: Lo
         "maxima": [float(a) for a in angles[(values > before) & (values >= after)]],
         "minima": [float(a) for a in angles[(values < before) & (values <= after)]],
     }
+
+
+RAY_STEP, RAY_END, RAY_EXACT = 0.05, 5.0, 1e-4  # m: marching out, at most so far, and how exact the end is
+
+
+def reach_along(machine: Machine, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
+    """(n,) m that the tool tip can go from a place (3,) along unit vectors (n, 3) before the first limit.
+
+    `turn` (3, 3) is the orientation, which is kept. 0 where the place itself is out of reach.
+    """
+
+    def inside(lengths: FloatArray) -> BoolArray:
+        tips = start + lengths[:, None] * directions
+        turns = np.broadcast_to(turn, (len(tips), 3, 3))
+        return np.asarray(reach(machine, tips, solve_struts(machine, tips, turns), turns).reachable)
+
+    steps = np.arange(0.0, RAY_END, RAY_STEP)
+    good = np.stack([inside(np.full(len(directions), step)) for step in steps], axis=1)
+    first = np.where(good.all(axis=1), len(steps), np.argmin(good, axis=1))
+    low, high = np.maximum(first - 1, 0) * RAY_STEP, first * RAY_STEP
+    for _ in range(int(np.ceil(np.log2(RAY_STEP / RAY_EXACT)))):
+        middle = 0.5 * (low + high)
+        within = inside(middle)
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    return np.where(first > 0, low, 0.0)

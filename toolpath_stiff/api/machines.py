@@ -233,6 +233,40 @@ class Machine:
     def _shown_pose(self) -> Pose:
         return pose_in_si(FIGURE_2_MM_DEG) if self.name == "nist" else self.model.machine.default_origin
 
+    @property
+    def joints_mm(self) -> dict[str, Any]:
+        """What a drawing needs: "frame" (6, 3) in machine coordinates, "platform" (6, 3) from the tip, "tool" length.
+
+        The platform's joints are those at zero rotation; they turn about the tip with it.
+        """
+        machine = self.model.machine
+        return {
+            "frame": mm_from_m(machine.frame_joints).tolist(),
+            "platform": mm_from_m(machine.platform_joints).tolist(),
+            "tool": mm_from_m(machine.reference_tool_length),
+        }
+
+    def reach_mm(self, from_mm_deg: Sequence[float], directions: Sequence[Sequence[float]]) -> FloatArray:
+        """(n,) how far the tool tip can go from a pose along directions (n, 3), unturned, before the first limit.
+
+        0 where the pose itself is out of reach.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.Machine.load("nist").reach_mm((0, 0, 800), [(1, 0, 0), (0, 0, -1)]).round().tolist()
+        [750.0, 946.0]
+        """
+        import numpy as np
+
+        from toolpath_stiff.analysis.poses import reach_along
+        from toolpath_stiff.rotations import rotation_matrices
+
+        pose = np.array(pose_si("pose", from_mm_deg))
+        rays = np.asarray(directions, dtype=float)
+        rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        return mm_from_m(reach_along(self.model.machine, pose[:3], rays, rotation_matrices(pose[3:])))
+
     def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
         """What `plot` draws as a PNG."""
         from toolpath_stiff.report.machine import machine_picture

@@ -29,12 +29,16 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from toolpath_stiff.analysis.loads import Load
     from toolpath_stiff.machine.model import Machine as MachineModel
+    from toolpath_stiff.nc.moves import Program as ReadProgram
     from toolpath_stiff.placement.case_study import CaseStudy as Study
     from toolpath_stiff.placement.case_study import Region
     from toolpath_stiff.placement.climb import Bounds
+    from toolpath_stiff.placement.paths import WorkPath
     from toolpath_stiff.placement.placing import Placed, Rewriting
     from toolpath_stiff.placement.search import SearchRules
+    from toolpath_stiff.stiffness.model import StiffnessModel
 
 FARTHEST_TURN_DEG = 720.0
 LONGEST_CHORD_MM = 10.0
@@ -339,6 +343,60 @@ def _pair(given: Range) -> tuple[float, float]:
     if low > high:
         raise InputError(f"bounds {low:g} to {high:g}", expected="the lower bound first")
     return float(low), float(high)
+
+
+class PlacementTrial:
+    """A program that can be put anywhere, with the figures of every place at once; `try_placement` makes one."""
+
+    def __init__(self, model: StiffnessModel, program: ReadProgram, path: WorkPath, load: Load, force: float) -> None:
+        from toolpath_stiff.placement.evaluator import Evaluator
+
+        self._evaluator = Evaluator(model, path, load, force)
+        self.program, self.samples = program, len(path)
+
+    def at(self, origin_mm_deg: Sequence[float]) -> dict[str, float | None]:
+        """Mean, range and weakest in N/mm, margins as shares of a limit's span; None where a cut is out of reach."""
+        import numpy as np
+
+        from toolpath_stiff.units import n_per_mm_from_n_per_m
+
+        found = self._evaluator.figures(np.array([pose_si("origin", origin_mm_deg)]))
+        names = {"mean_N_per_mm": found.mean, "range_N_per_mm": found.spread, "min_N_per_mm": found.lowest}
+        stiffnesses = {name: float(n_per_mm_from_n_per_m(values[0])) for name, values in names.items()}
+        margins = {"margin": float(found.margin[0]), "rapid_margin": float(found.rapid_margin[0])}
+        return {name: value if np.isfinite(value) else None for name, value in {**stiffnesses, **margins}.items()}
+
+
+def try_placement(
+    machine: Machine | str | Path,
+    program: Program | str | Path,
+    *,
+    load: str = LOAD,
+    step_mm: float = 1.0,
+    force_N: float = FORCE,
+) -> PlacementTrial:
+    r"""What a program does wherever it is put: read and sampled once, then the figures of any placement at once.
+
+    The figures are those of `place` and of `analyze` with the same step. Arguments and errors as of `analyze`.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> round(tps.try_placement("nist", slot).at((0, 0, 800))["mean_N_per_mm"])
+    54353
+    """
+    from toolpath_stiff.analysis.loads import parse_load
+    from toolpath_stiff.placement.paths import work_path
+
+    on, part = machine_from(machine), program_from(program)
+    model, asked = on.running(part), parse_load(load)
+    default = model.machine.default_origin
+    read = part.moves(None, default)
+    present = read.origin if read.origin_source == "program" else default
+    step = m_from_mm(positive("step", step_mm, "mm", LONGEST_STEP_MM))
+    path = work_path(read, step, asked, present, lambda origin: part.moves(origin, default))
+    return PlacementTrial(model, read, path, asked, positive("force", force_N, "N", STRONGEST_N))
 
 
 class RewrittenProgram(Result):

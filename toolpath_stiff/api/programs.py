@@ -112,6 +112,14 @@ class Analysis(FolderResult):
 
         return [] if self._required is None else required_stiffness_missed(self.path, self._required)
 
+    @property
+    def deviation_N_per_mm(self) -> Any:  # noqa: N802
+        """(n,) standard deviation of each sample's stiffness from the fitted parameters; None where none is stated."""
+        from toolpath_stiff.units import n_per_mm_from_n_per_m
+
+        band = self.path.parameter_band
+        return None if band is None else n_per_mm_from_n_per_m(band.deviation)
+
     def __str__(self) -> str:
         from toolpath_stiff.report.analysis import text
 

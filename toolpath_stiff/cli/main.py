@@ -38,7 +38,13 @@ class Command:
         return found
 
 
-MODULES = {"A program": "program", "A machine": "machine", "A placement": "placement", "Measurements": "measurements"}
+MODULES = {
+    "A program": "program",
+    "A machine": "machine",
+    "A placement": "placement",
+    "Measurements": "measurements",
+    "Studio": "studio",
+}
 
 
 COMMANDS = (
@@ -59,6 +65,7 @@ COMMANDS = (
     Command("update", "fit effects to measurements, watch the error fall, write the machine", "Measurements"),
     Command("plan", "what to measure next to tell explanations apart, or a first campaign", "Measurements"),
     Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements", "rig"),
+    Command("studio", "measure, see where the model fails, add what is missing: a case in the browser", "Studio"),
 )
 
 DESCRIPTION = "Stiffness of a hexapod (Stewart-platform) mill along a real NC program."

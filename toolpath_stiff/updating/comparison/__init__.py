@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.stiffness.effects.contract import read_parameters
 from toolpath_stiff.updating.comparison.document import Answer, ComparisonDocument, document_of
 from toolpath_stiff.updating.comparison.principles import LinkShares, assess, load_path_shares, model_free_checks
 from toolpath_stiff.updating.comparison.residuals import (
@@ -30,9 +32,10 @@ from toolpath_stiff.updating.comparison.structure import (
     Scattering,
     find_structure,
 )
+from toolpath_stiff.updating.inference.candidates import Candidate, Component
 from toolpath_stiff.updating.inference.covariances import Covariance, Groups
-from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.fits import Baseline
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
+from toolpath_stiff.updating.inference.fits import Baseline, fit_effects
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements, model_stiffness
@@ -189,3 +192,50 @@ def _places(data: Measurements) -> NDArray[np.int64]:
     columns += [data.tool_extension[:, None], setup.reshape(-1, 1)]
     found = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
     return np.asarray(found.reshape(-1), dtype=np.int64)
+
+
+# -- effects set by hand -----------------------------------------------------------------------------------------------
+
+
+class ByHand:
+    """The model against n readings with effects of sizes that somebody sets: made once, then at once for any sizes.
+
+    Attributes
+    ----------
+    problem
+        Readings, model and scatter, under the noise that a diagnosis writes out in full.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        data: Measurements,
+        *,
+        noise: float | tuple[float, float] | None = None,
+        strut_spread: float = STRUT_SPREAD,
+        effect_files: Sequence[str | Path] = (),
+    ) -> None:
+        noises = noise_models(data, noise, strut_spread)
+        self.problem = Problem.of(Predictor(machine, data, effect_files), max(noises, key=lambda one: one.typical))
+
+    def fit(self, entries: Sequence[EffectEntry] = (), law_free: bool = True) -> Fit:
+        """The strut law fitted beside effects of these sizes, or left as it is.
+
+        Raises
+        ------
+        InputError
+            An effect is unknown, or has keys or values that it cannot have.
+        """
+        candidates, sizes = [], []
+        for entry in entries:
+            effect = find_effect(entry.name, self.problem.predictor.effect_files)
+            values = read_parameters(effect, entry, "by hand")
+            real = tuple(Component.of(one) for one in effect.parameters if not one.discrete)
+            choice = tuple((one.name, values[one.name]) for one in effect.parameters if one.discrete)
+            candidates.append(Candidate(effect, choice, real))
+            sizes.append(np.array([component.size(values[component.parameter.name]) for component in real]))
+        fit = fit_effects(self.problem, candidates, sizes, (), np.zeros(2), self.problem.scatter, law_free)
+        again = self.problem.scatter.with_wild(fit.residual)
+        if law_free and again.wild != fit.scatter.wild:
+            fit = fit_effects(self.problem, candidates, sizes, (), fit.law, again, law_free)
+        return fit

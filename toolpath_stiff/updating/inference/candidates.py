@@ -68,6 +68,12 @@ class Component:
             return np.inf if size == 0.0 else 1.0 / size
         return self.parameter.neutral * self.parameter.si + size
 
+    def size(self, value: float) -> float:
+        """The size of an SI value: what `value` gives back."""
+        if self.inverse:
+            return 0.0 if np.isinf(value) else 1.0 / value
+        return value - self.parameter.neutral * self.parameter.si
+
     @property
     def signs(self) -> tuple[float, ...]:
         """Directions in which the size may go from 0."""

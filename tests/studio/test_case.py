@@ -1,0 +1,185 @@
+"""A case folder: what its steps make of it, undo and redo, the commands on it, what is refused."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import subprocess
+
+import pytest
+
+import toolpath_stiff as tps
+from toolpath_stiff.cli.main import main
+
+SEED = 9006  # hides a weak strut
+SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n"
+
+
+@pytest.fixture
+def case(tmp_path):
+    found = tps.Case.open(tmp_path / "case")
+    found.start_exercise(SEED)
+    return found
+
+
+def rows(case):
+    return len(case.data.on(case.machine))
+
+
+def test_a_case_reads_back_as_it_was_written(case):
+    case.set_aside("data/measurements.csv", 5)
+    case.switch("weak_strut", {"strut": 4, "factor": 0.81358})
+    again = tps.Case.open(case.folder)
+    assert again.state == case.state
+    assert again.history == case.history
+    assert again.state.on == {"weak_strut": {"strut": 4, "factor": 0.81358}}
+
+
+def test_a_reading_set_aside_is_not_read_and_the_others_keep_their_lines(case):
+    before = case.data.to_frame(case.machine)
+    case.set_aside("data/measurements.csv", 5)
+    after = case.data.to_frame(case.machine)
+    assert sorted(set(before["line"]) - set(after["line"])) == [5]
+    kept = before[before["line"] != 5].drop(columns=["file", "clamp"]).reset_index(drop=True)
+    assert after.drop(columns=["file", "clamp"]).equals(kept)
+
+
+def test_the_command_of_a_reading_set_aside_does_the_same(case, monkeypatch):
+    case.set_aside("data/measurements.csv", 5)
+    case.set_aside("data/measurements.csv", 8)
+    file = case.folder / "used" / "measurements.csv"
+    content = file.read_bytes()
+    file.unlink()
+    subprocess.run(case.history[-1].command, shell=True, cwd=case.folder, check=True)
+    assert file.read_bytes() == content
+
+
+def test_undo_and_redo_change_what_is_read(case):
+    count = rows(case)
+    case.set_aside("data/measurements.csv", 5)
+    case.set_aside("data/measurements.csv", 6)
+    assert rows(case) == count - 2
+    case.undo()
+    assert rows(case) == count - 1
+    assert rows(tps.Case.open(case.folder)) == count - 1  # after a kill
+    case.redo()
+    assert rows(case) == count - 2
+    case.set_aside("data/measurements.csv", 5, back=True)
+    assert rows(case) == count - 1
+    case.undo()
+    case.undo()
+    case.undo()
+    assert case.history[-1].kind == "exercise"
+    case.switch("weak_strut", {"strut": 1, "factor": 0.9})
+    assert case.undone == []  # a new step forgets what was undone
+
+
+def test_the_first_machine_stays(tmp_path):
+    case = tps.Case.open(tmp_path)
+    assert case.undo() is None
+    assert case.machine.name == "nist"
+
+
+def test_the_command_of_a_step_gives_the_figures_of_the_case(tmp_path, monkeypatch, capsys):
+    case = tps.Case.open(tmp_path)
+    case.add_data("nist-table1")
+    case.set_aside("data/nist-table1.csv", 5)
+    document = case.compare().to_dict()
+    monkeypatch.chdir(case.folder)
+    assert main([*shlex.split(case.history[-1].command)[1:], "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["baseline"] == document["baseline"]
+    kept = json.loads((case.folder / case.latest("compare") / "compare.json").read_text())
+    assert kept["baseline"] == document["baseline"]
+
+
+def test_the_rig_measures_again_and_reveals(case, monkeypatch):
+    plan = case.folder / "plan.csv"
+    plan.write_text("x_mm,y_mm,z_mm,direction\n0,0,800,X\n0,0,800,Y\n")
+    count = rows(case)
+    case.measure(plan)
+    assert rows(case) == count + 2
+    assert case.claim("weak_strut")["verdict"] == "right"
+    assert "claimed weak_strut: right" in [step.text for step in case.history]
+
+
+def test_a_program_and_where_it_sits(case, tmp_path):
+    (tmp_path / "slot.nc").write_text(SLOT)
+    case.add_program(tmp_path / "slot.nc")
+    case.place_at((10, 0, 820))
+    found = case.analyze()
+    there = tps.analyze(case.machine, tmp_path / "slot.nc", origin_mm_deg=(10, 0, 820))
+    assert found.mean_N_per_mm == there.mean_N_per_mm
+    assert "--origin 10,0,820" in case.history[-1].command
+
+
+def test_files_of_the_same_name_are_kept_apart_and_the_paper_s_table_becomes_a_file(tmp_path):
+    case = tps.Case.open(tmp_path / "case")
+    case.add_data("nist-table1")
+    assert case.state.data == ("data/nist-table1.csv",)
+    there = tps.Measurements.read("nist-table1").to_frame()
+    here = case.data.to_frame()
+    assert here["stiffness_N_per_mm"].tolist() == pytest.approx(there["stiffness_N_per_mm"].tolist())
+    assert here["setup"].tolist() == there["setup"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x_mm,y_mm,z_mm,direction,stiffness_N_per_mm\n0,0,800,X,soft\n", "soft"),
+        ("", "empty"),
+        ("what,is,this\n1,2,3\n", "column"),
+    ],
+)
+def test_a_broken_file_leaves_the_case_as_it_was(case, tmp_path, text, said):
+    (tmp_path / "broken.csv").write_text(text)
+    steps, files = case.history, sorted(case.folder.rglob("*"))
+    with pytest.raises(tps.TpsError, match=said):
+        case.add_data(tmp_path / "broken.csv")
+    assert case.history == steps
+    assert sorted(case.folder.rglob("*")) == files
+
+
+def test_a_changed_copy_is_noticed(case):
+    file = case.folder / "data" / "measurements.csv"
+    file.write_text(file.read_text().replace("37095", "37096"))
+    with pytest.raises(tps.InputError, match="is not what was put into the case"):
+        tps.Case.open(case.folder)
+
+
+def test_another_program_s_change_is_not_written_over(case):
+    other = tps.Case.open(case.folder)
+    other.set_aside("data/measurements.csv", 5)
+    with pytest.raises(tps.InputError, match="changed by another program"):
+        case.set_aside("data/measurements.csv", 6)
+    assert tps.Case.open(case.folder).state.aside == ("data/measurements.csv:5",)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("format = 2\n", "format 2"),
+        ("format = 1\ndone = 1\n[[step]]\nkind = 'x'\n", "step 1 is no step"),
+        ("format = 1\ndone = 3\n[[step]]\nkind = 'x'\ntext = 'y'\n", "done = 3"),
+        (
+            "format = 1\ndone = 1\n[[step]]\nkind = 'x'\ntext = 'y'\nchange = {machine = '../m.toml'}\n",
+            "within the case",
+        ),
+        (
+            "format = 1\ndone = 1\n[[step]]\nkind = 'x'\ntext = 'y'\nchange = {data = ['/etc/passwd']}\n",
+            "within the case",
+        ),
+        ("format = 1\ndone = \n", "not TOML"),
+    ],
+)
+def test_a_file_that_is_no_case_is_refused(tmp_path, text, said):
+    (tmp_path / "case.toml").write_text(text)
+    with pytest.raises(tps.InputError, match=said):
+        tps.Case.open(tmp_path)
+
+
+def test_what_cannot_be_set_aside(case):
+    for file, line in (("data/measurements.csv", 1), ("data/other.csv", 2), ("data/measurements.csv", 99999)):
+        with pytest.raises(tps.InputError):
+            case.set_aside(file, line)
+    assert case.state.aside == ()

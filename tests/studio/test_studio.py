@@ -1,0 +1,452 @@
+"""The studio: who may ask, what a page is told, and the whole journey in a browser on a blind exercise."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import toolpath_stiff as tps
+from tests.browser import BROWSER
+
+SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG1 Y30\nM2\n"
+SEED, LAYOUT = 9006, "paper"
+PATIENCE = 180_000  # ms: on a busy machine everything is slow
+
+
+class Running:
+    """A studio in a process of its own."""
+
+    def __init__(self, folder: Path, *more: str) -> None:
+        self.folder = folder
+        words = [sys.executable, "-m", "toolpath_stiff", "studio", "--case", str(folder), "--no-browser", *more]
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        lines = iter(self.process.stdout.readline, "")
+        self.address = next(line.split()[1] for line in lines if line.startswith("studio"))
+        self.port = int(re.search(r":(\d+)/", self.address)[1])
+        self.token = self.address.partition("token=")[2]
+
+    def ask(self, method: str, path: str, body: bytes = b"", **headers: str) -> tuple[int, bytes, dict[str, str]]:
+        host = f"127.0.0.1:{self.port}"
+        given = {"Host": host, "Cookie": f"tps_studio_{self.port}={self.token}"}
+        if method == "POST":
+            given["Origin"] = f"http://{host}"
+        given |= {name.replace("_", "-"): value for name, value in headers.items()}
+        link = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
+        link.request(method, path, body, {name: value for name, value in given.items() if value})
+        answer = link.getresponse()
+        content = answer.read()
+        link.close()
+        return answer.status, content, dict(answer.getheaders())
+
+    def do(self, **asked: object) -> dict[str, object]:
+        return json.loads(self.ask("POST", "/do", json.dumps(asked).encode())[1])
+
+    def state(self) -> dict[str, object]:
+        return json.loads(self.ask("GET", "/state")[1])
+
+    def idle(self) -> dict[str, object]:
+        for _ in range(600):
+            found = self.state()
+            if not found["job"]:
+                return found
+            time.sleep(0.2)
+        raise AssertionError(f"still at {found['job']}")
+
+    def end(self) -> None:
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait(30)
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory):
+    found = Running(tmp_path_factory.mktemp("studio") / "case")
+    yield found
+    found.end()
+
+
+# -- who may ask -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "headers"),
+    [
+        ("GET", "/state", {"Cookie": ""}),
+        ("GET", "/", {"Cookie": ""}),
+        ("GET", "/?token=wrong", {"Cookie": ""}),
+        ("GET", "/state", {"Cookie": "tps_studio_1=wrong"}),
+        ("GET", "/state", {"Host": "studio.example"}),
+        ("GET", "/state", {"Host": "127.0.0.1"}),
+        ("GET", "/state", {"Origin": "http://studio.example"}),
+        ("GET", "/events", {"Origin": "null"}),
+        ("POST", "/do", {"Origin": "http://127.0.0.1:1"}),
+        ("POST", "/do", {"Origin": ""}),
+        ("POST", "/do", {"Sec_Fetch_Site": "cross-site"}),
+        ("POST", "/file?name=a.csv", {"Cookie": ""}),
+        ("GET", "/export", {"Cookie": ""}),
+    ],
+)
+def test_strangers_are_refused(running, method, path, headers):
+    status, content, _ = running.ask(method, path, b"{}", **headers)
+    assert status == 403
+    assert running.token.encode() not in content
+
+
+def test_the_token_goes_into_a_cookie_that_scripts_and_other_sites_do_not_get(running):
+    status, _, headers = running.ask("GET", f"/?token={running.token}", Cookie="")
+    assert status == 303
+    assert headers["Location"] == "/"
+    assert "HttpOnly" in headers["Set-Cookie"]
+    assert "SameSite=Strict" in headers["Set-Cookie"]
+
+
+@pytest.mark.parametrize(
+    "path", ["../case.toml", "%2e%2e/secret.csv", "/etc/passwd", "exercise/machine.toml", "case", "results/../../x.csv"]
+)
+def test_nothing_outside_the_case_and_not_the_seal(running, path):
+    (running.folder.parent / "secret.csv").write_text("secret")
+    assert running.ask("GET", f"/case/{path}")[0] == 404
+
+
+def test_pages_of_results_have_an_origin_of_their_own(running):
+    (running.folder / "results").mkdir(exist_ok=True)
+    (running.folder / "results" / "page.html").write_text("<script>fetch('/state')</script>")
+    status, _, headers = running.ask("GET", "/case/results/page.html")
+    assert (status, headers["Content-Security-Policy"]) == (200, "sandbox allow-scripts")
+
+
+def test_large_bodies_are_refused_before_they_are_read(running):
+    assert running.ask("POST", "/do", Content_Length="99999999")[0] == 413
+    assert running.ask("POST", "/file?name=a.csv", Content_Length=str(2**40))[0] == 413
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"do": "format"}, "nothing called"),
+        ({"do": "aside", "file": "../x.csv", "line": 3}, ""),
+        ({"do": "switch", "effect": "ghost", "values": {}}, ""),
+        ({"do": "claim", "effects": "weak_strut"}, "no exercise"),
+        ({"do": "fit"}, "no effect is switched on"),
+        ({"do": "place", "x_mm": 0, "out": "/tmp"}, "bounds"),
+        ({"do": "undo", "what": 1}, "undo"),
+    ],
+)
+def test_what_cannot_be_done_is_said(running, asked, said):
+    answer = running.do(**asked)
+    assert said in answer["error"]
+
+
+def test_code_is_loaded_on_an_explicit_yes_alone(running, tmp_path):
+    body = tps.effect_template("my_screw").text.encode()
+    status, content, _ = running.ask("POST", "/file?name=my_screw.py", body)
+    assert status == 200
+    assert "my_screw.py is code" in json.loads(content)["confirm"]
+    assert not (running.folder / "effects").exists()
+
+
+def test_a_broken_effect_is_told_with_its_line(running):
+    text = "from toolpath_stiff import Effect\n\nclass Screw(Effect):\n    name = 1 +\n"
+    status, content, _ = running.ask("POST", "/file?name=screw.py&run=yes", text.encode())
+    assert status == 200
+    said = json.loads(content)["error"]
+    assert "screw.py" in said
+    assert "4" in said
+    assert running.state()["history"][-1]["kind"] != "effects"
+
+
+def test_a_second_studio_of_the_same_case_is_refused(running):
+    words = [sys.executable, "-m", "toolpath_stiff", "studio", "--case", str(running.folder), "--no-browser"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2
+    assert "open in another studio" in done.stderr
+
+
+# -- the journey -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api")
+    if BROWSER is None:
+        pytest.skip("no Chromium here")
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
+        yield found
+        found.close()
+
+
+class Tab:
+    """A tab that notes what it may not have: messages of the console, errors, requests to another host."""
+
+    def __init__(self, browser, address: str, **options) -> None:
+        self.page = browser.new_context(**{"viewport": {"width": 1400, "height": 900}, **options}).new_page()
+        self.page.set_default_timeout(PATIENCE)
+        self.faults: list[str] = []
+        self.page.on("console", lambda message: self.faults.append(f"console: {message.text}"))
+        self.page.on("pageerror", lambda error: self.faults.append(f"error: {error}"))
+        host = address.split("/")[2]
+        self.page.on(
+            "request",
+            lambda asked: (
+                asked.url.split("/")[2:3] != [host]
+                and not asked.url.startswith(("data:", "blob:", "file:"))
+                and self.faults.append(asked.url)
+            ),
+        )
+        self.page.goto(address)
+
+    def go(self, panel: str) -> None:
+        self.page.click(f"#tab-{panel}")
+
+    def text(self, selector: str) -> str:
+        return self.page.inner_text(selector)
+
+    def number(self, selector: str) -> float:
+        return float(re.sub(r"[^\d.-]", "", self.text(selector)))
+
+    def until(self, script: str) -> None:
+        """Wait; by asking again, as the page's policy lets no string be run as code."""
+        for _ in range(PATIENCE // 100):
+            if self.page.evaluate(script):
+                return
+            self.page.wait_for_timeout(100)
+        raise AssertionError(f"never: {script}")
+
+    def close(self) -> None:
+        self.page.context.close()
+
+
+def settled(running) -> dict[str, object]:
+    time.sleep(0.3)
+    return running.idle()
+
+
+def test_the_journey_by_mouse(running, browser, tmp_path):
+    tab = Tab(browser, running.address)
+    page = tab.page
+    # Start a blind exercise.
+    tab.go("exercise")
+    page.fill("#seed", str(SEED))
+    page.select_option("#layout", LAYOUT)
+    page.click("#start-exercise")
+    page.wait_for_selector("#g-floor:has-text('%')")
+    state = settled(running)
+    case = tps.Case.open(running.folder)
+    asked = [case.path(name) for name in case.state.data]
+    command = tps.diagnose(case.path(case.state.machine), asked).to_dict()
+    tab.until("document.querySelector('#sentence small') !== null")
+    assert state["verdict"]["text"] == command["text"]
+    assert tab.number("#g-as_given") == pytest.approx(
+        command["baseline"]["as_given"]["mean_abs_error_percent"], abs=0.005
+    )
+    assert tab.number("#g-refitted") == pytest.approx(command["baseline"]["mean_abs_error_percent"], abs=0.005)
+    assert tab.number("#g-floor") == pytest.approx(command["baseline"]["noise_floor_percent"], abs=0.005)
+    # Set a reading aside in the machine, and take it back.
+    box = page.locator("#scene .overlay").bounding_box()
+    spot = page.evaluate("() => { const s = window.tpsStudio.spots(); return s[s.length - 1]; }")
+    page.mouse.move(box["x"] + spot[0], box["y"] + spot[1])
+    tab.until("document.querySelector('#status').textContent.includes('measured')")
+    page.mouse.click(box["x"] + spot[0], box["y"] + spot[1])
+    tab.until("document.querySelector('#machine-name').textContent.includes('41 readings')")
+    assert len(tps.Case.open(running.folder).state.aside) == 1
+    page.click("#undo")
+    tab.until("document.querySelector('#machine-name').textContent.includes('42 readings')")
+    # Switch an effect on, move its size, fit, accept.
+    tab.go("effects")
+    page.click("label[for=sw-weak_strut]")
+    page.wait_for_selector("#weak_strut-factor")
+    page.select_option("#weak_strut-strut", "4")
+    tab.until("document.querySelector('#weak_strut-strut').value === '4'")
+    settled(running)
+    slider = page.locator("#weak_strut-factor").bounding_box()
+    page.mouse.move(slider["x"] + 5, slider["y"] + slider["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(slider["x"] + 0.4 * slider["width"], slider["y"] + slider["height"] / 2, steps=3)
+    page.mouse.up()
+    settled(running)
+    on = tps.Case.open(running.folder).state.on
+    assert on["weak_strut"]["strut"] == 4
+    hand = tps.preview(case.machine, case.data).at(on)["mean_abs_error_percent"]
+    tab.until(f"Math.abs(parseFloat(document.querySelector('#g-now').textContent) - {hand}) < 0.006")
+    settled(running)
+    page.click("#fit")
+    page.wait_for_selector("#fit-text")
+    state = settled(running)
+    kept = json.loads((running.folder / tps.Case.open(running.folder).latest("update") / "update.json").read_text())
+    assert tab.number("#g-now") == pytest.approx(kept["steps"][-1]["mean_abs_error_percent"], abs=0.006)
+    assert state["fit"]["text"] == kept["text"]
+    assert state["fit"]["holds"] or kept["verdict"] != "updated"
+    # A plan, measured on the exercise's machine.
+    tab.go("next")
+    page.fill("#poses", "2")
+    page.click("#make-plan")
+    page.wait_for_selector("#plan-file")
+    page.click("#measure")
+    tab.until("!document.querySelector('#machine-name').textContent.includes('42 readings')")
+    # A program, where it sits, the best place.
+    (tmp_path / "slot.nc").write_text(SLOT)
+    page.set_input_files("#file", tmp_path / "slot.nc")
+    page.wait_for_selector("#p-mean")
+    state = settled(running)
+    case = tps.Case.open(running.folder)
+    assert tab.number("#p-mean") == pytest.approx(state["program"]["summary"]["mean_N_per_mm"], abs=0.5)
+    tab.go("placement")
+    box = page.locator("#drag").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2 - 20, steps=4)
+    page.mouse.up()
+    tab.until("Math.abs(parseFloat(document.querySelector('#o-Xn').value)) > 20")
+    settled(running)
+    case = tps.Case.open(running.folder)
+    there = tps.try_placement(case.machine, case.program).at(case.state.origin)
+    assert tab.number("#pl-mean") == pytest.approx(there["mean_N_per_mm"], abs=0.5)
+    # Reveal, export.
+    tab.go("exercise")
+    page.select_option("#claim", "weak_strut")
+    page.click("#reveal")
+    page.wait_for_selector("#revealed")
+    assert "claim weak_strut: " in tab.text("#revealed")
+    tab.go("history")
+    assert "tps rig reveal exercise --claim weak_strut" in tab.text("#panel")
+    assert tab.faults == []
+    tab.close()
+
+
+def test_by_keyboard(running, browser):
+    tab = Tab(browser, running.address)
+    page = tab.page
+    page.wait_for_selector("#sw-table_compliance")
+    page.focus("#tab-effects")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowLeft")
+    tab.until("document.activeElement.id === 'tab-effects'")
+    page.focus("#sw-table_compliance")
+    page.keyboard.press("Space")
+    page.wait_for_selector("#table_compliance-x_nm_per_N")
+    before = page.input_value("#table_compliance-x_nm_per_N")
+    page.focus("#table_compliance-x_nm_per_N")
+    page.keyboard.press("ArrowRight")
+    settled(running)
+    assert float(page.input_value("#table_compliance-x_nm_per_N")) > float(before)
+    tab.until("document.activeElement.id === 'table_compliance-x_nm_per_N'")
+    page.focus("#scene .overlay")
+    page.keyboard.press(".")
+    tab.until("document.querySelector('#status').textContent.includes('measured')")
+    page.keyboard.press("Control+z")
+    tab.until(f"document.querySelector('#table_compliance-x_nm_per_N').value === {before!r}")
+    page.keyboard.press("Control+z")
+    page.wait_for_selector("#sw-table_compliance:not(:checked)")
+    page.focus("#scene .overlay")
+    title = tab.text("#machine-name")
+    page.keyboard.press("Enter")
+    tab.until(f"document.querySelector('#machine-name').textContent !== {title!r}")
+    assert len(tps.Case.open(running.folder).state.aside) == 1
+    page.keyboard.press("Control+z")
+    tab.until(f"document.querySelector('#machine-name').textContent === {title!r}")
+    assert tps.Case.open(running.folder).state.aside == ()
+    assert tab.faults == []
+    tab.close()
+
+
+def test_two_tabs_see_the_same(running, browser):
+    one, two = Tab(browser, running.address), Tab(browser, running.address)
+    for tab in (one, two):
+        tab.page.wait_for_selector("#sw-table_compliance")
+    one.page.click("label[for=sw-table_compliance]")
+    two.page.wait_for_selector("#sw-table_compliance:checked")
+    two.page.click("#undo")
+    one.page.wait_for_selector("#sw-table_compliance:not(:checked)")
+    assert one.faults + two.faults == []
+    one.close()
+    two.close()
+
+
+def test_a_program_out_of_reach_is_told(running, browser, tmp_path):
+    tab = Tab(browser, running.address)
+    tab.page.wait_for_selector("#sw-table_compliance")
+    (tmp_path / "far.nc").write_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X2500\nM2\n")
+    tab.page.set_input_files("#file", tmp_path / "far.nc")
+    tab.page.wait_for_selector("#out-of-reach")
+    assert "out of reach" in tab.text("#out-of-reach")
+    tab.page.click("#undo")
+    tab.until("!document.querySelector('#machine-name').textContent.includes('far.nc')")
+    assert tab.faults == []
+    tab.close()
+
+
+def test_broken_files_are_told_and_change_nothing(running, browser, tmp_path):
+    tab = Tab(browser, running.address)
+    tab.page.wait_for_selector("#sw-table_compliance")
+    steps = len(tps.Case.open(running.folder).history)
+    for name, text, said in (
+        ("broken<b>.csv", "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm\n0,0,800,X,soft\n", "soft"),
+        ("broken.toml", "name = \n", "TOML"),
+        ("broken.nc", "G1 X10 F100\nG5.9 X\n", ""),
+    ):
+        (tmp_path / name).write_text(text)
+        tab.page.set_input_files("#file", tmp_path / name)
+        tab.page.wait_for_selector("#message:not([hidden])")
+        tab.until(f"document.querySelector('#message').textContent.includes({json.dumps(said)})")
+        tab.page.evaluate("document.querySelector('#message').hidden = true")
+    running.idle()
+    assert [s.kind for s in tps.Case.open(running.folder).history[steps:] if s.change and s.kind == "data"] == []
+    assert tab.page.locator("b", has_text=".csv").count() == 0
+    tab.close()
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
+def test_axe_finds_nothing_serious(running, browser, width, scheme):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    tab = Tab(browser, running.address, viewport={"width": width, "height": 900}, color_scheme=scheme)
+    tab.page.wait_for_selector("#sw-table_compliance")
+    for panel in ("effects", "why", "next", "program", "placement", "exercise", "history"):
+        tab.go(panel)
+        found = axe.Axe().run(tab.page).response["violations"]
+        serious = [
+            f"{panel}: {one['id']}: {one['nodes'][0]['html'][:160]}"
+            for one in found
+            if one["impact"] in ("serious", "critical")
+        ]
+        assert serious == []
+    wide = tab.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    assert wide <= 0
+    tab.close()
+
+
+def test_a_killed_studio_resumes_where_it_was(running, browser):
+    before = running.idle()
+    running.process.kill()
+    running.process.wait()
+    again = Running(running.folder)
+    try:
+        after = again.idle()
+    finally:
+        again.end()
+    for name in ("history", "verdict", "gauge", "readings", "exercise"):
+        assert after[name] == before[name]
+
+
+def test_the_export_is_read_without_a_studio(running, browser, tmp_path):
+    again = Running(running.folder)
+    try:
+        content = again.ask("GET", "/export")[1]
+        state = again.idle()
+    finally:
+        again.end()
+    assert again.token.encode() not in content
+    (tmp_path / "case.html").write_bytes(content)
+    tab = Tab(browser, (tmp_path / "case.html").as_uri())
+    tab.page.wait_for_selector("#sw-table_compliance")
+    assert tab.number("#g-as_given") == pytest.approx(state["gauge"]["as_given"], abs=0.005)
+    assert tab.page.locator("#undo").count() == 0
+    assert tab.faults == []
+    tab.close()

@@ -1,0 +1,125 @@
+"""The file of a case: the steps that were done, what they make of the case's state, read and written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from toolpath_stiff.defaults import MACHINE
+from toolpath_stiff.errors import InputError
+
+FORMAT = 1
+HEADING = "# A case of toolpath_stiff: the steps in their order; `done` of them hold, the others were undone.\n"
+
+
+@dataclass(frozen=True)
+class Step:
+    """Something that was done.
+
+    Attributes
+    ----------
+    kind, text
+        One word for programs, one line for people.
+    command, python
+        The command line, run in the case's folder, and the Python line that do the same; "" where there is none.
+    change
+        Attribute of `CaseState` -> its new value.
+    files
+        File of the case that this step wrote -> its SHA-256.
+    result
+        Folder with what was found, "" without one.
+    """
+
+    kind: str
+    text: str
+    command: str = ""
+    python: str = ""
+    change: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+    result: str = ""
+
+
+@dataclass(frozen=True)
+class CaseState:
+    """What holds after some steps; files are named within the case's folder.
+
+    Attributes
+    ----------
+    machine, effects, data, program, exercise
+        Files: of the machine, of effects of one's own, of measurements, of the program; folder of a blind exercise.
+    aside
+        Readings that were set aside, "file:line" each.
+    on
+        Effects that are switched on: name -> the keys of its entry in a machine file.
+    origin
+        Where program zero sits, mm and degrees; empty: where the program or the machine has it.
+    require
+        Stiffness that every cut should have, N/mm; 0: none is asked for.
+    """
+
+    machine: str = MACHINE
+    effects: tuple[str, ...] = ()
+    data: tuple[str, ...] = ()
+    aside: tuple[str, ...] = ()
+    on: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    program: str = ""
+    origin: tuple[float, ...] = ()
+    require: float = 0.0
+    exercise: str = ""
+
+
+def case_text(steps: Sequence[Step], done: int) -> str:
+    """The content of case.toml."""
+    lines = [HEADING, f"format = {FORMAT}", f"done = {done}"]
+    for step in steps:
+        lines += ["", "[[step]]", *(f"{name} = {_toml(value)}" for name, value in vars(step).items() if value)]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    from toolpath_stiff.machine.writer import toml_text
+
+    if isinstance(value, str):
+        return toml_text(value)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{toml_text(str(key))} = {_toml(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def read_case(file: Path) -> tuple[list[Step], int, str]:
+    """Steps, how many hold, the text. Raises `InputError`."""
+    from toolpath_stiff.toml_reader import TomlReader
+
+    reader = TomlReader.read(file, "the case")
+    found = reader.data
+    if found.get("format") != FORMAT:
+        raise InputError(f"format {found.get('format')}", expected=f"format = {FORMAT}", file=str(file))
+    known, states = ({one.name for one in fields(kind)} for kind in (Step, CaseState))
+    steps = []
+    for number, entry in enumerate(found.get("step", []), 1):
+        change: dict[str, Any] = entry.get("change", {})
+        if not {"kind", "text"} <= set(entry) <= known or not set(change) <= states:
+            raise InputError(
+                f"step {number} is no step of a case", file=str(file), line=reader.line_of("step", nth=number - 1)
+            )
+        fixed = {name: tuple(value) if isinstance(value, list) else value for name, value in change.items()}
+        _check_names(fixed, entry, str(file), number)
+        steps.append(Step(**{**entry, "change": fixed}))
+    done = found.get("done")
+    if not isinstance(done, int) or not 1 <= done <= len(steps):
+        raise InputError(f"done = {done}", expected=f"1 to {len(steps)}, the steps that hold", file=str(file))
+    return steps, done, file.read_text("utf-8")
+
+
+def _check_names(change: Mapping[str, Any], entry: Mapping[str, Any], file: str, number: int) -> None:
+    """No file of a case lies outside its folder."""
+    names = [change.get("machine"), change.get("program"), change.get("exercise"), entry.get("result")]
+    names += [*change.get("data", ()), *change.get("effects", ()), *entry.get("files", {})]
+    names += [str(one).rpartition(":")[0] for one in change.get("aside", ())]
+    for name in filter(None, names):
+        if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts or "\\" in name:
+            raise InputError(f"step {number} names {name!r}", expected="a file within the case's folder", file=file)

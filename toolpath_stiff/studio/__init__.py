@@ -1,0 +1,1 @@
+"""The studio: a case in the browser. It shows what the public functions give; no physics, no statistics here."""

@@ -1,0 +1,308 @@
+// The page: it asks for the state, draws it, posts what is to be done, and hears of every change.
+const $ = (id) => document.getElementById(id);
+const scene = new MachineScene();
+let state = JSON.parse($("state").textContent), panel = "effects", here = -1, which = "now", operation = 0, playing = 0, version = -1;
+const readonly = state !== null;
+document.body.classList.toggle("readonly", readonly);
+if (readonly) for (const id of ["tools", "drop"]) $(id).remove();
+
+async function post(path, body) {
+  const answer = await fetch(path, { method: "POST", body, headers: typeof body === "string" ? { "Content-Type": "application/json" } : {} });
+  const found = await answer.json();
+  if (found.error) throw new Error(found.error);
+  return found;
+}
+function tell(text) {
+  $("message").hidden = !text;
+  $("message").textContent = text;
+}
+const act = async (asked) => {
+  if (readonly) return;
+  try {
+    const answer = await post("/do", JSON.stringify(asked));
+    tell(answer.message ?? "");
+  } catch (error) { tell(error.message); }
+  await refresh();
+};
+// Of what follows the pointer only the last is asked for, one question at a time.
+function latest(ask, show) {
+  let busy = false, next = null;
+  return async (...asked) => {
+    next = asked;
+    if (busy || readonly) return;
+    busy = true;
+    while (next) { const now = next; next = null; try { show(await ask(...now), ...now); } catch (error) { tell(error.message); } }
+    busy = false;
+  };
+}
+const hand = latest((on) => post("/do", JSON.stringify({ do: "hand", on })), (found) => {
+  state.gauge.now = found.mean_abs_error_percent;
+  state.gauge.left_out = null;
+  let k = 0;
+  scene.deviation = state.readings.aside.map((gone) => (gone ? null : found.deviation_percent[k++]));
+  $("gauge").replaceChildren(gaugeOf(state));
+  view.redraw();
+});
+const placed = latest((origin) => post("/do", JSON.stringify({ do: "at", origin })), (found) => {
+  state.placement.now = found;
+  $("pl")?.replaceWith(placementFigures(found, state, "pl"));
+});
+Object.assign(act, {
+  scene, readonly, operation, origin: [0, 0, 0, 0, 0, 0], redraw: () => drawPanel(), put: () => {},
+  hand: (name, values) => hand({ ...Object.fromEntries(state.effects.filter((one) => one.on).map((one) => [one.name, one.on])), [name]: values }),
+  only: (number) => { operation = act.operation = act.operation === number ? 0 : number; classify(); view.redraw(); drawPanel(); },
+  shift: (axis, by) => act.move(axis, act.origin[axis] + by, false),
+  move: (axis, value, done) => {
+    if (!Number.isFinite(value)) return;
+    act.origin[axis] = axis === 5 ? ((value % 360) + 360) % 360 : value;
+    act.put();
+    for (const name of ["X", "Y", "Z", "C"]) { const k = { X: 0, Y: 1, Z: 2, C: 5 }[name]; for (const id of [`o-${name}`, `o-${name}n`]) if ($(id) && document.activeElement !== $(id)) $(id).value = Number(act.origin[k].toFixed(1)); }
+    placed([...act.origin]);
+    if (done) act.drop();
+  },
+  drop: () => act({ do: "place_at", origin: act.origin.map((v) => Number(v.toFixed(3))) }),
+});
+
+// ---------------------------------------------------------------- the machine, the profile
+const view = new Viewer($("scene"), scene, { point, pick, step: (by) => stepReading(by) });
+let profile = null;
+function describe(i) {
+  const r = state.readings, d = scene.deviation[i], turned = [r.a_deg[i], r.b_deg[i], r.c_deg[i]];
+  const along = ["dx", "dy", "dz"].map((k) => r[k][i]), axis = along.findIndex((v) => Math.abs(v) > 0.999);
+  return [`${r.file[i]} line ${r.line[i]}${r.aside[i] ? ", set aside" : ""}`,
+    `X${r.x_mm[i]} Y${r.y_mm[i]} Z${r.z_mm[i]} mm${turned.some(Boolean) ? `, A${turned[0]} B${turned[1]} C${turned[2]} deg` : ""}`,
+    `along ${axis < 0 ? along.map((v) => v.toFixed(2)).join(", ") : "XYZ"[axis]}, ${group(r.force_N[i])} N`,
+    r.aside[i] ? `measured ${group(r.stiffness_N_per_mm[i])} N/mm` : `measured ${group(r.stiffness_N_per_mm[i])}, modelled ${group(r.stiffness_N_per_mm[i] / (1 + d / 100))} N/mm: ${d > 0 ? "+" : ""}${d.toFixed(1)} %`];
+}
+function select(i) {
+  scene.selected = i;
+  const r = state.readings;
+  scene.pose = [r.x_mm[i], r.y_mm[i], r.z_mm[i], r.a_deg[i], r.b_deg[i], r.c_deg[i]];
+  $("status").textContent = `${describe(i).join(" \u00b7 ")} \u00b7 ${readonly ? "" : "click or Enter sets it aside or uses it again"}`;
+  view.redraw();
+}
+function point(i) {
+  view.tip.hidden = true;
+  if (i < 0) return;
+  if (i >= PATH_FROM) { goTo(i - PATH_FROM); return; }
+  select(i);
+  const spot = scene.spots.find((one) => one[2] === i);
+  if (spot) view.tell(spot, describe(i));
+}
+function pick(i) {
+  if (i >= 0 && i < PATH_FROM) { select(i); aside(i); }
+}
+const aside = (i) => act({ do: "aside", file: state.readings.file[i], line: state.readings.line[i] });
+function stepReading(by) {
+  const n = state.readings?.line.length;
+  if (n) select((scene.selected + by + n) % n);
+}
+$("scene").querySelector(".overlay").addEventListener("keydown", (e) => { if (e.key === "Enter" && scene.selected >= 0) { e.preventDefault(); aside(scene.selected); } });
+
+function classify() {
+  const path = state.program?.path;
+  if (!path) { scene.paths = []; return; }
+  const lines = scene.paths[0] ?? new Path([path.x_mm, path.y_mm, path.z_mm]);
+  const shown = curve(), known = shown.filter((v, i) => v !== null && path.cut[i] && !path.plunge[i]);
+  let low = Infinity, high = -Infinity;
+  for (const v of known) { low = Math.min(low, v); high = Math.max(high, v); }
+  const count = COLOURS.light.length;
+  scene.ends = [low, high];
+  lines.classify((i) => {
+    if (operation && path.operation[i] !== operation) return -1;
+    if (!path.cut[i]) return count;
+    if (shown[i] === null) return count + 2;
+    return path.plunge[i] ? count + 1 : Math.max(0, Math.min(count - 1, Math.floor((shown[i] - low) / (high - low || 1) * count)));
+  }, count + 3);
+  scene.paths = [lines];
+}
+function curve() {
+  const path = state.program.path;
+  if (which === "difference" && path.given) return path.now.map((v, i) => (v === null || path.given[i] === null ? null : v - path.given[i]));
+  return which === "given" && path.given ? path.given : path.now;
+}
+const numbers = (values, keep) => Float32Array.from(values, (v, i) => (v === null || !keep(i) ? NaN : v));
+function drawProfile() {
+  const path = state.program?.path;
+  $("profile-card").hidden = !path;
+  document.body.classList.toggle("with-profile", Boolean(path));
+  if (!path) { profile = null; return; }
+  const s = Float32Array.from(path.s_mm), cut = (i) => path.cut[i] && !path.plunge[i], shown = numbers(curve(), cut);
+  const curves = () => {
+    const found = [];
+    if (which === "now" && path.sd) for (const sign of [-1.96, 1.96]) found.push({ s, k: numbers(path.now.map((v, i) => (v === null ? null : v + sign * path.sd[i])), cut), colour: ink.rapid });
+    if (which === "now" && path.given && path.given.some((v, i) => v !== path.now[i])) found.push({ s, k: numbers(path.given, cut), colour: ink.second });
+    return [...found, { s, k: shown, colour: ink.curve }];
+  };
+  const model = {
+    s, value: (i) => shown[i], curves, ends: () => scene.ends, here: () => here,
+    beside: () => null,
+    levels: () => (state.program.require && which !== "difference" ? [{ value: state.program.require, colour: ink.bad, dash: [6, 4], held: true }] : []),
+  };
+  if (profile) { profile.model = model; profile.all(); profile.redraw(); }
+  else {
+    profile = new Profile($("profile"), model, { point: goTo, step: (by) => goTo(Math.max(0, Math.min(s.length - 1, here + by))) });
+    profile.drawOverlay = function () { const g = this.clear(this.overlay); if (here >= 0 && here < this.model.s.length) { ring(g, ...this.at(here), 5, ink.panel, 4); ring(g, ...this.at(here), 5, ink.ink, 2); } };
+  }
+  $("scrub").max = path.s_mm.length - 1;
+  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])].map((name) => h("button", { type: "button", "aria-pressed": String(which === name), onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
+  const other = which === "now" && path.given?.some((v, i) => v !== path.now[i]);
+  $("curves").textContent = [other ? "orange: as given" : "", which === "now" && path.sd ? "grey: 95 % band of what was fitted" : "", state.program.require ? "dashed: required" : ""].filter(Boolean).join(", ");
+}
+function goTo(i) {
+  const path = state.program?.path;
+  if (!path || !(i >= 0)) return;
+  here = scene.sample = Math.round(i);
+  scene.pose = ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"].map((k) => path[k][here]);
+  $("scrub").value = here;
+  const k = path.now[here];
+  $("status").textContent = `line ${path.line[here]} \u00b7 ${k === null ? "out of reach" : `${group(k)} N/mm`}${path.sd?.[here] ? ` \u00b1 ${group(1.96 * path.sd[here])} (95 %)` : ""}${path.given?.[here] ? `, as given ${group(path.given[here])}` : ""} \u00b7 X${path.x_mm[here].toFixed(1)} Y${path.y_mm[here].toFixed(1)} Z${path.z_mm[here].toFixed(1)} mm \u00b7 margin ${path.margin[here]?.toFixed(3) ?? "\u2013"}`;
+  view.redraw();
+  profile?.drawOverlay();
+  drawText(path.line[here]);
+}
+const lowest = { of: null, lines: new Map() };
+function drawText(line) {
+  const box = $("text"), p = state.program;
+  if (!box || !p) return;
+  if (lowest.of !== p.path) {
+    Object.assign(lowest, { of: p.path, lines: new Map() });
+    p.path?.line.forEach((n, i) => { if (p.path.cut[i] && p.path.now[i] !== null) lowest.lines.set(n, Math.min(lowest.lines.get(n) ?? Infinity, p.path.now[i])); });
+  }
+  const from = Math.max(1, Math.min(line - 8, p.lines.length - 16)), colours = theme.dark ? COLOURS.dark : COLOURS.light, [low, high] = scene.ends ?? [0, 1];
+  box.replaceChildren(...p.lines.slice(from - 1, from + 16).map((text, k) => {
+    const n = from + k, v = lowest.lines.get(n), c = v === undefined ? "transparent" : colours[Math.max(0, Math.min(colours.length - 1, Math.floor((v - low) / (high - low || 1) * colours.length)))];
+    return h("button", { type: "button", class: n === line ? "here" : "", title: v === undefined ? "" : `${group(v)} N/mm`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i); else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
+  }));
+}
+function play() {
+  const path = state.program?.path;
+  if (!playing || !path) return;
+  goTo((here + Math.max(1, Math.round(path.s_mm.length / 900))) % path.s_mm.length);
+  playing = requestAnimationFrame(play);
+}
+
+// ---------------------------------------------------------------- drawing the state
+function drawLegend() {
+  const parts = [];
+  if (state.readings) parts.push(h("div", { title: "Larger dots: larger errors. Rings: set aside." }, `softer -${scene.scale} %`, h("span", { class: "ramp", style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }), `+${scene.scale} % stiffer than modelled`));
+  if (state.program?.path) parts.push(h("div", {}, `path ${group(scene.ends[0])}`, h("span", { class: "ramp", style: `background:${ramp(theme.dark ? COLOURS.dark : COLOURS.light)}` }), `${group(scene.ends[1])} N/mm`));
+  $("legend").replaceChildren(...parts);
+}
+function drawPanel() {
+  const focus = document.activeElement?.id, [, , make] = PANELS.find(([name]) => name === panel);
+  $("tabs").replaceChildren(...PANELS.map(([name, label]) => h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-selected": String(name === panel), "aria-controls": "panel", tabindex: name === panel ? "0" : "-1", onclick: () => open(name) }, label)));
+  $("panel").setAttribute("aria-labelledby", `tab-${panel}`);
+  $("panel").replaceChildren(...[make(state, act)].flat(9).filter(Boolean));
+  if (panel === "program") drawText(state.program?.path?.line[Math.max(0, here)] ?? 1);
+  if (focus) $(focus)?.focus({ preventScroll: true });
+}
+function open(name) { panel = name; drawPanel(); $(`tab-${name}`).focus({ preventScroll: true }); }
+$("tabs").addEventListener("keydown", (e) => {
+  const by = { ArrowRight: 1, ArrowLeft: -1 }[e.key], names = PANELS.map(([name]) => name);
+  if (by) { e.preventDefault(); open(names[(names.indexOf(panel) + by + names.length) % names.length]); }
+});
+function draw() {
+  scene.state = state;
+  const r = state.readings, v = state.verdict;
+  scene.deviation = r?.deviation ?? [];
+  const sizes = scene.deviation.filter((d) => d !== null).map(Math.abs).sort((a, b) => a - b);
+  if (!scene.scaled && sizes.length) { scene.scale = Math.max(5, 5 * Math.ceil(sizes[Math.floor(0.95 * sizes.length)] / 5)); scene.scaled = true; }
+  scene.lit = state.effects.filter((one) => one.on).map((one) => ({ link: one.link, number: one.on.strut }));
+  if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
+  if (scene.selected < 0 && here < 0) scene.pose = [...state.machine.origin];
+  act.origin = [...(state.program?.origin ?? state.machine.origin)];
+  $("title").textContent = state.case;
+  $("machine-name").textContent = `${state.machine.title}${r ? `, ${r.line.length - r.aside.filter(Boolean).length} readings` : ""}${state.program ? `, ${state.program.name}` : ""}`;
+  document.title = `${state.case}: toolpath_stiff studio`;
+  const waiting = r && !v ? "Judging the readings" : r ? "" : "What does the machine do, and does the model say so?";
+  $("sentence").classList.toggle("waiting", Boolean(waiting));
+  $("sentence").replaceChildren(waiting || `${v.sentence}.`, v ? h("small", {}, v.text) : "");
+  $("gauge").replaceChildren(gaugeOf(state));
+  for (const [id, many] of [["undo", state.history.length > 1], ["redo", state.undone.length]]) if ($(id)) $(id).disabled = !many;
+  scene.paths = [];
+  if (state.program?.path && here >= state.program.path.s_mm.length) here = scene.sample = -1;
+  classify();
+  drawProfile();
+  drawLegend();
+  drawPanel();
+  if (view.width) { if (!scene.fitted) { scene.fitted = true; view.fit(); } view.redraw(); }
+}
+function drawJob(job) {
+  if (readonly) return;
+  $("job").classList.toggle("busy", Boolean(job));
+  $("job").textContent = job ? `${job.text || job.kind}${job.total ? `, ${Math.round(100 * job.done / job.total)} %` : ""}` : "";
+  $("cancel").hidden = !job;
+}
+let asking = null;
+async function refresh() {
+  if (readonly) return;
+  asking ??= (async () => {
+    const found = await (await fetch("/state")).json();
+    asking = null;
+    if (found.error) { tell(found.error); return; }
+    state = found;
+    version = found.version;
+    drawJob(found.job);
+    draw();
+  })();
+  await asking;
+}
+
+// ---------------------------------------------------------------- controls
+for (const one of document.querySelectorAll("[data-view]")) one.addEventListener("click", () => view.turnTo(one.dataset.view));
+for (const one of document.querySelectorAll("[data-focus]")) one.addEventListener("click", () => {
+  scene.focus = one.dataset.focus;
+  for (const other of document.querySelectorAll("[data-focus]")) other.setAttribute("aria-pressed", String(other === one));
+  view.turnTo("fit");
+});
+$("show-reach").addEventListener("change", (e) => { scene.showReach = e.target.checked; view.redraw(); });
+$("scrub").addEventListener("input", (e) => goTo(Number(e.target.value)));
+$("play").addEventListener("click", () => {
+  if (playing) cancelAnimationFrame(playing);
+  playing = playing ? 0 : 1;
+  $("play").setAttribute("aria-pressed", String(Boolean(playing)));
+  $("play").textContent = playing ? "Pause" : "Play";
+  play();
+});
+watchTheme(() => { if (state) { drawLegend(); view.redraw(); profile?.redraw(); } });
+
+async function take(file, run = false) {
+  try {
+    const found = await post(`/file?name=${encodeURIComponent(file.name)}${run ? "&run=yes" : ""}`, file);
+    if (found.confirm) {
+      $("ask-text").textContent = found.confirm;
+      $("yes").onclick = () => { $("ask").close(); take(file, true); };
+      $("no").onclick = () => $("ask").close();
+      $("ask").showModal();
+      return;
+    }
+    await refresh();
+    tell(found.message);
+    if (state.program && !/\.(csv|xlsx|toml|py)$/i.test(file.name)) open("program");
+  } catch (error) { tell(error.message); }
+}
+window.tpsStudio = { spots: () => scene.spots.map((spot) => [...spot]) };  // where readings stand on the screen
+if (readonly) draw();
+else {
+  for (const name of ["undo", "redo", "cancel"]) $(name).addEventListener("click", () => act({ do: name }));
+  $("open").addEventListener("click", () => $("file").click());
+  $("file").addEventListener("change", async (e) => { for (const file of [...e.target.files]) await take(file); e.target.value = ""; });
+  addEventListener("dragover", (e) => { e.preventDefault(); $("drop").hidden = false; });
+  addEventListener("dragleave", (e) => { if (!e.relatedTarget) $("drop").hidden = true; });
+  addEventListener("drop", async (e) => { e.preventDefault(); $("drop").hidden = true; for (const file of [...e.dataTransfer.files]) await take(file); });
+  addEventListener("keydown", (e) => {
+    if (!(e.ctrlKey || e.metaKey) || /^(input|textarea|select)$/i.test(e.target.tagName)) return;
+    const name = { z: "undo", y: "redo" }[e.key.toLowerCase()];
+    if (name) { e.preventDefault(); act({ do: name }); }
+  });
+  const news = new EventSource("/events");
+  news.onmessage = (e) => {
+    const told = JSON.parse(e.data);
+    drawJob(told.job);
+    if (told.message) tell(told.message);
+    if (told.version !== version) refresh();
+  };
+  news.onerror = () => { $("job").textContent = "the studio does not answer; it resumes when it is started again"; };
+  refresh();
+}
