@@ -19,7 +19,7 @@ import pytest
 import toolpath_stiff as tps
 from tests.test_cli_analyze import PART, _nist
 from toolpath_stiff.cli.main import main
-from toolpath_stiff.results_folder import MANIFEST
+from toolpath_stiff.results_folder import MANIFEST, clear_up
 
 BROKEN = "G21 F1000\nG1 X10\nG77.7\n"
 FAR = "F1000\nG1 X100\nX2000\n"
@@ -233,6 +233,14 @@ def test_a_killed_process_is_a_failing_program(shop, capsys):
     assert "jobs/b/part.nc: its process was ended by SIGKILL" in capsys.readouterr().out
 
 
+def wait_until(process, reached):
+    """Until something has been reached, or the process has ended; not for ever."""
+    end = time.monotonic() + 300
+    while process.poll() is None and not reached():
+        assert time.monotonic() < end, "it did not get there"
+        time.sleep(0.05)
+
+
 def test_ctrl_c_leaves_whole_reports_and_nothing_else(shop):
     arguments = ["analyze", "jobs", "--jobs", "2", *trap(shop, 600.0), *SHORT]
     # A shell that runs this in the background ignores SIGINT, and children inherit that: this one shall not.
@@ -246,8 +254,7 @@ def test_ctrl_c_leaves_whole_reports_and_nothing_else(shop):
         signal.signal(signal.SIGINT, before)
     done = shop / "reports/a/part/summary.json"
     try:
-        while process.poll() is None and not (done.exists() and (shop / "reached").exists()):
-            time.sleep(0.05)
+        wait_until(process, lambda: done.exists() and (shop / "reached").exists())
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes
         _, error = process.communicate(timeout=120)
     finally:
@@ -342,17 +349,19 @@ def test_an_input_of_one_program_is_not_written_over_by_another_ones_report(shop
     assert "is read here and would be written over" in rows_of(shop / "reports")["jobs/a/part.nc"]["reason"]
 
 
-def test_sigterm_stops_all_as_ctrl_c_does(shop):
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL"])
+def test_however_the_first_process_ends_the_others_end_too(name, shop):
     arguments = ["analyze", "jobs", "--jobs", "2", *trap(shop, 600.0), *SHORT]
     process = subprocess.Popen(
         [sys.executable, "-m", "toolpath_stiff", *arguments], cwd=shop, stderr=subprocess.PIPE, text=True
     )
     try:
-        while process.poll() is None and not (shop / "reached").exists():
-            time.sleep(0.05)
-        process.terminate()
+        wait_until(process, (shop / "reached").exists)
+        process.send_signal(getattr(signal, name))
         _, error = process.communicate(timeout=120)  # the pipe is open as long as any process lives
     finally:
         process.kill()
-    assert process.returncode == 130 and error == "tps: interrupted; no file is half-written\n"
+    if name == "SIGTERM":  # as Ctrl-C
+        assert process.returncode == 130 and error == "tps: interrupted; no file is half-written\n"
+    clear_up([shop / "reports/any"])  # as the next run does
     assert {path.name for path in (shop / "reports").rglob(".*")} <= {MANIFEST}

@@ -56,7 +56,8 @@ class Case:
     """A folder before and after a run that is let through."""
 
     def __init__(self, place, prepare, exchanges):
-        self.place, self.out, self.prepare, self.exchanges = place, place / "out", prepare, exchanges
+        self.place, self.out, self.template = place, place / "out", place.with_name("template")
+        self.prepare, self.exchanges = prepare, exchanges
         self.rules = Rules(replace=prepare is a_file_in_the_way)
         self.old = self.fresh()
         self.points = count_points(self.run)
@@ -65,27 +66,32 @@ class Case:
 
     def fresh(self):
         shutil.rmtree(self.place, ignore_errors=True)
-        self.place.mkdir()
-        self.prepare(self.out)
+        if not self.template.exists():
+            self.template.mkdir()
+            self.prepare(self.template / "out")
+        shutil.copytree(self.template, self.place)
         return tree(self.out)
 
     def run(self):
         write_folder(self.out, NEW, command="test", rules=self.rules)
 
 
-@pytest.fixture(params=[True, False], ids=["exchanged", "one by one"])
-def exchanges(request, monkeypatch):
-    if not request.param:
+# The folder as it was, whether it can be exchanged on this file system.
+CASES = [
+    (nothing_there, True),
+    (old_results, True),
+    (a_file_in_the_way, True),
+    (old_results_and_a_folder, True),
+    (a_file_in_the_way, False),
+]
+
+
+@pytest.fixture(params=CASES, ids=lambda one: f"{one[0].__name__}-{'' if one[1] else 'not '}exchanged")
+def case(request, tmp_path, monkeypatch):
+    prepare, exchanges = request.param
+    if not exchanges:
         monkeypatch.setattr(results_folder, "exchange", lambda one, other: False)
-    return request.param
-
-
-PREPARED = [nothing_there, old_results, old_results_and_a_folder, a_file_in_the_way]
-
-
-@pytest.fixture(params=PREPARED, ids=lambda one: one.__name__)
-def case(request, tmp_path, exchanges):
-    return Case(tmp_path / "place", request.param, exchanges and request.param is not old_results_and_a_folder)
+    return Case(tmp_path / "place", prepare, exchanges and prepare is not old_results_and_a_folder)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -121,10 +127,10 @@ def test_a_kill_at_any_point_leaves_the_old_files_or_the_new(case):
             assert tree(case.out) == case.new
 
 
-def test_a_kill_while_the_next_run_clears_up_is_made_good_by_the_one_after(tmp_path, exchanges):
+def test_a_kill_while_the_next_run_clears_up_is_made_good_by_the_one_after(tmp_path):
     case = Case(tmp_path / "place", old_results_and_a_folder, False)
-    for number in range(1, case.points + 1, 3):
-        for second in range(1, 40, 4):
+    for number in range(1, case.points + 1, 5):
+        for second in range(1, 40, 5):
             case.fresh()
             assert killed(case.run, number)
             done = not killed(lambda: clear_up([case.out]), second)

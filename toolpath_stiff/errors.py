@@ -27,6 +27,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+# What steers a terminal or turns the order of letters: the control characters but tab and line feed, and Unicode's
+# bidirectional ones (standard annex 9); half of a surrogate pair, which no encoding has.
+STEERING = (*range(9), *range(11, 32), *range(127, 160), 0x61C, 0x200E, 0x200F, *range(0x202A, 0x202F),
+            *range(0x2066, 0x206A), *range(0xD800, 0xE000))  # fmt: skip
+_HARMLESS = dict.fromkeys(STEERING, "?")
+
+
+def harmless(text: str) -> str:
+    """Text as it may go to a terminal."""
+    return text.translate(_HARMLESS)
+
 
 class TpsError(Exception):
     """Base of every error that the command line turns into one message and an exit code (2)."""

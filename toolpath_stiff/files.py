@@ -11,13 +11,10 @@ import hashlib
 import itertools
 import json
 import os
-import secrets
 import shlex
 import shutil
-import socket
 import stat
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -93,7 +90,7 @@ def _write_then_rename(target: Path, content: Content) -> None:
 def _new_file(prefix: Path) -> tuple[int, Path]:
     """An open file of a new name, held by this process."""
     while True:
-        path = prefix.with_name(prefix.name + secrets.token_hex(4))
+        path = prefix.with_name(prefix.name + os.urandom(4).hex())
         handle = os.open(path, NEW_FILE, 0o666)
         hold(handle)
         if _is_at(path, handle):  # not taken away by another run between the two calls
@@ -246,6 +243,8 @@ def locked(lock: Path, what: str, wait: float | None = None) -> Iterator[None]:
     InputError
         Another run holds it; the message names that run.
     """
+    import socket
+
     end = time.monotonic() + (WAIT_SECONDS if wait is None else wait)
     while True:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
@@ -280,6 +279,8 @@ def _holder(handle: int) -> str:
 @contextmanager
 def temporary_folder(prefix: str) -> Iterator[Path]:
     """A new folder among the system's temporary ones, removed at the end; those of killed runs are removed as well."""
+    import tempfile
+
     place = Path(tempfile.gettempdir())
     for left in place.glob(f"{prefix}*"):
         if left.is_dir() and not left.is_symlink() and is_left(left):
