@@ -218,6 +218,7 @@ def _ended(error: str, code: int) -> int:
         sys.stdout.flush()
     with suppress(TpsError):
         print(f"tps: error: {error}" if error else "tps: interrupted; no file is half-written", file=sys.stderr)
+        sys.stderr.flush()
     return code
 
 
