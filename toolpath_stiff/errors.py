@@ -39,6 +39,15 @@ def harmless(text: str) -> str:
     return text.translate(_HARMLESS)
 
 
+LONGEST_QUOTE = 2000  # characters of what was found: a line, a number or a name may have a million
+
+
+def _cut(found: str) -> str:
+    """What was found, cut in its middle where it is endless."""
+    half = LONGEST_QUOTE // 2
+    return found if len(found) <= LONGEST_QUOTE else f"{found[:half]} ... {found[-half:]}"
+
+
 class TpsError(Exception):
     """Base of every error that the command line turns into one message and an exit code (2)."""
 
@@ -73,7 +82,7 @@ class InputError(TpsError):
         line: int | None = None,
         column: int | None = None,
     ) -> None:
-        self.found, self.expected, self.hint = found, expected, hint
+        self.found, self.expected, self.hint = _cut(found), expected, hint
         self.file, self.line, self.column = file, line, column
         super().__init__(self._message())
 

@@ -18,11 +18,12 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, MachineFileError
+from toolpath_stiff.files import read_bytes
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, StrutLaw, read_uncertainty
 from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
-from toolpath_stiff.toml_reader import TomlReader, is_number, is_text, shortened
+from toolpath_stiff.toml_reader import LARGEST_BYTES, TomlReader, is_number, is_text, shortened
 from toolpath_stiff.units import (
     Pose,
     m_from_mm,
@@ -172,7 +173,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
             hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
         )
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_bytes(path, "machine file", LARGEST_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise MachineFileError(
             f"not a text file (byte {error.start})", expected="a machine file (TOML, UTF-8)", file=str(path)

@@ -8,10 +8,12 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.errors import FileError, ProgramError
+from toolpath_stiff.files import read_bytes
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
+LARGEST_BYTES = 10_000_000
 LARGEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
 # LinuxCNC's parameter file (manual, "Parameters"): G54 is 5221 to 5230, each further offset 20 on; X Y Z A B C U V W R.
 FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
@@ -58,9 +60,9 @@ class Offsets:
 
 def _lines(path: str | Path, what: str) -> list[str]:
     try:
-        return Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise ProgramError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+        return read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig").splitlines()
+    except FileError as error:
+        raise ProgramError(error.found, hint=error.hint) from None
     except UnicodeDecodeError:
         raise ProgramError(f"{what} is not a text file", file=str(path)) from None
 
@@ -109,7 +111,7 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
 
 def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
     columns = ("tool", "length_mm", "diameter_mm", "remark", "stick_out_mm", "material")
-    heading = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
+    heading = _cells(lines[0][1], path, lines[0][0])
     unknown = [name for name in heading if name not in columns]
     missing = [name for name in columns[:2] if name not in heading]
     if unknown or missing:
@@ -117,7 +119,7 @@ def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int
         raise ProgramError(found, expected=f"columns {', '.join(columns)}", file=str(path), line=lines[0][0])
     rows = []
     for line, text in lines[1:]:
-        cells = dict(zip(heading, (cell.strip() for cell in next(csv.reader([text]))), strict=False))
+        cells = dict(zip(heading, _cells(text, path, line), strict=False))
         number = _number(cells.get("tool", ""), "tool", path, line)
         if number != int(number) or number < 0:
             raise ProgramError(f"tool = {cells['tool']!r}", expected="a whole number", file=str(path), line=line)
@@ -131,6 +133,13 @@ def _csv_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int
     return rows
 
 
+def _cells(text: str, path: str | Path, line: int) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([text]))]
+    except csv.Error as error:  # a cell beyond 131,072 characters, say
+        raise ProgramError(f"not a row of CSV: {error}", file=str(path), line=line) from None
+
+
 def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tuple[int, ToolEntry]]:
     rows = []
     for line, text in lines:
@@ -139,7 +148,7 @@ def _linuxcnc_tools(path: str | Path, lines: list[tuple[int, str]]) -> list[tupl
             continue
         words = dict(re.findall(r"([A-Za-z])\s*([^\sA-Za-z]+(?:[eE][+-]?\d+)?)", content))
         words = {letter.upper(): value for letter, value in words.items()}
-        if "T" not in words or not words["T"].isdigit():
+        if not re.fullmatch("[0-9]{1,9}", words.get("T", "")):
             raise ProgramError(
                 f"{content.strip()!r} is not a tool",
                 expected="T<number> P<pocket> Z<length mm> D<diameter mm> ;remark",
@@ -195,7 +204,7 @@ def read_offsets(path: str | Path) -> Offsets:
         raise ProgramError("the offsets file is empty", expected="lines such as G55 = [100, 0, 0]", file=str(path))
     offsets = Offsets()
     for line, text in filled:
-        parameter = re.fullmatch(r"(\d+)\s+(\S+)", text)
+        parameter = re.fullmatch(r"([0-9]{1,9})\s+(\S+)", text)
         assignment = re.fullmatch(r'"?([Gg][\d.]+(?: ?[Pp]\d+)?)"?\s*=\s*\[(.*)\]', text)
         if parameter:
             _set_parameter(offsets, int(parameter[1]), _number(parameter[2], parameter[1], path, line))

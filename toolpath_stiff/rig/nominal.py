@@ -9,7 +9,6 @@ geometry, commands a pose.
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -21,9 +20,18 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_text
+from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_um, rad_from_deg
 
+SECTIONS = ("platform", "limits", "reference_tool", "strut_law", "frame_joints", "platform_joints")  # read here
 # Joints of one vertex of the frame lie within this angle about the machine's axis; vertices are far more apart.
+    "platform",
+    "limits",
+    "reference_tool",
+    "strut_law",
+    "frame_joints",
+    "platform_joints",
+)  # that are read here
 VERTEX_WIDTH = rad_from_deg(15.0)
 
 
@@ -95,10 +103,12 @@ def load_nominal(machine: str = defaults.MACHINE) -> Nominal:
 
 def parse_nominal(text: str, file: str) -> Nominal:
     """Nominal machine from the text of a machine file; `file` names it in messages. Raises `InputError`."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not a TOML file: {error}", file=file) from None
+    toml = TomlReader(text, file)
+    table = toml.data
+    for name in SECTIONS:
+        toml.table(name, table.get(name, {}), f"a section [{name}]")
+    for name in ("strut_length", "joint_angle"):
+        toml.table(f"limits.{name}", table.get("limits", {}).get(name, {}), f"a section [limits.{name}]")
     for kind in ("effect", "instrument"):
         if table.get(kind):
             raise InputError(
