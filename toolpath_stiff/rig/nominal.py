@@ -25,13 +25,6 @@ from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_um, rad_from_deg
 
 SECTIONS = ("platform", "limits", "reference_tool", "strut_law", "frame_joints", "platform_joints")  # read here
 # Joints of one vertex of the frame lie within this angle about the machine's axis; vertices are far more apart.
-    "platform",
-    "limits",
-    "reference_tool",
-    "strut_law",
-    "frame_joints",
-    "platform_joints",
-)  # that are read here
 VERTEX_WIDTH = rad_from_deg(15.0)
 
 
