@@ -302,6 +302,14 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 # -- reading -----------------------------------------------------------------------------------------------------------
 
 
+def is_file(path: str | Path) -> bool:
+    """Whether there is such a file; False as well for a name that none can have (too long, a circle of links)."""
+    try:
+        return Path(path).is_file()
+    except OSError:
+        return False
+
+
 def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
     """Content of a file; `what` names it in messages, `most` are the bytes that it may have. Raises `InputError`."""
     try:
@@ -351,7 +359,7 @@ def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], r
 
     Raises `InputError` for the first of them unless `replace`.
     """
-    given = [Path(file) for file in inputs if Path(file).is_file()]
+    given = [Path(file) for file in inputs if is_file(file)]
     found = [Path(out) for out in outputs if any(_is_same(Path(out), file) for file in given)]
     if found and not replace:
         raise FileError(

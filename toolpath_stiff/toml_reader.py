@@ -18,7 +18,7 @@ MOST_PARTS = 64  # of a dotted key: tomllib's time grows with their square
 DEEPEST = 32  # arrays and tables in each other
 LARGEST_INTEGER = 2**63 - 1  # TOML 1.0: "64-bit signed integers"
 LONG_KEY = re.compile(rf"""(?:\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+){{{MOST_PARTS}}}""")
-HEADING = re.compile(r"\s*\[\[?\s*([\w.]+)\s*\]")
+HEADING = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]")
 NTH = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -135,7 +135,8 @@ class TomlReader:
             if line is not None:
                 return line
         nth = NTH.fullmatch(where)
-        return self.line_of(nth[1], "", int(nth[2]) - 1) if nth else self.line_of(where)
+        line = self.line_of(nth[1], "", int(nth[2]) - 1) if nth else self.line_of(where)
+        return line or next((n for n, text in enumerate(self.lines, 1) if _heads_part_of(text, where)), None)
 
     def error(self, found: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
         """An error at the line of the dotted name `where`."""
@@ -178,6 +179,12 @@ class TomlReader:
         if not isinstance(value, dict):
             raise self.error(f"{where} = {value!r}", expected, where=where)
         return value
+
+
+def _heads_part_of(line: str, where: str) -> bool:
+    """Whether a line is the heading of a table within a table."""
+    heading = HEADING.match(line)
+    return heading is not None and heading[1].startswith(f"{where}.")
 
 
 def is_number(value: object) -> TypeGuard[int | float]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import options
 from toolpath_stiff.units import Pose, pose_in_mm, pose_in_si
 
@@ -125,7 +126,7 @@ class Program:
         """
         from toolpath_stiff.nc.words import read_lines
 
-        if not Path(file).is_file():
+        if not is_file(file):
             read_lines(file)  # says what is wrong with it
         said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
         return cls(Path(file).name, str(file), *_control(said, block_delete), said=said)
