@@ -183,7 +183,7 @@ POSES = b"x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,800,0,0,0\n-100,50,900,5,5,10\n"
 WORDS = (
     b"pose\n0\n-100\n800\n--load\nnormal\n--force\n500", b"pose\n10\n-20\n800\n5\n-5\n10\n--machine\nnist\n--json",
     b"check\npart.nc\n--dialect\nfanuc\n--block-delete\n2,3", b"path\npart.nc\n--step\n5\n--origin\n1,2,3",
-    b"effects\nshow\nweak_strut", b"machine\nlist\n--json", b"machine\nshow\nnist",
+    b"effects\nshow\nweak_strut", b"machine\nlist\n--json", b"machine\nshow\nnist\n--json",
 )  # fmt: skip
 
 

@@ -98,6 +98,7 @@ class Program:
         block_delete: bool | Iterable[int] = False,
         interpreter: str = "builtin",
         rs274: str | None = None,
+        unconfined: bool = False,
     ) -> Program:
         """A program in a file.
 
@@ -118,6 +119,8 @@ class Program:
             "builtin"; "linuxcnc", LinuxCNC's rs274; "auto", the second where the first refuses.
         rs274
             LinuxCNC's interpreter, if it is not on PATH.
+        unconfined
+            Run it even where bubblewrap, which keeps it from all files but its own, cannot be used.
 
         Raises
         ------
@@ -128,7 +131,7 @@ class Program:
 
         if not is_file(file):
             read_lines(file)  # says what is wrong with it
-        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
+        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274, unconfined)
         return cls(Path(file).name, str(file), *_control(said, block_delete), said=said)
 
     @classmethod
@@ -144,9 +147,10 @@ class Program:
         block_delete: bool | Iterable[int] = False,
         interpreter: str = "builtin",
         rs274: str | None = None,
+        unconfined: bool = False,
     ) -> Program:
         """A program given as text; arguments as of `read`."""
-        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274)
+        said = _said(dialect, controller, offsets, tools, block_delete, interpreter, rs274, unconfined)
         return cls(name, None, *_control(said, block_delete), text, said)
 
     def __repr__(self) -> str:
@@ -218,6 +222,7 @@ def _said(
     block_delete: bool | Iterable[int],
     interpreter: str,
     rs274: str | None,
+    unconfined: bool,
 ) -> dict[str, Any]:
     """What was said of the reading, as options have it; None for what was not."""
     switches = block_delete if isinstance(block_delete, bool) else sorted(block_delete)
@@ -230,6 +235,7 @@ def _said(
         "block_delete": ",".join(map(str, switches)) if isinstance(switches, list) else switches,
         "interpreter": interpreter if interpreter != "builtin" else None,
         "rs274": rs274,
+        "unconfined": unconfined,
     }
 
 
@@ -246,7 +252,8 @@ def _control(said: Mapping[str, Any], block_delete: bool | Iterable[int]) -> tup
         found = replace(found, tools=read_tool_table(said["tools"]))
     switches = block_delete if isinstance(block_delete, bool) else frozenset(block_delete)
     interpreter = said["interpreter"] or "builtin"
-    return found, {"block_delete": switches, "interpreter": interpreter, "rs274": said["rs274"]}
+    by = {name: said[name] for name in ("rs274", "unconfined")}
+    return found, {"block_delete": switches, "interpreter": interpreter, **by}
 
 
 def program_from(program: Program | str | Path) -> Program:

@@ -293,7 +293,7 @@ def _check_shared(on: Machine, other: Machine | None, programs: Iterable[Program
     for program in programs:
         on.running(program, [other] if other else [])
         if program.options["interpreter"] == "linuxcnc":
-            find_rs274(program.options["rs274"])
+            find_rs274(program.options["rs274"], program.options["unconfined"])
 
 
 def _tasks(run: Run, listed: Sequence[Listed], given: dict[str, Program], example: Program) -> list[Task]:

@@ -160,6 +160,11 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
         "auto: the second where the first refuses (default: builtin)",
     )
     group.add_argument("--rs274", metavar="PATH", help="LinuxCNC's interpreter, if it is not on PATH")
+    group.add_argument(
+        "--unconfined",
+        action="store_true",
+        help="run rs274 even where bubblewrap, which keeps it from all files but its own, cannot be used",
+    )
 
 
 def add_machine_options(parser: argparse.ArgumentParser) -> None:
@@ -244,6 +249,7 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
         "block_delete": args.block_delete,
         "interpreter": args.interpreter,
         "rs274": args.rs274,
+        "unconfined": args.unconfined,
     }
 
 

@@ -62,11 +62,13 @@ def read(
     block_delete: bool,
     *,
     rs274: str | None = None,
+    unconfined: bool = False,
     limits: Limits | None = None,
     posted: bool = False,
 ) -> Reading:
     """Read a program (lines without line ends) with `rs274`; `origin`, `default_origin` in mm and degrees.
 
+    `unconfined`: even where bubblewrap cannot be used.
     `posted`: it was posted for another machine, whose rotary axes have one zero for program and machine.
 
     Raises
@@ -76,7 +78,7 @@ def read(
     """
     lines = split(source, name)
     refuse_other_programs(lines, name)
-    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted)
+    session = _Session(source, lines, name, offsets, tools, block_delete, find_rs274(rs274, unconfined), limits, posted)
     return session.read(origin, default_origin)
 
 
