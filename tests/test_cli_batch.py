@@ -266,6 +266,23 @@ def test_ctrl_c_leaves_whole_reports_and_nothing_else(shop):
     assert {path.name for path in (shop / "reports").rglob(".*")} <= {MANIFEST}
 
 
+def test_no_odd_file_in_a_folder_ends_the_others(shop):
+    """Links in a circle or to nowhere, pipes, devices, empty files, zeros, a folder with the name of a program."""
+    odd = shop / "jobs/odd"
+    (odd / "folder.nc").mkdir(parents=True)
+    (odd / "circle.nc").symlink_to(odd / "circle.nc")
+    (odd / "nowhere.nc").symlink_to("/nonexistent")
+    (odd / "device.nc").symlink_to("/dev/zero")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(odd / "pipe.nc")
+    (odd / "empty.nc").touch()
+    (odd / "zeros.nc").write_bytes(b"\0" * 1000)
+    (odd / "nested.nc").write_text("(" * 10_000)
+    assert main(["analyze", "jobs", "--out", "out", *SHORT]) == 1
+    status = {Path(file).name: row["status"] for file, row in rows_of(shop / "out").items() if "odd" in file}
+    assert status == dict.fromkeys(["circle.nc", "empty.nc", "nested.nc", "nowhere.nc", "zeros.nc"], "failed")
+
+
 def test_the_command_shows_what_the_function_returns(shop, capsys):
     seen = []
     found = tps.analyze_many(

@@ -364,7 +364,7 @@ def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], r
     if found and not replace:
         raise FileError(
             f"{str(found[0])!r} is read here and would be written over",
-            hint="write somewhere else, or say --replace: the old file is then kept beside the new one",
+            hint="write somewhere else, or say --replace (replace=True): the old file is kept beside the new one",
         )
     return found
 

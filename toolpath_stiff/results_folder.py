@@ -39,7 +39,7 @@ MANIFEST = ".tps-files.json"
 # In the temporary folder of a run: files that are being written; the same when all are there and nothing is left but
 # to move them to their places; what was moved out of their way.
 NEW, WHOLE, GONE = "new", "whole", "gone"
-ELSEWHERE = "choose another folder with --out, or say --replace: the old file is then kept beside the new one"
+ELSEWHERE = "choose another folder with --out, or say --replace (replace=True): the old file is kept beside the new one"
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,7 @@ class TomlReader:
                 inside = heading[1] == section and seen == nth
                 if inside and not key:
                     return number
-            elif inside and key and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[.=]", line):
+            elif inside and key and re.match(rf"\s*(?:[\"']?{re.escape(key)}[\"']?\s*=|{re.escape(key)}\s*\.)", line):
                 return number
         return None
 
