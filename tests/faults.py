@@ -8,11 +8,13 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from unittest import mock
 
-from toolpath_stiff import results_folder
+from toolpath_stiff import files, results_folder
 
 # What changes a disk. `os.open` counts where it makes a file.
 CALLS = ("open", "write", "fsync", "rename", "replace", "link", "unlink", "mkdir", "rmdir", "chmod", "ftruncate")
@@ -76,6 +78,36 @@ def killed(run: Callable[[], object], number: int) -> bool:
             os._exit(0)
     _, status = os.waitpid(process, 0)
     return os.WIFSIGNALED(status)
+
+
+_heard: list[list[tuple[str, bool]]] = []  # the list of who listens now; a first, empty one stands for the hook
+
+
+def _listen(event: str, args: tuple[object, ...]) -> None:
+    """An audit hook, which stays for good: what is opened to be written, and whether `files` does it."""
+    if len(_heard) < 2 or event != "open" or not isinstance(args[0], str | os.PathLike):
+        return
+    if isinstance(args[2], int) and args[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+        frame, within = sys._getframe(), False
+        while frame is not None and not within:
+            within, frame = frame.f_code.co_filename == files.__file__, frame.f_back
+        _heard[-1].append((os.path.realpath(os.fspath(args[0])), within))
+
+
+@contextmanager
+def all_writes_by_files(folder: Path) -> Iterator[None]:
+    """Whatever is written below a folder is written by `files`, whose points the tests of faults try."""
+    if not _heard:  # the hook cannot be taken away again
+        sys.addaudithook(_listen)
+        _heard.append([])
+    opened: list[tuple[str, bool]] = []
+    _heard.append(opened)
+    try:
+        yield
+    finally:
+        _heard.pop()
+    assert any(within for _, within in opened)
+    assert not [path for path, within in opened if not within and path.startswith(str(folder))]
 
 
 FAULTS = {
