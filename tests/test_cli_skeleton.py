@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
+import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from toolpath_stiff.cli import program as program_commands
 from toolpath_stiff.cli.arguments import pose_argument, range_argument
-from toolpath_stiff.cli.main import COMMANDS, main
+from toolpath_stiff.cli.main import COMMANDS, TRACEBACK, main
+from toolpath_stiff.cli.main import _stop as stop
+from toolpath_stiff.cli.main import _stop_at as stop_at
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import write_atomically
 
@@ -123,18 +130,99 @@ def test_input_errors_are_one_line_without_traceback(part, capsys):
     assert captured.err.startswith("tps: error: part.nc:1:") and captured.err.count("\n") == 1
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), ValueError("a bug")])
-def test_interruption_is_130_and_a_bug_shows(part, monkeypatch, capsys, error):
+def failing(monkeypatch, error):
+    """`tps path` ends with an error that no command foresees."""
+
     def fail(_args):
         raise error
 
     monkeypatch.setitem(program_commands.COMMANDS, "path", (program_commands.path_arguments, fail))
-    if isinstance(error, KeyboardInterrupt):
-        assert main(["path", "part.nc"]) == 130
-        assert "Traceback" not in capsys.readouterr().err
-    else:
-        with pytest.raises(ValueError, match="a bug"):
-            main(["path", "part.nc"])
+
+
+def test_interruption_is_130(part, monkeypatch, capsys):
+    failing(monkeypatch, KeyboardInterrupt())
+    assert main(["path", "part.nc"]) == 130
+    assert capsys.readouterr().err == "tps: interrupted; no file is half-written\n"
+
+
+UNFORESEEN = [
+    (ValueError("a\nbug"), r"an error that should not be \(ValueError, test_cli_skeleton.py:\d+\): a bug"),
+    (np.linalg.LinAlgError("Singular matrix"), r"\(LinAlgError, .*: Singular matrix"),
+    (MemoryError("Unable to allocate 9. GiB"), r"out of memory \(Unable to allocate 9. GiB\): take a larger --step"),
+    (RecursionError("maximum depth"), "nested too deeply"),
+    (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/tmp/x"), "'/tmp/x': No space left on device"),
+    (OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG)), "error: File name too long"),
+    (AssertionError(), "no more is known"),
+]
+
+
+@pytest.mark.parametrize(("error", "told"), UNFORESEEN, ids=lambda one: type(one).__name__)
+def test_what_nobody_foresaw_is_one_line_and_how_to_report_it(part, monkeypatch, capsys, error, told):
+    failing(monkeypatch, error)
+    monkeypatch.delenv(TRACEBACK, raising=False)
+    assert main(["path", "part.nc"]) == 2
+    text = capsys.readouterr().err
+    assert text.startswith("tps: error: ") and text.count("\n") == 1 and re.search(told, text)
+    assert f"{TRACEBACK}=1" in text
+    monkeypatch.setenv(TRACEBACK, "1")
+    assert main(["path", "part.nc"]) == 2
+    assert "Traceback (most recent call last)" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+@pytest.mark.parametrize("words", [["check", "part.nc"], ["path", "part.nc", "--step", "0.01"], ["--help"]])
+def test_a_full_disk_behind_the_output_is_an_error(words, part, monkeypatch, capsys):
+    with Path("/dev/full").open("w") as full:
+        monkeypatch.setattr("sys.stdout", full)
+        assert main(words) == 2
+    assert capsys.readouterr().err == "tps: error: cannot write to standard output: No space left on device\n"
+
+
+def test_where_standard_error_is_full_or_closed_the_exit_code_still_tells(part, monkeypatch):
+    with Path("/dev/full").open("w") as full:
+        monkeypatch.setattr("sys.stderr", full)
+        assert main(["check", "gone.nc"]) == 2
+    monkeypatch.setattr("sys.stderr", None)
+    monkeypatch.setattr("sys.stdout", None)
+    assert main(["check", "gone.nc"]) == 2 and main(["check", "part.nc"]) == 0
+
+
+def test_a_closed_pipe_keeps_the_exit_code_of_require(part, monkeypatch, capsys):
+    end, start = os.pipe()
+    os.close(end)
+    with os.fdopen(start, "w") as pipe:
+        monkeypatch.setattr("sys.stdout", pipe)
+        assert main(["analyze", "part.nc", "--no-plots", "--require", "9000000", "--origin", "0,0,800"]) == 3
+    assert capsys.readouterr().err == ""
+
+
+def test_nothing_from_a_file_steers_the_terminal(part, monkeypatch, capsys):
+    odd = part.with_name("odd\x1b]0;title\x07.nc")
+    odd.write_text("(MSG, \x1b[2J\x9b31m\u202e)\nG1 X10\x1b[31m\n")
+    for words in (["check"], ["path"], ["analyze"], ["pose", "--at"], ["compare"], ["reduce"], ["effects", "check"]):
+        main([*words, odd.name])
+        captured = capsys.readouterr()
+        assert captured.out + captured.err and not set(captured.out + captured.err) & set("\x1b\x07\x9b\u202e")
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signal on this system")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_the_signals_that_end_a_run_interrupt_it_once(name):
+    number = getattr(signal, name)
+    before = {one: signal.getsignal(one) for one in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+        stop_at(stop, signal.SIG_DFL)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+        for again in before:
+            signal.raise_signal(again)  # while it clears up
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # nohup
+        stop_at(stop, signal.SIG_DFL)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
 
 
 def test_a_reader_that_goes_away_is_no_error(part):

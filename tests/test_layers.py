@@ -53,7 +53,7 @@ UPDATING_RANK = {
     "diagnosis": 4,
     "correction": 5,
 }
-RIG_MAY_IMPORT = {"units", "errors", "arrays", "defaults", "files", "results_folder", "rig"}
+RIG_MAY_IMPORT = {"units", "errors", "arrays", "defaults", "toml_reader", "files", "results_folder", "rig"}
 RIG_SHOWN_BY = ("api", "cli")  # a case starts, measures and reveals exercises, as the command does
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
 

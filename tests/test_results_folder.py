@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.faults import all_writes_by_files
 from toolpath_stiff import results_folder
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.cli.outputs import joined_names
@@ -222,7 +223,8 @@ COMMANDS = {  # command -> its arguments without and with pictures left out, the
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_names_its_folder_after_its_data_and_keeps_to_the_rules(command, shop, capsys):
     arguments, folder, file = COMMANDS[command]
-    assert main([*arguments, "--no-plots"]) == 0
+    with all_writes_by_files(shop):
+        assert main([*arguments, "--no-plots"]) == 0
     out = shop / folder
     assert set(json.loads((out / MANIFEST).read_text())["sha256"]) == {p.name for p in out.iterdir()} - {MANIFEST}
     first = tree(out)

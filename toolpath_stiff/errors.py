@@ -27,6 +27,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+# What steers a terminal or turns the order of letters: the control characters but tab and line feed, and Unicode's
+# bidirectional ones (standard annex 9); half of a surrogate pair, which no encoding has.
+STEERING = (*range(9), *range(11, 32), *range(127, 160), 0x61C, 0x200E, 0x200F, *range(0x202A, 0x202F),
+            *range(0x2066, 0x206A), *range(0xD800, 0xE000))  # fmt: skip
+_HARMLESS = dict.fromkeys(STEERING, "?")
+
+
+def harmless(text: str) -> str:
+    """Text as it may go to a terminal."""
+    return text.translate(_HARMLESS)
+
+
+LONGEST_QUOTE = 2000  # characters of what was found: a line, a number or a name may have a million
+
+
+def _cut(found: str) -> str:
+    """What was found, cut in its middle where it is endless."""
+    half = LONGEST_QUOTE // 2
+    return found if len(found) <= LONGEST_QUOTE else f"{found[:half]} ... {found[-half:]}"
+
 
 class TpsError(Exception):
     """Base of every error that the command line turns into one message and an exit code (2)."""
@@ -62,7 +82,7 @@ class InputError(TpsError):
         line: int | None = None,
         column: int | None = None,
     ) -> None:
-        self.found, self.expected, self.hint = found, expected, hint
+        self.found, self.expected, self.hint = _cut(found), expected, hint
         self.file, self.line, self.column = file, line, column
         super().__init__(self._message())
 

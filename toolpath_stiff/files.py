@@ -1,18 +1,47 @@
-"""Files that are whole or not there: write to a temporary name beside the target, then rename."""
+"""Files that are whole or not there: written beside their place and flushed to the disk, then renamed.
+
+What is being written is locked by its process, and the lock ends with the process however that ends: a temporary file
+or folder that nobody holds was left by a run that was killed, and the next run takes it away.
+"""
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import itertools
+import json
 import os
-import tempfile
-from collections.abc import Iterable, Iterator
+import shlex
+import shutil
+import stat
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from toolpath_stiff.errors import FileError
 
+if sys.platform != "win32":  # nothing is locked there, and what a killed run leaves stays
+    import fcntl
+
 NOT_WINDOWS = frozenset(b"\x81\x8d\x8f\x90\x9d")  # bytes that Windows' Latin-1 (cp1252) leaves undefined
+LARGEST_BYTES = 1 << 30  # of a file that is read
+BLOCK = 1 << 20  # bytes written at once
+NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)  # the last is Windows'
+WAIT_SECONDS = 10.0  # for another run that writes to the same place
+LONGEST_NAME = 60  # letters of a target in the name of what lies beside it: names may have 255 bytes
+# renameat2(2); what says that this file system, or this folder, cannot be exchanged
+AT_FDCWD, RENAME_EXCHANGE = -100, 2
+NOT_EXCHANGED = (errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.EPERM, errno.EACCES, errno.EBUSY, errno.EXDEV)
 
 Content = str | bytes | Iterable[str | bytes]
+
+
+def reason(error: OSError) -> str:
+    """What an error of the system says."""
+    return error.strerror or str(error) or type(error).__name__
 
 
 def write_atomically(path: str | Path, content: Content) -> Path:
@@ -31,23 +60,104 @@ def write_atomically(path: str | Path, content: Content) -> Path:
             with target.open("wb") as stream:
                 stream.writelines(encoded(content))
         else:
-            _write_then_rename(target.resolve(), content)
+            _write_then_rename(Path(os.path.realpath(target)), content)
     except OSError as error:
-        raise FileError(f"cannot write {str(path)!r}: {error.strerror}") from None
+        raise FileError(f"cannot write {str(path)!r}: {reason(error)}") from None
     return target
 
 
 def _write_then_rename(target: Path, content: Content) -> None:
+    if target.is_symlink():  # realpath leaves nothing else a link
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
     target.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    prefix = beside(target, "part-")
+    for left in target.parent.iterdir():
+        if left.name.startswith(prefix.name):
+            _remove_if_left(left)
+    handle, temporary = _new_file(prefix)
     try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.writelines(encoded(content))
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(target)
+        try:
+            _write(handle, content)
+        finally:
+            os.close(handle)
+        temporary.replace(target)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
+    sync_folder(target.parent)
+
+
+def _new_file(prefix: Path) -> tuple[int, Path]:
+    """An open file of a new name, held by this process."""
+    while True:
+        path = prefix.with_name(prefix.name + os.urandom(4).hex())
+        handle = os.open(path, NEW_FILE, 0o666)
+        hold(handle)
+        if _is_at(path, handle):  # not taken away by another run between the two calls
+            return handle, path
+        os.close(handle)
+
+
+def write_file(path: Path, content: Content) -> str:
+    """Write a new file where nobody else looks, and flush it to the disk; its SHA-256."""
+    handle = os.open(path, NEW_FILE, 0o666)
+    try:
+        return _write(handle, content)
+    finally:
+        os.close(handle)
+
+
+def _write(handle: int, content: Content) -> str:
+    digest = hashlib.sha256()
+    for block in _blocks(encoded(content)):
+        digest.update(block)
+        rest = memoryview(block)
+        while rest:
+            rest = rest[os.write(handle, rest) :]
+    os.fsync(handle)
+    return digest.hexdigest()
+
+
+def _blocks(pieces: Iterable[bytes]) -> Iterator[bytes]:
+    """The pieces, small ones together."""
+    held = bytearray()
+    for piece in pieces:
+        if len(piece) >= BLOCK and not held:
+            yield piece
+            continue
+        held += piece
+        if len(held) >= BLOCK:
+            yield bytes(held)
+            held.clear()
+    if held:
+        yield bytes(held)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush the names in a folder to the disk, where the system can."""
+    with suppress(OSError):  # a folder that may not be read, a file system that knows no such thing
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def exchange(one: Path, other: Path) -> bool:
+    """Exchange two folders of one file system in one step; False where that cannot be done."""
+    if sys.platform != "linux":
+        return False
+    import ctypes
+
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if rename is None:
+        return False
+    if rename(AT_FDCWD, os.fsencode(one), AT_FDCWD, os.fsencode(other), RENAME_EXCHANGE) == 0:
+        return True
+    code = ctypes.get_errno()
+    if code in NOT_EXCHANGED:
+        return False
+    raise OSError(code, os.strerror(code), str(other))
 
 
 def encoded(content: Content) -> Iterator[bytes]:
@@ -59,18 +169,170 @@ def encoded(content: Content) -> Iterator[bytes]:
             yield piece.encode("utf-8", "replace") if isinstance(piece, str) else piece
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+# -- who writes where --------------------------------------------------------------------------------------------------
 
 
-def read_bytes(path: str | Path, what: str) -> bytes:
-    """Content of a file; `what` names it in messages. Raises `InputError`."""
+def beside(target: Path, what: str) -> Path:
+    """The name beside a file or folder of what belongs to it while it is written."""
+    name = target.name
+    if len(name) > LONGEST_NAME:  # the letters of a name are up to four bytes
+        digest = hashlib.sha256(os.fsencode(name)).hexdigest()[:16]
+        name = f"{name[:LONGEST_NAME]}-{digest}"
+    return target.with_name(f".{name}.tps-{what}")
+
+
+def hold(handle: int) -> bool:
+    """Lock an open file or folder until it is closed, or its process ends; False where another holds it.
+
+    True as well where the file system knows no locks: nobody is kept out there.
+    """
+    if sys.platform == "win32":
+        return True
     try:
-        return Path(path).read_bytes()
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        raise FileError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+        return not isinstance(error, BlockingIOError | PermissionError)
+    return True
+
+
+def is_left(path: Path) -> bool:
+    """Whether something that is locked while it is used is there and not locked: its process was killed."""
+    if sys.platform == "win32":
+        return False
+    try:
+        handle = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:  # held, or no locks here: nobody can tell
+        return False
+    finally:
+        os.close(handle)
+    return True
+
+
+def _remove_if_left(path: Path) -> None:
+    if is_left(path):
+        with suppress(OSError):
+            path.unlink()
+
+
+def _is_at(path: Path, handle: int) -> bool:
+    try:
+        return os.path.samestat(path.stat(), os.fstat(handle))
+    except OSError:
+        return False
+
+
+@contextmanager
+def locked(lock: Path, what: str, wait: float | None = None) -> Iterator[None]:
+    """Hold a lock file, which says who does: process, host, command.
+
+    Parameters
+    ----------
+    lock
+        Its name; made, and removed at the end.
+    what
+        What is written under it, for the message.
+    wait
+        Seconds to wait for another run, `WAIT_SECONDS` unless given.
+
+    Raises
+    ------
+    InputError
+        Another run holds it; the message names that run.
+    """
+    import socket
+
+    end = time.monotonic() + (WAIT_SECONDS if wait is None else wait)
+    while True:
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        if hold(handle) and _is_at(lock, handle):
+            break
+        holder = _holder(handle)
+        os.close(handle)
+        if holder and time.monotonic() > end:
+            raise FileError(f"{what} is being written by {holder}", hint="wait for it, or choose another folder")
+        time.sleep(0.02)
+    try:
+        command = shlex.join([Path(sys.argv[0] or "python").name, *sys.argv[1:]])[:500]
+        told = {"process": os.getpid(), "host": socket.gethostname(), "command": command}
+        os.ftruncate(handle, 0)
+        os.write(handle, (json.dumps(told) + "\n").encode())
+        yield
+    finally:
+        with suppress(OSError):
+            lock.unlink()
+        os.close(handle)
+
+
+def _holder(handle: int) -> str:
+    """Who wrote a lock file."""
+    try:
+        told = json.loads(os.read(handle, 4096))
+        return f"another run: {told['command']} (process {told['process']} on {told['host']})"
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # it has not written its name yet
+        return "another run"
+
+
+@contextmanager
+def temporary_folder(prefix: str) -> Iterator[Path]:
+    """A new folder among the system's temporary ones, removed at the end; those of killed runs are removed as well."""
+    import tempfile
+
+    place = Path(tempfile.gettempdir())
+    for left in place.glob(f"{prefix}*"):
+        if left.is_dir() and not left.is_symlink() and is_left(left):
+            shutil.rmtree(left, ignore_errors=True)
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
+        handle = os.open(folder, os.O_RDONLY) if sys.platform != "win32" else None
+        if handle is None or (hold(handle) and _is_at(folder, handle)):
+            break
+        os.close(handle)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if handle is not None:
+            os.close(handle)
+
+
+# -- reading -----------------------------------------------------------------------------------------------------------
+
+
+def is_file(path: str | Path) -> bool:
+    """Whether there is such a file; False as well for a name that none can have (too long, a circle of links)."""
+    try:
+        return Path(path).is_file()
+    except OSError:
+        return False
+
+
+def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
+    """Content of a file; `what` names it in messages, `most` are the bytes that it may have. Raises `InputError`."""
+    try:
+        with Path(path).open("rb") as stream:
+            content = _read(stream, most)
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        told = reason(error) if isinstance(error, OSError) else str(error)
+        raise FileError(f"cannot read {what} {str(path)!r}: {told}") from None
+    if len(content) > most:
+        raise FileError(f"{what} {str(path)!r} has more than {most / 1e6:.0f} MB", hint="is it the right file?")
+    return content
+
+
+def _read(stream: BinaryIO, most: int) -> bytes:
+    """All of it, or a little more than it may have; a device may go on for ever."""
+    state = os.fstat(stream.fileno())
+    if stat.S_ISREG(state.st_mode) and state.st_size <= most:
+        return stream.read()
+    pieces, length = [], 0
+    while length <= most and (piece := stream.read(BLOCK)):
+        pieces.append(piece)
+        length += len(piece)
+    return b"".join(pieces)
 
 
 def decoded(content: bytes) -> str:
@@ -97,12 +359,12 @@ def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], r
 
     Raises `InputError` for the first of them unless `replace`.
     """
-    given = [Path(file) for file in inputs if Path(file).is_file()]
+    given = [Path(file) for file in inputs if is_file(file)]
     found = [Path(out) for out in outputs if any(_is_same(Path(out), file) for file in given)]
     if found and not replace:
         raise FileError(
             f"{str(found[0])!r} is read here and would be written over",
-            hint="write somewhere else, or say --replace: the old file is then kept beside the new one",
+            hint="write somewhere else, or say --replace (replace=True): the old file is kept beside the new one",
         )
     return found
 
@@ -122,10 +384,11 @@ def keep_old(file: str | Path) -> Path | None:
     path = Path(file)
     if not path.is_file():
         return None
+    kept = path.with_name(free_name(path.name, lambda name: os.path.lexists(path.with_name(name))))
+    return write_atomically(kept, read_bytes(path, "file"))
+
+
+def free_name(name: str, taken: Callable[[str], bool]) -> str:
+    """`NAME.old`, or `NAME.old2` and so on, whichever is not taken first."""
     numbers = itertools.chain([""], itertools.count(2))
-    names = (path.with_name(f"{path.name}.old{number}") for number in numbers)
-    kept = next(name for name in names if not name.exists() and not name.is_symlink())
-    try:
-        return write_atomically(kept, path.read_bytes())
-    except OSError as error:
-        raise FileError(f"cannot read {str(path)!r}: {error.strerror}") from None
+    return next(free for number in numbers if not taken(free := f"{name}.old{number}"))

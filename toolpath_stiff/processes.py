@@ -19,10 +19,10 @@ import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from multiprocessing import connection, get_context, resource_tracker
+from multiprocessing import connection, get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Any, ParamSpec, TypeVar
 
 from toolpath_stiff.defaults import THREADS
@@ -32,6 +32,7 @@ Arguments = ParamSpec("Arguments")
 Answer = TypeVar("Answer")
 
 LEAVE_SECONDS = 5.0  # for a process that is told to stop, to remove its temporary files
+BLOCKED = [getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGTERM") if hasattr(signal, name)]
 _ONE_BY_ONE = threading.Lock()  # processes are started and reaped by one thread at a time
 
 
@@ -214,9 +215,12 @@ def _serve(pipe: Connection) -> None:
     """The life of a process: calls in, answers out, until the pipe closes or a signal says to stop."""
     # Ctrl-C reaches all processes of a terminal; the first one tells the others, once.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, interrupt)
+    if hasattr(signal, "SIGHUP"):  # so does the end of the terminal
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # what is half-written is removed on the way out
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, BLOCKED)
+    threading.Thread(target=_end_with_the_first, daemon=True).start()
     with suppress(EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
         while True:
             pipe.send_bytes(_answer(pipe.recv_bytes()))
@@ -237,20 +241,25 @@ def _answer(message: bytes) -> bytes:
         return answer
 
 
-def interrupt(number: int, frame: FrameType | None) -> None:
-    """A signal handler that stops as Ctrl-C does: what is half-written is removed on the way out."""
-    raise KeyboardInterrupt
+def _end_with_the_first() -> None:
+    """Stop when the process that hands out the calls is gone, however it ended: nobody wants the answer."""
+    first = parent_process()
+    if first is not None:
+        connection.wait([first.sentinel])
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(LEAVE_SECONDS)
+        os._exit(1)  # a long call in a library sees no signal
 
 
 @contextmanager
 def _surroundings() -> Iterator[None]:
-    """What a process starts with: Ctrl-C waits until it has its own handler; one thread for linear algebra."""
+    """What a process starts with: signals wait until it has its own handlers; one thread for linear algebra."""
     before = {name: os.environ.get(name) for name in THREADS}
     one_thread()
     mask = None
     if hasattr(signal, "pthread_sigmask"):
         resource_tracker.ensure_running()  # started together with the process it would lift the mask
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, BLOCKED)
     try:
         yield
     finally:

@@ -4,6 +4,11 @@ A small manifest (`.tps-files.json`) names the files that a run wrote, with thei
 and nothing else: a file that the tool did not write, or that was changed since, is somebody's own. It stays where the
 run has no file of that name, and where it has one, nothing is written at all. A folder without a manifest holds nothing
 of the tool's.
+
+The new files are written into a folder beside it and flushed to the disk. Then the two folders are exchanged, which is
+one step: whatever stops a run, the folder holds the old files or the new. A folder that cannot be exchanged (it has
+folders in it, it is the current one, the file system does not do it) gets its files one by one: an error takes all of
+them back, and what a kill cuts off there the next run carries to its end.
 """
 
 from __future__ import annotations
@@ -12,18 +17,29 @@ import hashlib
 import json
 import os
 import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from toolpath_stiff.errors import FileError
-from toolpath_stiff.files import Content, check_outputs, encoded, keep_old, write_atomically
+from toolpath_stiff.files import (
+    Content,
+    beside,
+    check_outputs,
+    exchange,
+    free_name,
+    locked,
+    reason,
+    sync_folder,
+    write_file,
+)
 
 MANIFEST = ".tps-files.json"
-STAGE = ".tps-{process}-"  # begins the name of the temporary folder of a run
-ELSEWHERE = "choose another folder with --out, or say --replace: the old file is then kept beside the new one"
+# In the temporary folder of a run: files that are being written; the same when all are there and nothing is left but
+# to move them to their places; what was moved out of their way.
+NEW, WHOLE, GONE = "new", "whole", "gone"
+ELSEWHERE = "choose another folder with --out, or say --replace (replace=True): the old file is kept beside the new one"
 
 
 @dataclass(frozen=True)
@@ -107,30 +123,31 @@ def write_folder(
     InputError
         A file of such a name is not the tool's, is an input, or the folder cannot be written. Nothing is changed then.
     """
-    target = Path(folder)
-    with _folders_above(target):
-        in_the_way = check_folder(target, contents, rules)
+    target = Path(os.path.realpath(folder))
+    with _errors_of(folder), _folders_above(target), locked(_lock(target), repr(str(folder))):
+        _clear_up_held(target)
+        in_the_way = _refused(Path(folder), contents, rules)
         old = read_manifest(target)
-        exists = target.is_dir()
-        place = target if exists else target.absolute().parent
-        stage = Path(tempfile.mkdtemp(dir=place, prefix=STAGE.format(process=os.getpid())))
+        stage = _stage(target)
         try:
-            made = stage / "results"
-            made.mkdir()
-            hashes = {name: _write(made / name, content) for name, content in contents.items()}
-            new = Manifest(command, _relative(target, rules.of), {name: (sha,) for name, sha in hashes.items()})
-            for file in in_the_way:
-                kept = keep_old(file)
-                if kept is not None and rules.kept is not None:
-                    rules.kept(file, kept)
-            if exists:
-                _move_into(target, made, old, new)
-            else:
-                write_atomically(made / MANIFEST, new.text())
-                made.rename(target)
+            new = stage / NEW
+            new.mkdir(parents=True)
+            hashes = {name: write_file(new / name, _made(content)) for name, content in contents.items()}
+            manifest = Manifest(command, _relative(target, rules.of), {name: (sha,) for name, sha in hashes.items()})
+            write_file(new / MANIFEST, manifest.text())
+            kept = _put(target, stage, old, [file.name for file in in_the_way])
         finally:
-            shutil.rmtree(stage, ignore_errors=True)
-    return [target / name for name in contents]
+            for one in _stages(target):
+                if not (one / WHOLE / MANIFEST).exists():  # else it could not be taken back: the next run carries it on
+                    shutil.rmtree(one, ignore_errors=True)
+    for name, kept_as in kept.items():
+        if rules.kept is not None:
+            rules.kept(Path(folder) / name, Path(folder) / kept_as)
+    return [Path(folder) / name for name in contents]
+
+
+def _made(content: Content | Callable[[], Content]) -> Content:
+    return content() if callable(content) else content
 
 
 def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules()) -> list[Path]:
@@ -141,7 +158,13 @@ def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules(
     InputError
         As `write_folder`.
     """
-    target, names = Path(folder), list(names)
+    with _errors_of(folder):
+        clear_up([folder])
+        return _refused(Path(folder), names, rules)
+
+
+def _refused(target: Path, names: Iterable[str], rules: Rules) -> list[Path]:
+    names = list(names)
     nearest = next(path for path in (target, *target.absolute().parents) if os.path.lexists(path))
     if not nearest.is_dir():
         raise FileError(f"cannot write to {str(target)!r}: {str(nearest)!r} is not a folder")
@@ -209,45 +232,171 @@ def _relative(folder: Path, of: Sequence[str]) -> tuple[str, ...]:
     return tuple(Path(os.path.relpath(one, folder)).as_posix() if Path(one).exists() else one for one in of)
 
 
-def _write(path: Path, content: Content | Callable[[], Content]) -> str:
-    """Write one file; its SHA-256."""
-    digest = hashlib.sha256()
-
-    def pieces() -> Iterator[bytes]:
-        for piece in encoded(content() if callable(content) else content):
-            digest.update(piece)
-            yield piece
-
-    write_atomically(path, pieces())
-    return digest.hexdigest()
+# -- to their places ---------------------------------------------------------------------------------------------------
 
 
-def _move_into(folder: Path, made: Path, old: Manifest, new: Manifest) -> None:
-    """Rename the new files to their places, clear what is left of the earlier run.
+def _lock(folder: Path) -> Path:
+    """The lock file of a folder: beside it, or in it where beside it nothing can be written."""
+    return beside(folder, "lock") if os.access(folder.parent, os.W_OK) else folder / ".tps-lock"
 
-    The manifest is written before and after: cut off in between, the next run knows the old files and the new as ours.
+
+def _stages(folder: Path) -> tuple[Path, Path]:
+    """Where the temporary folder of a run may be: beside the folder, or in it."""
+    return beside(folder, "stage"), folder / ".tps-stage"
+
+
+def _stage(folder: Path) -> Path:
+    """Where it is this time: beside what is new or can be exchanged."""
+    outside, inside = _stages(folder)
+    return outside if not folder.is_dir() or _can_be_exchanged(folder) else inside
+
+
+def _can_be_exchanged(folder: Path) -> bool:
+    """Whether a folder holds files alone, is nobody's current one and lies in one that we may write to."""
+    if folder == Path(os.path.realpath(".")) or folder.is_mount() or not os.access(folder.parent, os.W_OK):
+        return False
+    with os.scandir(folder) as entries:
+        return all(entry.is_file(follow_symlinks=False) or entry.is_symlink() for entry in entries)
+
+
+def _put(folder: Path, stage: Path, old: Manifest, in_the_way: Iterable[str]) -> dict[str, str]:
+    """The new files to their places, those of the earlier run away; what is in the way -> the name that it gets."""
+    new = stage / NEW
+    sync_folder(new)
+    if not folder.is_dir():
+        new.rename(folder)
+        sync_folder(folder.parent)
+        return {}
+    kept = {name: free_name(name, lambda free: os.path.lexists(folder / free)) for name in in_the_way}
+    own = [name for name in _own(folder, old) if name not in kept]
+    if stage.parent != folder:
+        if _exchanged(folder, new, own, kept):
+            return kept
+        inside = _stages(folder)[1]
+        inside.mkdir()
+        new.rename(inside / NEW)
+        stage = inside
+    (stage / NEW).rename(stage / WHOLE)
+    sync_folder(stage)
+    _move_in(folder, stage, old, kept)
+    return kept
+
+
+def _own(folder: Path, old: Manifest) -> list[str]:
+    """The names in a folder that are the tool's: the manifest, and the files that are as they were written."""
+    return [name for name in (MANIFEST, *old.files) if name == MANIFEST or _is_ours(folder, name, old)]
+
+
+def _exchanged(folder: Path, new: Path, own: Sequence[str], kept: Mapping[str, str]) -> bool:
+    """Give the new folder what is the user's in the old one, and exchange them; False where that cannot be done."""
+    taken = {name: kept.get(name, name) for name in _names(folder) if name not in own}
+    linked = []
+    try:
+        for name, becomes in taken.items():
+            os.link(folder / name, new / becomes, follow_symlinks=False)
+            linked.append(becomes)
+        state = folder.stat()
+        new.chmod(state.st_mode & 0o7777)
+        if new.stat().st_gid != state.st_gid:
+            os.chown(new, -1, state.st_gid)
+    except OSError:  # no hard links here, say
+        done = False
+    else:
+        sync_folder(new)
+        done = exchange(new, folder)
+    if not done:
+        for becomes in linked:
+            (new / becomes).unlink()
+        return False
+    sync_folder(folder.parent)
+    for name in _names(new):  # written by somebody else in this very moment
+        now = folder / taken.get(name, name)
+        if name not in own and not (os.path.lexists(now) and os.path.samestat((new / name).lstat(), now.lstat())):
+            (new / name).replace(now)
+    return True
+
+
+def _names(folder: Path) -> list[str]:
+    return [entry.name for entry in folder.iterdir()]
+
+
+def _move_in(folder: Path, stage: Path, old: Manifest, kept: Mapping[str, str], again: bool = False) -> None:
+    """One by one, the manifest first away and last in place; an error takes all of it back.
+
+    `again`: a run was killed in the midst of it. There is no way back then, and an error leaves it to the next run.
     """
-    both = {name: old.files.get(name, ()) + new.files.get(name, ()) for name in (*old.files, *new.files)}
-    write_atomically(folder / MANIFEST, Manifest(new.command, new.of, both).text())
-    for name in new.files:
-        (made / name).replace(folder / name)
-    for name in set(old.files) - set(new.files):
-        if _is_ours(folder, name, old):
-            (folder / name).unlink()
-    write_atomically(folder / MANIFEST, new.text())
+    whole, gone = stage / WHOLE, stage / GONE
+    moves: list[tuple[Path, Path]] = []
+
+    def move(one: Path, to: Path) -> None:
+        one.rename(to)
+        moves.append((one, to))
+
+    try:
+        gone.mkdir(exist_ok=True)
+        new = read_manifest(whole)
+        for name, becomes in kept.items():
+            move(folder / name, folder / becomes)
+        for name in (MANIFEST, *old.files):
+            arrived = name in new.files and not (whole / name).exists()  # before the kill that this run makes good
+            if not arrived and (_is_ours(folder, name, old) if name != MANIFEST else (folder / name).exists()):
+                move(folder / name, gone / name)
+        for name in (*new.files, MANIFEST):
+            if (whole / name).exists():
+                if os.path.lexists(folder / name):  # somebody put it there since the run was killed
+                    move(folder / name, folder / free_name(name, lambda free: os.path.lexists(folder / free)))
+                move(whole / name, folder / name)
+        sync_folder(folder)
+    except BaseException:
+        if not again:
+            for one, to in reversed(moves):
+                to.rename(one)
+            whole.rename(stage / NEW)
+        raise
+
+
+def clear_up(folders: Iterable[str | Path]) -> None:
+    """Take away what killed runs left for folders and beside them; one that had all its files is carried to its end."""
+    targets = [Path(os.path.realpath(folder)) for folder in folders]
+    for parent in dict.fromkeys(target.parent for target in targets):
+        for left in (*parent.glob(".*.tps-stage"), *parent.glob(".*.tps-lock")):
+            lock = left.with_name(left.name.rpartition("-")[0] + "-lock")
+            with suppress(FileError, OSError), locked(lock, repr(str(left)), wait=0.0):  # a run that lives holds it
+                shutil.rmtree(left, ignore_errors=True)
+    for target in targets:
+        if _stages(target)[1].exists():
+            with locked(_lock(target), repr(str(target))):
+                _clear_up_held(target)
+
+
+def _clear_up_held(folder: Path) -> None:
+    """The same of one folder, whose lock this run holds."""
+    outside, inside = _stages(folder)
+    if (inside / WHOLE / MANIFEST).exists():
+        began = (inside / GONE / MANIFEST).exists()
+        _move_in(folder, inside, read_manifest(inside / GONE if began else folder), {}, again=True)
+    for stage in (outside, inside):
+        shutil.rmtree(stage, ignore_errors=True)
 
 
 @contextmanager
 def _folders_above(folder: Path) -> Iterator[None]:
-    """Make the folders above; those are taken away again after an error, which becomes an `InputError`."""
-    made = [parent for parent in folder.absolute().parents if not parent.exists()]
+    """Make the folders above; those are taken away again after an error."""
+    made = [parent for parent in folder.parents if not parent.exists()]
     try:
-        folder.absolute().parent.mkdir(parents=True, exist_ok=True)
+        folder.parent.mkdir(parents=True, exist_ok=True)
         yield
-    except BaseException as error:
+    except BaseException:
         for parent in made:
             with suppress(OSError):  # not empty: someone else uses it by now
                 parent.rmdir()
-        if isinstance(error, OSError):
-            raise FileError(f"cannot write to {str(folder)!r}: {error.strerror}") from None
         raise
+
+
+@contextmanager
+def _errors_of(folder: str | Path) -> Iterator[None]:
+    """An error of the system becomes an `InputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(f"cannot write to {str(folder)!r}: {reason(error)}") from None

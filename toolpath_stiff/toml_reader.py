@@ -13,7 +13,12 @@ from typing import Any, TypeGuard
 
 from toolpath_stiff.errors import InputError
 
-HEADING = re.compile(r"\s*\[\[?\s*([\w.]+)\s*\]")
+LARGEST_BYTES = 4_000_000
+MOST_PARTS = 64  # of a dotted key: tomllib's time grows with their square
+DEEPEST = 32  # arrays and tables in each other
+LARGEST_INTEGER = 2**63 - 1  # TOML 1.0: "64-bit signed integers"
+LONG_KEY = re.compile(rf"""(?:\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+){{{MOST_PARTS}}}""")
+HEADING = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]")
 NTH = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -36,20 +41,61 @@ class TomlReader:
         import tomllib
 
         self.file, self.lines, self.kind = file, text.splitlines(), kind
+        self._check_size(text)
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
-            line, column = (int(place[1]), int(place[2])) if place else (None, None)
+            line, column = (int(place[1]), int(place[2])) if place else (len(self.lines), None)  # at its end
             reason = str(error).split(" (at ")[0]
             found = f"{what} is not TOML: {reason}" if what else f"not valid TOML: {reason}"
             raise kind(found, file=file, line=line, column=column) from None
+        except RecursionError:
+            raise self._too_deep(self._deepest_line()) from None
+        except ValueError:  # an integer of thousands of digits
+            raise self._too_large(re.compile(r"\d[\d_]{999}")) from None
+        self._check_values()
+
+    def _check_size(self, text: str) -> None:
+        if len(text) > LARGEST_BYTES:
+            raise self.kind(f"more than {LARGEST_BYTES / 1e6:.0f} MB", hint="is it the right file?", file=self.file)
+        for number, line in enumerate(self.lines, 1):
+            if line.count(".") > MOST_PARTS and LONG_KEY.search(line):
+                raise self.kind(f"a key of more than {MOST_PARTS} parts", file=self.file, line=number)
+
+    def _check_values(self) -> None:
+        """Refuse what is nested too deeply, and integers that TOML does not know."""
+        level: list[Any] = [self.data]
+        for _ in range(DEEPEST):
+            if not level:
+                return
+            inner = [value for one in level for value in (one.values() if isinstance(one, dict) else one)]
+            for value in inner:
+                if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+                    raise self._too_large(re.compile(r"[\da-fA-F][\d_a-fA-F]{15,}"))
+            level = [value for value in inner if isinstance(value, dict | list)]
+        if level:
+            raise self._too_deep(self._deepest_line())
+
+    def _too_deep(self, line: int) -> InputError:
+        return self.kind("arrays or tables within each other", expected=f"at most {DEEPEST}", file=self.file, line=line)
+
+    def _deepest_line(self) -> int:
+        """The line with the most brackets."""
+        counts = [line.count("[") + line.count("{") for line in self.lines]
+        return counts.index(max(counts)) + 1
+
+    def _too_large(self, digits: re.Pattern[str]) -> InputError:
+        """The first integer that looks like it."""
+        line = next((number for number, line in enumerate(self.lines, 1) if digits.search(line)), None)
+        return self.kind("an integer beyond 64 bits", expected="a smaller number", file=self.file, line=line)
 
     @classmethod
     def read(cls, path: str | Path, what: str, kind: type[InputError] = InputError) -> TomlReader:
         """Read a file, as the constructor. Raises `kind` if it cannot be read or is not TOML."""
         try:
-            text = Path(path).read_text(encoding="utf-8-sig")
+            with Path(path).open("rb") as stream:
+                text = stream.read(LARGEST_BYTES + 1).decode("utf-8-sig")  # one more than the constructor takes
         except OSError as error:
             raise kind(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
         except UnicodeDecodeError:
@@ -66,7 +112,7 @@ class TomlReader:
                 inside = heading[1] == section and seen == nth
                 if inside and not key:
                     return number
-            elif inside and key and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
+            elif inside and key and re.match(rf"\s*(?:[\"']?{re.escape(key)}[\"']?\s*=|{re.escape(key)}\s*\.)", line):
                 return number
         return None
 
@@ -89,7 +135,8 @@ class TomlReader:
             if line is not None:
                 return line
         nth = NTH.fullmatch(where)
-        return self.line_of(nth[1], "", int(nth[2]) - 1) if nth else self.line_of(where)
+        line = self.line_of(nth[1], "", int(nth[2]) - 1) if nth else self.line_of(where)
+        return line or next((n for n, text in enumerate(self.lines, 1) if _heads_part_of(text, where)), None)
 
     def error(self, found: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
         """An error at the line of the dotted name `where`."""
@@ -132,6 +179,12 @@ class TomlReader:
         if not isinstance(value, dict):
             raise self.error(f"{where} = {value!r}", expected, where=where)
         return value
+
+
+def _heads_part_of(line: str, where: str) -> bool:
+    """Whether a line is the heading of a table within a table."""
+    heading = HEADING.match(line)
+    return heading is not None and heading[1].startswith(f"{where}.")
 
 
 def is_number(value: object) -> TypeGuard[int | float]:

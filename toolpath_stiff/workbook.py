@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import re
 import warnings
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from toolpath_stiff.errors import InputErrors, TableError
@@ -52,7 +52,7 @@ def counts(cells: list[str]) -> bool:
 def split_name(path: str) -> tuple[str, str]:
     """File and sheet of `FILE.xlsx#SHEET`; a file that has the whole name comes first."""
     found = re.fullmatch(r"(.+\.xls[xm])#(.+)", path, re.IGNORECASE)
-    return (path, "") if found is None or Path(path).exists() else (found[1], found[2])
+    return (path, "") if found is None or os.path.lexists(path) else (found[1], found[2])
 
 
 def is_workbook(content: bytes) -> bool:
@@ -117,7 +117,7 @@ def _refuse_large(content: bytes, file: str) -> None:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = archive.namelist()
             size = sum(part.file_size for part in archive.infolist())
-    except zipfile.BadZipFile:
+    except Exception:  # a damaged one, or of a kind that the library does not know
         raise TableError("a damaged Excel workbook", hint=SAVE_AS, file=file) from None
     if "xl/workbook.xml" not in names:
         raise TableError("neither text nor an Excel workbook", hint=SAVE_AS, file=file)

@@ -94,8 +94,8 @@ def started(monkeypatch):
         raise InputError("started")
 
     monkeypatch.setattr(linuxcnc, "run_rs274", run)
-    monkeypatch.setattr(linuxcnc, "find_rs274", lambda path=None: "/usr/bin/rs274")
-    monkeypatch.setattr(runner, "find_rs274", lambda path=None: "/usr/bin/rs274")
+    monkeypatch.setattr(linuxcnc, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
+    monkeypatch.setattr(runner, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
     return runs
 
 
@@ -254,8 +254,9 @@ def test_a_program_is_not_changed_and_a_run_leaves_no_trace_in_the_next(tmp_path
     assert file.read_bytes() == before and list(tmp_path.iterdir()) == [file]
 
 
-def read_limited(text: str, limits: Limits) -> linuxcnc.Reading:
-    return linuxcnc.read(text.split("\n"), "part.nc", None, ZERO, Offsets(), None, False, limits=limits)
+def read_limited(text: str, limits: Limits, unconfined: bool = False) -> linuxcnc.Reading:
+    lines = text.split("\n")
+    return linuxcnc.read(lines, "part.nc", None, ZERO, Offsets(), None, False, limits=limits, unconfined=unconfined)
 
 
 @needs_rs274
@@ -264,7 +265,7 @@ def test_an_endless_loop_ends(confined, monkeypatch):
     if not confined:
         monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
     with pytest.raises(InputError, match=r"part\.nc.*after 1 s of processor time.*endless loop"):
-        read_limited("G1 X1 F100\no100 while [1]\n#1 = 1\no100 endwhile\nM2", Limits(seconds=1))
+        read_limited("G1 X1 F100\no100 while [1]\n#1 = 1\no100 endwhile\nM2", Limits(seconds=1), not confined)
 
 
 @needs_rs274

@@ -280,11 +280,15 @@ def test_the_report_names_who_read_the_program(tmp_path, capsys):
 
 
 @needs_rs274
-def test_without_bubblewrap_it_reads_the_same(monkeypatch):
+def test_without_bubblewrap_it_is_refused_unless_that_is_wanted(monkeypatch):
     text = "#1 = 5\nG1 X#1 F100\nG2 X15 I5\n"
     confined = linuxcnc(text).moves
     monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
-    assert_same(confined, linuxcnc(text).moves)
+    with pytest.raises(
+        InputError, match=r"bubblewrap.* is not there or may not work\. Install bubblewrap .*--unconfined"
+    ):
+        linuxcnc(text)
+    assert_same(confined, linuxcnc(text, unconfined=True).moves)
 
 
 @needs_rs274

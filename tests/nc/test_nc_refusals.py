@@ -120,6 +120,9 @@ def test_missing_file_and_folder(tmp_path):
         ("tool,length_mm\n1,10\n1,20", "appears twice"),
         ("T1 P1 Z5 D6\nnonsense", "not a tool"),
         ("T1 Z1e9", "Z = "),
+        ("T1 Z5\nT\N{SUPERSCRIPT TWO} Z5", "tools.tbl:2: .* is not a tool"),
+        (f"T{'1' * 5000} Z5", "is not a tool"),
+        (f'tool,length_mm,remark\n1,5,"{"x" * 140_000}"', "tools.tbl:2: not a row of CSV: field larger"),
     ],
 )
 def test_bad_tool_tables(tmp_path, table, words):

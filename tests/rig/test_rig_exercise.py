@@ -162,6 +162,9 @@ def test_custom_campaign_and_paper_layout(tmp_path):
         ("x_mm,y_mm,z_mm,direction,mood\n0,0,800,X,good\n", "unknown column 'mood'"),
         ("x_mm,y_mm,z_mm,direction,loop\n0,0,800,X,floor\n", "loop 'floor'"),
         ("x_mm,y_mm,z_mm,direction,clamp\n0,0,800,X,1.5\n", "whole number"),
+        (f"x_mm,y_mm,z_mm,direction,clamp\n0,0,800,X,{'1' * 5000}\n", "whole number"),
+        ("x_mm,y_mm,z_mm,direction\r0,0,800,X\r0,0,800,W\r", "plan.csv:3: direction 'W'"),
+        (f"x_mm,y_mm,z_mm,direction\n0,0,800,{'X' * 140_000}\n", "plan.csv:2: not a CSV file: field larger"),
     ],
 )
 def test_bad_plans_are_named_and_nothing_is_written(blind, tmp_path, capsys, content, message):

@@ -245,6 +245,7 @@ def check_program(
     block_delete: Switches = False,
     interpreter: str = "builtin",
     rs274: str | None = None,
+    unconfined: bool = False,
 ) -> dict[str, Any]:
     """Everything that is to be said of a program, in the shop's units.
 
@@ -256,12 +257,14 @@ def check_program(
         Whose reach and strut speeds are checked; None: the program alone.
     origin, step, strut_speed
         Where program zero sits (m, rad); distance of the samples, m; largest speed of a strut, m/s.
-    controller, block_delete, interpreter, rs274
+    controller, block_delete, interpreter, rs274, unconfined
         As of `read_program`.
     """
     default = machine.default_origin if machine else ZERO
-    reading: dict[str, Any] = {"block_delete": block_delete, "controller": controller, "rs274": rs274}
-    checked, reader = check_by(interpreter, lines, name, origin=origin, default_origin=default, **reading)
+    run: dict[str, Any] = {"rs274": rs274, "unconfined": unconfined, "controller": controller}
+    checked, reader = check_by(
+        interpreter, lines, name, origin=origin, default_origin=default, block_delete=block_delete, **run
+    )
     findings: list[Finding] = list(checked.findings)
     found = Figures({}, {}, {}, {})
     speed: dict[str, float] = {}

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import options
 from toolpath_stiff.units import Pose, pose_in_mm, pose_in_si
 
@@ -73,6 +74,7 @@ class Reading(TypedDict, total=False):
     rs274: str | None
     feed_mm_per_min: float | None
     subprograms: str | Path | None
+    unconfined: bool
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,7 @@ class Program:
         rs274: str | None = None,
         feed_mm_per_min: float | None = None,
         subprograms: str | Path | None = None,
+        unconfined: bool = False,
     ) -> Program:
         """A program in a file.
 
@@ -138,6 +141,8 @@ class Program:
             Feed of cuts before the program's first F (a cutter-location file's first FEDRAT), mm/min.
         subprograms
             Folder of the files that the program calls (`o<name> call`, `M98 P1234`); without it none is opened.
+        unconfined
+            Run it even where bubblewrap, which keeps it from all files but its own, cannot be used.
 
         Raises
         ------
@@ -146,10 +151,19 @@ class Program:
         """
         from toolpath_stiff.nc.words import read_lines
 
-        if not Path(file).is_file():
+        if not is_file(file):
             read_lines(file)  # says what is wrong with it
         said = _said(
-            dialect, controller, offsets, tools, block_delete, interpreter, rs274, feed_mm_per_min, subprograms
+            dialect,
+            controller,
+            offsets,
+            tools,
+            block_delete,
+            interpreter,
+            rs274,
+            feed_mm_per_min,
+            subprograms,
+            unconfined,
         )
         return cls(Path(file).name, str(file), *_control(said, block_delete), said=said)
 
@@ -230,6 +244,7 @@ def _said(
     rs274: str | None = None,
     feed_mm_per_min: float | None = None,
     subprograms: str | Path | None = None,
+    unconfined: bool = False,
 ) -> dict[str, Any]:
     """What was said of the reading, as options have it; None for what was not."""
     switches = block_delete if isinstance(block_delete, bool) else sorted(block_delete)
@@ -244,6 +259,7 @@ def _said(
         "rs274": rs274,
         "feed": None if feed_mm_per_min is None else positive("feed", feed_mm_per_min, "mm/min", FASTEST_MM_PER_MIN),
         "subprograms": str(subprograms) if subprograms else None,
+        "unconfined": unconfined,
     }
 
 
@@ -266,7 +282,8 @@ def _control(said: Mapping[str, Any], block_delete: bool | Iterable[int]) -> tup
         found = replace(found, subprograms=said["subprograms"])
     switches = block_delete if isinstance(block_delete, bool) else frozenset(block_delete)
     interpreter = said["interpreter"] or "builtin"
-    return found, {"block_delete": switches, "interpreter": interpreter, "rs274": said["rs274"]}
+    by = {name: said[name] for name in ("rs274", "unconfined")}
+    return found, {"block_delete": switches, "interpreter": interpreter, **by}
 
 
 def program_from(program: Program | str | Path) -> Program:

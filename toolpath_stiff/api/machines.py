@@ -484,16 +484,14 @@ def machine_from_linuxcnc(file: str | Path, units: str | None = None) -> Machine
     >>> import toolpath_stiff as tps
     >>> tps.machine_from_linuxcnc("nowhere.hal")
     Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read 'nowhere.hal': No such file or directory
+    toolpath_stiff.errors.FileError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
     """
+    from toolpath_stiff.files import read_bytes
     from toolpath_stiff.machine import machine_toml
     from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
 
     path = Path(file)
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise InputError(f"cannot read {str(file)!r}: {error.strerror}") from None
+    text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
     unit = units or units_of(path)
     if unit is None:
         raise InputError(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import pickle
-import shutil
 import textwrap
 import threading
 import uuid
@@ -34,7 +33,7 @@ from toolpath_stiff.report.batch.programs import (
     find_programs,
     report_folders,
 )
-from toolpath_stiff.results_folder import STAGE, Rules, check_folder, write_folder
+from toolpath_stiff.results_folder import Rules, check_folder, clear_up, write_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -294,7 +293,7 @@ def _check_shared(on: Machine, other: Machine | None, programs: Iterable[Program
     for program in programs:
         on.running(program, [other] if other else [])
         if program.options["interpreter"] == "linuxcnc":
-            find_rs274(program.options["rs274"])
+            find_rs274(program.options["rs274"], program.options["unconfined"])
 
 
 def _tasks(run: Run, listed: Sequence[Listed], given: dict[str, Program], example: Program) -> list[Task]:
@@ -372,18 +371,18 @@ def _outcomes(
 
 def _answers(tasks: Sequence[Task], run: Run, executor: Executor | None, jobs: int) -> Iterator[tuple[int, Outcome]]:
     """Position and outcome of each task, as they come."""
-    if executor is not None:
-        before = set(_left_over(tasks))
-        try:
-            yield from _from_executor(tasks, executor)
-        finally:  # of processes that died where we do not see it, nothing else says what they were writing
-            _remove(set(_left_over(tasks)) - before)
-    elif jobs == 1:
+    if executor is None and jobs == 1:
         for place, task in enumerate(tasks):
             yield place, analyze_task(task, run.machines)
-    else:
-        with ProcessPool(jobs) as pool:
-            yield from _from_executor(tasks, pool)
+        return
+    try:
+        if executor is not None:
+            yield from _from_executor(tasks, executor)
+        else:
+            with ProcessPool(jobs) as pool:
+                yield from _from_executor(tasks, pool)
+    finally:  # of processes that died, wherever they were
+        clear_up(task.folder for task in tasks)
 
 
 def _from_executor(tasks: Sequence[Task], executor: Executor) -> Iterator[tuple[int, Outcome]]:
@@ -438,24 +437,11 @@ def _answer(task: Task, future: Future[Outcome]) -> Outcome:
     if error is None:
         return future.result()
     if isinstance(error, ProcessDied):
-        _remove(_left_over([task], error.process))
         return _failed(task, str(error))
     if _worker_died(future):
         tried, last = error.args[2] + 1, error.args[1].address
         return _failed(task, f"{tried} workers died of it, the last at {last} (out of memory? their logs may say)")
     return _failed(task, f"no process could do it: {_named(error)}")
-
-
-def _left_over(tasks: Iterable[Task], process: int | None = None) -> Iterator[Path]:
-    """Temporary folders beside and in the reports: those of a process, or all."""
-    pattern = STAGE.format(process="*" if process is None else process) + "*"
-    for place in {place for task in tasks for place in (task.folder, task.folder.parent)}:
-        yield from place.glob(pattern)
-
-
-def _remove(folders: Iterable[Path]) -> None:
-    for folder in folders:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _failed(task: Task, told: str) -> Outcome:

@@ -159,6 +159,11 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
         help="folder of the files that programs call: name.ngc for o<name> call, O1234.nc for M98 and G65 P1234",
     )
     group.add_argument("--rs274", metavar="PATH", help="LinuxCNC's interpreter, if it is not on PATH")
+    group.add_argument(
+        "--unconfined",
+        action="store_true",
+        help="run rs274 even where bubblewrap, which keeps it from all files but its own, cannot be used",
+    )
 
 
 def add_machine_options(parser: argparse.ArgumentParser) -> None:
@@ -245,6 +250,7 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
         "rs274": args.rs274,
         "feed_mm_per_min": args.feed,
         "subprograms": args.subprograms,
+        "unconfined": args.unconfined,
     }
 
 

@@ -10,14 +10,20 @@ import difflib
 import importlib
 import os
 import re
+import signal
 import sys
-from collections.abc import Callable, Sequence
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any, TextIO
 
 from toolpath_stiff import __version__
 from toolpath_stiff.cli.arguments import whole_options
 from toolpath_stiff.defaults import THREADS
-from toolpath_stiff.errors import TpsError
+from toolpath_stiff.errors import FileError, TpsError, harmless
 
 
 @dataclass(frozen=True)
@@ -119,9 +125,86 @@ def _command_list() -> str:
     return "\n".join(lines) + "\n"
 
 
+class Screen:
+    """Standard output or standard error, through which all text goes that a user sees.
+
+    Control characters from a program or a file name do not reach the terminal. Where nobody reads any more (`| head`),
+    the command goes on to its end and its exit code, in silence.
+
+    Attributes
+    ----------
+    gone
+        Whether nobody reads any more.
+    """
+
+    def __init__(self, stream: TextIO, name: str) -> None:
+        self.stream, self.name, self.gone = stream, name, False
+
+    def write(self, text: str) -> int:
+        """Write text, without what steers a terminal. Raises `InputError` where the disk behind it is full, say."""
+        self._do(lambda: self.stream.write(harmless(text)))
+        return len(text)
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        """The same of several texts."""
+        for line in lines:
+            self.write(line)
+
+    def flush(self) -> None:
+        """Hand on what is held back."""
+        self._do(self.stream.flush)
+
+    def _do(self, step: Callable[[], object]) -> None:
+        if self.gone:
+            return
+        try:
+            step()
+        except OSError as error:
+            self.gone = True
+            with suppress(OSError, ValueError):  # what Python itself still holds back goes nowhere
+                os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
+            if not isinstance(error, BrokenPipeError):
+                raise FileError(f"cannot write to {self.name}: {error.strerror}") from None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+
+@contextmanager
+def screens() -> Iterator[None]:
+    """Standard output and standard error as `Screen`; a closed one is a silent one."""
+    before = sys.stdout, sys.stderr
+    with Path(os.devnull).open("w", encoding="utf-8") as nothing:
+        out, error = (stream if stream is not None else nothing for stream in before)
+        sys.stdout, sys.stderr = Screen(out, "standard output"), Screen(error, "standard error")
+        try:
+            yield
+        finally:
+            sys.stdout, sys.stderr = before
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code (2 for wrong input, 130 for Ctrl-C)."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    """Run one command; returns the exit code (2 for wrong input and for whatever else went wrong, 130 for Ctrl-C)."""
+    with screens():
+        try:
+            try:
+                code = _run(list(sys.argv[1:] if argv is None else argv))
+            except SystemExit as stop:  # argparse: --help, --version, wrong usage
+                code = stop.code if isinstance(stop.code, int) else 2
+            sys.stdout.flush()
+            return code
+        except TpsError as error:
+            return _ended(str(error), error.exit_code)
+        except KeyboardInterrupt:
+            return _ended("", 130)
+        except Exception as error:
+            if os.environ.get(TRACEBACK):
+                traceback.print_exc()
+            return _ended(last_resort(error), 2)
+
+
+def _run(arguments: Sequence[str]) -> int:
+    """The command that the arguments name."""
     chosen = next((word for word in arguments if not word.startswith("-")), None)
     known = [command.name for command in COMMANDS]
     if chosen is not None and chosen not in known:
@@ -130,30 +213,60 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"tps: error: unknown command {chosen!r}; {hint}", file=sys.stderr)
         return 2
     parser = build_parser(chosen)
-    try:
-        args = parser.parse_args(whole_options(arguments))
-        if args.command is None:
-            parser.print_help()
-            return 2
-        command = next(c for c in COMMANDS if c.name == args.command)
-        code = command.parts[1](args)
+    args = parser.parse_args(whole_options(arguments))
+    if args.command is None:
+        parser.print_help()
+        return 2
+    return next(c for c in COMMANDS if c.name == args.command).parts[1](args)
+
+
+def _ended(error: str, code: int) -> int:
+    """Say why a run ended, if that can be said; the exit code."""
+    with suppress(TpsError):  # nobody hears it: standard error is full, or its terminal is gone
         sys.stdout.flush()
-        return code
-    except SystemExit as stop:  # argparse: --help, --version, wrong usage
-        return stop.code if isinstance(stop.code, int) else 2
-    except TpsError as error:
-        print(f"tps: error: {error}", file=sys.stderr)
-        return error.exit_code
-    except KeyboardInterrupt:
-        print("tps: interrupted; no file is half-written", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        # The reader of a pipe went away (`tps path ... | head`): not an error of ours.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    with suppress(TpsError):
+        print(f"tps: error: {error}" if error else "tps: interrupted; no file is half-written", file=sys.stderr)
+        sys.stderr.flush()
+    return code
+
+
+TRACEBACK = "TPS_TRACEBACK"  # set in the environment, it shows where in the code an unforeseen error came from
+REPORT = f"if that does not explain it, run the command again with {TRACEBACK}=1 and report what it prints"
+
+
+def last_resort(error: Exception) -> str:
+    """What no command foresaw, in one line: memory, recursion, the file system, a defect of this package."""
+    told = " ".join(str(error).split()) or "no more is known"
+    if isinstance(error, MemoryError):
+        return f"out of memory ({told}): take a larger --step, fewer --jobs or fewer data; {REPORT}"
+    if isinstance(error, RecursionError):
+        return f"something is nested too deeply ({told}); {REPORT}"
+    if isinstance(error, OSError):
+        files = [repr(str(file)) for file in (error.filename, error.filename2) if file is not None]
+        return f"{': '.join([*files, error.strerror or told])}; {REPORT}"
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f", {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
+    return f"an error that should not be ({type(error).__name__}{place}): {told}; {REPORT}"
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    """A signal handler that ends the run as Ctrl-C does; no other signal of its kind disturbs the clearing up."""
+    _stop_at(signal.SIG_IGN, _stop)
+    raise KeyboardInterrupt
+
+
+def _stop_at(new: Any, *before: Any) -> None:
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) in before:
+            signal.signal(number, new)
 
 
 def entry() -> None:
     """Console script: one thread of linear algebra, whatever the command."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
+    _stop_at(_stop, signal.SIG_DFL)  # one that is ignored (nohup) stays so
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a terminal that cannot show a letter shows a question mark
+            stream.reconfigure(errors="replace")
     sys.exit(main())

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, harmless
 from toolpath_stiff.files import Content, check_outputs, keep_old, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 
@@ -153,8 +153,10 @@ WIDTH = 30
 def say(text: str) -> None:
     """Replace the line of progress, where someone watches; "" takes it away."""
     if sys.stderr.isatty():
-        sys.stderr.write(f"\r\x1b[K{text}")
-        sys.stderr.flush()
+        # The one text that steers the terminal, past what takes control characters out of all others.
+        stream = getattr(sys.stderr, "stream", sys.stderr)
+        stream.write(f"\r\x1b[K{harmless(text)}")
+        stream.flush()
 
 
 @contextmanager

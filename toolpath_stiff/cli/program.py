@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -183,7 +181,7 @@ def _run_many(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
         say(f"{done}/{total} programs, {plain(text)}")
 
     try:
-        with _stopped_by_sigterm(), _executor(args) as executor:
+        with _executor(args) as executor:
             result = analyze_many(
                 machine_for(args),
                 found,
@@ -207,21 +205,6 @@ def _run_many(args: argparse.Namespace, found: Sequence[Found], counts: Sequence
     if not result.complete:
         return INCOMPLETE
     return BELOW_REQUIRED if result.below_required else 0
-
-
-@contextmanager
-def _stopped_by_sigterm() -> Iterator[None]:
-    """SIGTERM stops what runs as Ctrl-C does; it would leave processes and temporary files behind."""
-    from toolpath_stiff.processes import interrupt
-
-    if threading.current_thread() is not threading.main_thread():  # only the main thread may set handlers
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager
@@ -287,6 +270,8 @@ def path(args: argparse.Namespace) -> int:
     else:
         for piece in found.csv():
             sys.stdout.write(piece.decode())
+            if getattr(sys.stdout, "gone", False):  # nobody reads on
+                break
     for warning in found.warnings:
         print(f"tps: warning: {found.name}: {warning}", file=sys.stderr)
     for note in found.unsupported:

@@ -18,11 +18,12 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, MachineFileError
+from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import ORIGINS, EffectEntry, Limits, Machine, StrutLaw, read_uncertainty
 from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
-from toolpath_stiff.toml_reader import TomlReader, is_number, is_text, shortened
+from toolpath_stiff.toml_reader import LARGEST_BYTES, TomlReader, is_number, is_text, shortened
 from toolpath_stiff.units import (
     Pose,
     m_from_mm,
@@ -164,7 +165,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
         path = known[str(name_or_file)]
         return parse_machine(path.read_text(encoding="utf-8"), file=f"{name_or_file}.toml")
     path = Path(name_or_file)
-    if not path.is_file():
+    if not is_file(path):
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
         raise MachineFileError(
             f"machine {str(name_or_file)!r} is neither a packaged machine nor a file",
@@ -172,7 +173,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
             hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
         )
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_bytes(path, "machine file", LARGEST_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise MachineFileError(
             f"not a text file (byte {error.start})", expected="a machine file (TOML, UTF-8)", file=str(path)
@@ -296,7 +297,7 @@ def _unknown(toml: TomlReader, name: str, known: list[str]) -> InputError:
         f"unknown section [{name}]",
         expected=f"one of {sections}, [[effect]], [[instrument]], [uncertainty]",
         file=toml.file,
-        line=toml.line_of(name, ""),
+        line=toml.line_at(name),
     )
 
 

@@ -401,6 +401,7 @@ def check_by(
     name: str,
     *,
     rs274: str | None = None,
+    unconfined: bool = False,
     origin: Iterable[float] | None = None,
     default_origin: Iterable[float] = ZERO,
     block_delete: Switches = False,
@@ -420,6 +421,7 @@ def check_by(
     if interpreter not in INTERPRETERS:
         raise ProgramError(f"interpreter {interpreter!r}", expected=", ".join(INTERPRETERS))
     options: dict[str, Any] = {"origin": origin, "default_origin": default_origin, "block_delete": block_delete}
+    run: dict[str, Any] = {"interpreter": "linuxcnc", "rs274": rs274, "unconfined": unconfined}
     ours = None
     if interpreter != "linuxcnc":
         ours = check_lines(lines, name, controller=controller, **options)
@@ -427,9 +429,7 @@ def check_by(
         if interpreter == "builtin" or ours.complete or not second:
             return ours, "builtin"
     try:
-        program = parse_program(
-            "\n".join([*lines, ""]), name, controller=controller, interpreter="linuxcnc", rs274=rs274, **options
-        )
+        program = parse_program("\n".join([*lines, ""]), name, controller=controller, **run, **options)
     except InputError as error:
         if ours is not None:
             return _refused_by_both(ours, error), "builtin"

@@ -96,6 +96,7 @@ def read_program(
     block_delete: Switches = False,
     interpreter: str = "builtin",
     rs274: str | None = None,
+    unconfined: bool = False,
     controller: Controller = UNKNOWN_CONTROL,
 ) -> Program:
     """Read an NC program file to its moves in the set-up frame.
@@ -119,6 +120,8 @@ def read_program(
         "builtin"; "linuxcnc", LinuxCNC's own (`rs274`); "auto", the first and, where it refuses, the second.
     rs274
         Path of the program `rs274`, if it is not on PATH.
+    unconfined
+        Run it even where bubblewrap, which keeps it from all files but its own, cannot be used.
     controller
         Dialect, block-delete switches, work offsets and tools of the control, and the kinematics that the program was
         posted for; the two files above win over its tables.
@@ -140,7 +143,7 @@ def read_program(
     lines, place = read_lines(path), None if origin is None else _six(origin)
     offsets = read_offsets(offsets_file) if offsets_file else controller.offsets or Offsets()
     tools = read_tool_table(tool_table) if tool_table else controller.tools
-    options = (offsets, tools, block_delete, interpreter, rs274, controller)
+    options = (offsets, tools, block_delete, interpreter, rs274, unconfined, controller)
     return _read(_Request(lines, Path(path).name, str(path), place, _six(default_origin), *options))
 
 
@@ -155,6 +158,7 @@ def parse_program(
     block_delete: Switches = False,
     interpreter: str = "builtin",
     rs274: str | None = None,
+    unconfined: bool = False,
     controller: Controller = UNKNOWN_CONTROL,
 ) -> Program:
     r"""Read an NC program from text; parameters as in `read_program`, tables as read by `nc.tables`.
@@ -176,7 +180,7 @@ def parse_program(
     """
     lines, place = split_lines(text, name), None if origin is None else _six(origin)
     offsets, tools = offsets or controller.offsets or Offsets(), controller.tools if tools is None else tools
-    options = (offsets, tools, block_delete, interpreter, rs274, controller)
+    options = (offsets, tools, block_delete, interpreter, rs274, unconfined, controller)
     return _read(_Request(lines, name, "", place, _six(default_origin), *options))
 
 
@@ -194,6 +198,7 @@ class _Request:
     block_delete: Switches
     interpreter: str
     rs274: str | None
+    unconfined: bool
     controller: Controller
 
     @property
@@ -273,7 +278,7 @@ def _second_opinion(error: InputError, asked: _Request) -> Program:
     if refused is not None:
         raise refused from None
     try:
-        found = find_rs274(asked.rs274)
+        found = find_rs274(asked.rs274, asked.unconfined)
     except InputError as missing:
         raise ProgramError(
             error.found,
@@ -298,6 +303,7 @@ def _read_by_linuxcnc(asked: _Request, rs274: str | None) -> Program:
         asked.tools,
         bool(asked.switches),
         rs274=rs274,
+        unconfined=asked.unconfined,
         posted=posted is not None,
         feed=asked.controller.feed,
     )

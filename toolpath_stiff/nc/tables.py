@@ -8,10 +8,12 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.errors import FileError, ProgramError
+from toolpath_stiff.files import read_bytes
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
+LARGEST_BYTES = 10_000_000
 LARGEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
 LARGEST_WORD = 1e9  # any other word: the radius of an arc that is nearly straight, a tool's number
 # LinuxCNC's parameter file (manual, "Parameters"): G54 is 5221 to 5230, each further offset 20 on; X Y Z A B C U V W R.
@@ -59,9 +61,9 @@ class Offsets:
 
 def _lines(path: str | Path, what: str) -> list[str]:
     try:
-        return Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise ProgramError(f"cannot read {what} {str(path)!r}: {error.strerror}") from None
+        return read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig").splitlines()
+    except FileError as error:
+        raise ProgramError(error.found, hint=error.hint) from None
     except UnicodeDecodeError:
         raise ProgramError(f"{what} is not a text file", file=str(path)) from None
 

@@ -15,6 +15,7 @@ import hmac
 import io
 import json
 import math
+import re
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.files import Content, read_text, write_atomically
+from toolpath_stiff.errors import FileError, InputError, InputErrors
+from toolpath_stiff.files import Content, read_bytes, read_text, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 from toolpath_stiff.rig.case import AXES, DEFAULT_SETUP, POSE, Case, Table, again, clamp_of, draw_case
 from toolpath_stiff.rig.effects import CATALOGUE
@@ -85,11 +86,9 @@ def seal(case: Case, seed: int, layout: str) -> bytes:
 def unseal(file: str | Path) -> tuple[Case, dict[str, Any]]:
     """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
     try:
-        content = Path(file).read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"cannot read {str(file)!r}: {error.strerror}", hint="give the folder that `tps rig new` wrote"
-        ) from None
+        content = read_bytes(file, "the sealed truth")
+    except FileError as error:
+        raise InputError(error.found, hint="give the folder that `tps rig new` wrote") from None
     digest = content[len(MAGIC) : len(MAGIC) + DIGEST]
     body = _scrambled(content[len(MAGIC) + DIGEST :], digest)
     if not content.startswith(MAGIC) or not hmac.compare_digest(digest, hmac.digest(KEY, body, "sha256")):
@@ -150,7 +149,7 @@ def read_plan(file: str, nominal: Nominal) -> Table:
     InputError, InputErrors
         Not a table of poses; or every bad cell and unreachable pose, named.
     """
-    lines = [row for row in enumerate(csv.reader(io.StringIO(read_text(file, "the plan"))), 1) if any(row[1])]
+    lines = _rows(read_text(file, "the plan"), file)
     if len(lines) < 2:
         raise InputError("no poses", expected="a heading (x_mm,y_mm,z_mm,direction ...) and rows", file=file)
     (first, heading), body = lines[0], lines[1:]
@@ -174,6 +173,15 @@ def read_plan(file: str, nominal: Nominal) -> Table:
     _check_rows(table, [line for line, _ in body], nominal, file)
     table.pop("loop", None)
     return table
+
+
+def _rows(text: str, file: str) -> list[tuple[int, list[str]]]:
+    """Line and cells of every row that is not empty, whatever the line ends are."""
+    reader = csv.reader(io.StringIO(text, newline=None))
+    try:
+        return [(reader.line_num, row) for row in reader if any(row)]
+    except csv.Error as error:  # a quote that never ends, a cell beyond 131,072 characters
+        raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
 
 
 def _check_heading(heading: list[str], file: str, line: int) -> None:
@@ -205,7 +213,7 @@ def _value(name: str, cell: str) -> float | int | str:
     if name == "setup":
         return cell or DEFAULT_SETUP
     if name in WHOLE:
-        if not cell.isdecimal():
+        if not re.fullmatch("[0-9]{1,9}", cell):
             raise ValueError("a whole number")
         return int(cell)
     low, high, default = NUMBERS[name]
@@ -279,7 +287,7 @@ def measure_again(folder: str | Path, plan_file: str, out: str | Path, visit: in
         raise InputError(f"visit {visit}", expected="0 or more")
     case, sealed = unseal(Path(folder) / SEALED)
     plan = read_plan(plan_file, case.nominal)
-    digest = hashlib.sha256(Path(plan_file).read_bytes()).digest()
+    digest = hashlib.sha256(read_bytes(plan_file, "the plan")).digest()
     rng = np.random.default_rng([sealed["seed"], visit, int.from_bytes(digest[:8], "big")])
     if "clamp" in plan or "clamp" in sealed["columns"]:
         first = sealed["clamps"] + 1000 * int(rng.integers(1, 10**4))

@@ -9,7 +9,6 @@ geometry, commands a pose.
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -21,8 +20,10 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_text
+from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_um, rad_from_deg
 
+SECTIONS = ("platform", "limits", "reference_tool", "strut_law", "frame_joints", "platform_joints")  # read here
 # Joints of one vertex of the frame lie within this angle about the machine's axis; vertices are far more apart.
 VERTEX_WIDTH = rad_from_deg(15.0)
 
@@ -95,10 +96,10 @@ def load_nominal(machine: str = defaults.MACHINE) -> Nominal:
 
 def parse_nominal(text: str, file: str) -> Nominal:
     """Nominal machine from the text of a machine file; `file` names it in messages. Raises `InputError`."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not a TOML file: {error}", file=file) from None
+    toml = TomlReader(text, file)
+    table = toml.data
+    for name in SECTIONS:
+        _section(toml, name)
     for kind in ("effect", "instrument"):
         if table.get(kind):
             raise InputError(
@@ -106,64 +107,71 @@ def parse_nominal(text: str, file: str) -> Nominal:
                 expected="a nominal machine",
                 hint="take the effects out; the rig adds its own hidden one",
                 file=file,
+                line=toml.line_of(kind),
             )
     bars = table.get("platform", {}).get("bar_stiffness_N_per_m", math.inf)
     if bars != math.inf:
-        raise InputError(
+        raise toml.error(
             f"[platform] bar_stiffness_N_per_m = {bars}",
-            expected="inf",
-            hint="the rig's nominal platform is rigid; a flexible one is the hidden effect platform_flexibility",
-            file=file,
+            "inf",
+            "the rig's nominal platform is rigid; a flexible one is the hidden effect platform_flexibility",
+            where="platform.bar_stiffness_N_per_m",
         )
-    limits = table.get("limits", {})
-    angles = limits.get("joint_angle")
-    lengths = limits.get("strut_length", {})
-    neutral = _numbers(angles or {}, "neutral_pose_mm_deg", 6, file) if angles else np.zeros(6)
+    angles = _section(toml, "limits.joint_angle")
+    neutral = _numbers(toml, "limits.joint_angle", "neutral_pose_mm_deg", 6) if angles else np.zeros(6)
     return Nominal(
         name=str(table.get("name", "machine")),
         text=text,
-        frame_joints=_joints(table, "frame_joints", file),
-        platform_joints=_joints(table, "platform_joints", file),
-        tool_length=m_from_mm(float(_numbers(table.get("reference_tool", {}), "length_mm", 1, file)[0])),
-        law_lengths=m_from_mm(_numbers(table.get("strut_law", {}), "length_mm", 2, file)),
-        law_stiffnesses=n_per_m_from_n_per_um(_numbers(table.get("strut_law", {}), "stiffness_N_per_um", 2, file)),
+        frame_joints=_joints(toml, "frame_joints"),
+        platform_joints=_joints(toml, "platform_joints"),
+        tool_length=m_from_mm(float(_numbers(toml, "reference_tool", "length_mm", 1)[0])),
+        law_lengths=m_from_mm(_numbers(toml, "strut_law", "length_mm", 2)),
+        law_stiffnesses=n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", 2)),
         strut_range=(
-            m_from_mm(float(_numbers(lengths, "min_mm", 1, file)[0])),
-            m_from_mm(float(_numbers(lengths, "max_mm", 1, file)[0])),
+            m_from_mm(float(_numbers(toml, "limits.strut_length", "min_mm", 1)[0])),
+            m_from_mm(float(_numbers(toml, "limits.strut_length", "max_mm", 1)[0])),
         ),
         swing=None
-        if angles is None
+        if not angles
         else (
-            rad_from_deg(float(_numbers(angles, "frame_max_deg", 1, file)[0])),
-            rad_from_deg(float(_numbers(angles, "platform_max_deg", 1, file)[0])),
+            rad_from_deg(float(_numbers(toml, "limits.joint_angle", "frame_max_deg", 1)[0])),
+            rad_from_deg(float(_numbers(toml, "limits.joint_angle", "platform_max_deg", 1)[0])),
         ),
         neutral_pose=np.concatenate([m_from_mm(neutral[:3]), rad_from_deg(neutral[3:])]),
     )
 
 
-def _numbers(section: dict[str, Any], key: str, count: int, file: str) -> FloatArray:
+def _section(toml: TomlReader, name: str) -> dict[str, Any]:
+    """A table by its dotted name, empty where there is none. Raises `InputError`."""
+    content = toml.data
+    for part in name.split("."):
+        content = toml.table(name, content.get(part, {}), f"a section [{name}]")
+    return content
+
+
+def _numbers(toml: TomlReader, section: str, key: str, count: int) -> FloatArray:
     """(count,) the numbers under a key."""
+    given = _section(toml, section).get(key)
     try:
-        values = np.atleast_1d(np.asarray(section.get(key), dtype=float))
+        values = np.atleast_1d(np.asarray(given, dtype=float))
     except (TypeError, ValueError):
         values = np.array([math.nan])
     if values.shape != (count,) or not np.isfinite(values).all():
-        raise InputError(
-            f"{key} = {section.get(key, 'missing')!r}", expected=f"{count} number{'s' * (count > 1)}", file=file
-        )
+        found = f"{key} = {'missing' if given is None else repr(given)}"
+        raise toml.error(found, f"{count} number{'s' * (count > 1)}", where=f"{section}.{key}")
     return values
 
 
-def _joints(table: dict[str, Any], section: str, file: str) -> FloatArray:
+def _joints(toml: TomlReader, section: str) -> FloatArray:
     """(6, 3) m, joints given as x, y, z or as radius, angle, height."""
-    content = table.get(section, {})
+    content = _section(toml, section)
     rows = content.get("mm", content.get("cylindrical_mm_deg"))
     try:
         joints = np.asarray(rows, dtype=float)
     except (TypeError, ValueError):
         joints = np.empty(0)
     if joints.shape != (6, 3) or not np.isfinite(joints).all():
-        raise InputError(f"[{section}] has no six joints", expected="mm or cylindrical_mm_deg, 6 rows of 3", file=file)
+        raise toml.error(f"[{section}] has no six joints", "mm or cylindrical_mm_deg, 6 rows of 3", where=section)
     if "mm" in content:
         return m_from_mm(joints)
     radius, angle, height = m_from_mm(joints[:, 0]), rad_from_deg(joints[:, 1]), m_from_mm(joints[:, 2])

@@ -66,14 +66,15 @@ def read(
     block_delete: bool,
     *,
     rs274: str | None = None,
+    unconfined: bool = False,
     limits: Limits | None = None,
     posted: bool = False,
     feed: float | None = None,
 ) -> Reading:
     """Read a program (lines without line ends) with `rs274`; `origin`, `default_origin` in mm and degrees.
 
-    `posted`: it was posted for another machine, whose rotary axes have one zero for program and machine. `feed`: of
-    cuts before the first F, mm/min.
+    `unconfined`: even where bubblewrap cannot be used. `posted`: it was posted for another machine, whose rotary axes
+    have one zero for program and machine. `feed`: of cuts before the first F, mm/min.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def read(
     """
     lines, dropped = _checked(source, name)
     session = _Session(
-        source, lines, name, offsets, tools, block_delete, find_rs274(rs274), limits, posted, feed, dropped
+        source, lines, name, offsets, tools, block_delete, find_rs274(rs274, unconfined), limits, posted, feed, dropped
     )
     return session.read(origin, default_origin)
 

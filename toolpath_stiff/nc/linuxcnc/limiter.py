@@ -9,10 +9,11 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
+import signal
 import struct
 import sys
 
-PR_SET_NO_NEW_PRIVS, PR_SET_SECCOMP, SECCOMP_MODE_FILTER = 38, 22, 2
+PR_SET_PDEATHSIG, PR_SET_NO_NEW_PRIVS, PR_SET_SECCOMP, SECCOMP_MODE_FILTER = 1, 38, 22, 2
 # linux/audit.h, and the numbers of clone, fork, vfork, clone3 on each machine (asm/unistd.h).
 ARCHITECTURES = {
     "x86_64": (0xC000003E, (56, 57, 58, 435)),
@@ -56,8 +57,17 @@ def start_nothing() -> bool:
         return False
 
 
+def end_with_the_caller() -> None:
+    """SIGKILL when the process that started this one is gone, however it ended."""
+    try:
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    except (OSError, AttributeError):  # not Linux
+        return
+
+
 def main() -> None:
     """Set the limits and become the command."""
+    end_with_the_caller()
     cpu, memory, size = map(int, sys.argv[1:4])
     resource.setrlimit(resource.RLIMIT_CPU, (cpu, cpu + 1))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))

@@ -1,7 +1,7 @@
 """Running `rs274` in a folder of its own: no shell, no network, limits on time, memory and output.
 
-Limits on time, memory and file size by the kernel, and no process beside it (`limiter`); bubblewrap, where it is
-installed and works, makes the whole file system but that folder read-only and takes away the network.
+Limits on time, memory and file size by the kernel, and no process beside it (`limiter`); bubblewrap makes the whole
+file system but that folder read-only and takes away the network. Without it the caller must say that he knows.
 """
 
 from __future__ import annotations
@@ -13,14 +13,18 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from toolpath_stiff.errors import ProgramError, TpsError
+from toolpath_stiff.files import temporary_folder
 
+HOW_TO_CONFINE = (
+    "install bubblewrap (Debian, Ubuntu: apt install bubblewrap), or say --unconfined (unconfined=True): "
+    "rs274 may then write wherever you may"
+)
 HOW_TO_GET = "install LinuxCNC (Debian, Ubuntu: apt install linuxcnc-uspace), or name the program with --rs274 PATH"
 PROGRAM, CANON, PARAMETERS, TOOLS, ERRORS = "program.ngc", "canon.txt", "rs274.var", "tool.tbl", "errors.txt"
 LONGEST_MESSAGE = 4000
@@ -53,12 +57,15 @@ class Run:
     parameters: str
 
 
-def find_rs274(path: str | None = None) -> str:
-    """The interpreter's path. Raises `InputError` with how to get it."""
+def find_rs274(path: str | None = None, unconfined: bool = False) -> str:
+    """The interpreter's path. Raises `InputError` with how to get it, or what is to confine it."""
     found = shutil.which(path or "rs274")
     if found is None:
         what = f"{path!r} is not a program that can be run" if path else "LinuxCNC's interpreter rs274 is not installed"
         raise ProgramError(what, hint=HOW_TO_GET)
+    if not unconfined and _bubblewrap() is None:
+        what = "bubblewrap, which keeps LinuxCNC's interpreter from all files but its own, is not there or may not work"
+        raise ProgramError(what, hint=HOW_TO_CONFINE)
     return str(Path(found).resolve())
 
 
@@ -75,8 +82,7 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str, limits: 
     if sys.platform == "win32":
         raise TpsError("LinuxCNC's interpreter runs on Linux only")
     limits = limits or Limits()
-    with tempfile.TemporaryDirectory(prefix="tps-rs274-") as name:
-        folder = Path(name)
+    with temporary_folder("tps-rs274-") as folder:
         (folder / PROGRAM).write_text(program, encoding="ascii")
         (folder / PARAMETERS).write_text(parameters, encoding="ascii")
         (folder / TOOLS).write_text(tools, encoding="ascii")

@@ -66,18 +66,18 @@ def find_programs(arguments: Sequence[str | Found]) -> tuple[list[Found], list[F
     InputError
         A folder cannot be read or holds no program.
     """
-    found: dict[Path, Found] = {}
+    found: dict[str, Found] = {}
     counts = []
     for argument in arguments:
         if isinstance(argument, Found):
             inside = [argument]
-        elif Path(argument).is_dir():
+        elif os.path.isdir(argument):  # noqa: PTH112  (false for a name that none can have)
             inside, count = _in_folder(argument)
             counts.append(count)
         else:
             inside = [Found(argument, Path(Path(argument).name))]
         for program in inside:
-            found.setdefault(Path(program.file).resolve(), program)
+            found.setdefault(os.path.realpath(program.file), program)
     return list(found.values()), counts
 
 
@@ -102,7 +102,7 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
             if name.startswith("."):
                 continue
             # A symbolic link that leads nowhere is a program that cannot be read; a pipe would wait for ever.
-            if path.suffix.lower() in known and (path.is_file() or path.is_symlink()):
+            if path.suffix.lower() in known and (path.is_file() or _leads_nowhere(path)):
                 inside.append(Found(str(path), path.relative_to(folder)))
             else:
                 others[path.suffix.lower()] += 1
@@ -114,6 +114,10 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
         )
     inside.sort(key=lambda program: [(_by_number(part), part) for part in program.inside.parts])
     return inside, FolderCount(folder, len(inside), tuple(sorted(others.items())))
+
+
+def _leads_nowhere(path: Path) -> bool:
+    return path.is_symlink() and not path.exists()
 
 
 def _by_number(name: str) -> list[str | int]:

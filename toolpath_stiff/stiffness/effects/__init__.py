@@ -153,7 +153,16 @@ def _failure(error: BaseException, file: str) -> InputError:
     if isinstance(error, SyntaxError) and error.filename and Path(error.filename).resolve() == Path(file).resolve():
         return EffectError(f"{type(error).__name__}: {error.msg}", file=file, line=error.lineno, column=error.offset)
     what = f"{type(error).__name__}: {error}".rstrip(": ")
-    return EffectError(f"{what}, when the file is run", file=file, line=line_in(error, file))
+    return EffectError(
+        f"{what}, when the file is run", file=file, line=line_in(error, file) or _unreadable(error, file)
+    )
+
+
+def _unreadable(error: BaseException, file: str) -> int | None:
+    """The line of a byte that no Python file has: Python does not say it."""
+    content = Path(file).read_bytes()
+    at = error.start if isinstance(error, UnicodeDecodeError) else content.find(b"\0")
+    return content.count(b"\n", 0, at) + 1 if at >= 0 else None
 
 
 def _effects_in(module: ModuleType, where: str) -> dict[str, Effect]:
