@@ -9,7 +9,7 @@ import pytest
 
 import toolpath_stiff as tps
 from tests.test_cli_analyze import PART, _nist
-from tests.test_cli_batch import BROKEN, SHORT, files_of, rows_of
+from tests.test_cli_batch import BROKEN, QUICK, files_of, rows_of
 from toolpath_stiff.cli.main import main
 
 distributed = pytest.importorskip("distributed")
@@ -80,7 +80,7 @@ def test_a_worker_that_dies_fails_its_own_program_alone(cluster, shop):
     (shop / "deadly.py").write_text(DEADLY)
     (shop / "deadly.toml").write_text(_nist() + f'\n[[effect]]\nname = "deadly"\nkeeper = {os.getpid()}\n')
     machine = ["--machine", "deadly.toml", "--effects", "deadly.py"]
-    assert main(["analyze", "jobs", "--cluster", cluster.scheduler_address, "--out", "o", *machine, *SHORT]) == 1
+    assert main(["analyze", "jobs", "--cluster", cluster.scheduler_address, "--out", "o", *machine, *QUICK]) == 1
     rows = rows_of(shop / "o")
     assert {file: row["status"] for file, row in rows.items()} == {
         "jobs/a/part.nc": "done", "jobs/b/part.nc": "failed", "jobs/bad.nc": "failed",
@@ -102,7 +102,7 @@ def test_the_function_takes_the_executor_of_a_client(cluster, shop):
 def test_a_scheduler_that_does_not_answer_is_one_message(shop, capsys, monkeypatch):
     monkeypatch.setattr("toolpath_stiff.cli.program.CONNECT_SECONDS", 0.5)
     for address in ("tcp://127.0.0.1:1", "127.0.0.1:1", "nowhere://x", "tcp://"):
-        assert main(["analyze", "jobs", "--cluster", address, *SHORT]) == 2
+        assert main(["analyze", "jobs", "--cluster", address, *QUICK]) == 2
         captured = capsys.readouterr()
         assert captured.err.startswith(f"tps: error: --cluster {address}: ") and captured.out == ""
         assert "expected the address of a Dask scheduler" in captured.err and captured.err.count("\n") == 1

@@ -88,7 +88,7 @@ def test_what_nothing_explains_is_written_and_tried(here, capsys):
     rows, _ = rig.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
     (here / "data.csv").write_text(rig.csv_text(rows), encoding="utf-8")
     asked = Asked(("data.csv",), effects=(), noise=0.03)
-    steps = next_steps(SimpleNamespace(verdict="unexplained", best=None), asked)
+    steps = next_steps(SimpleNamespace(verdict="unexplained", best=None, main=SimpleNamespace(question="")), asked)
     lines = [line for _, line in map(parted, steps)]
     assert [shlex.split(line)[1] for line in lines] == ["compare", "effects", "diagnose"]
     for line in lines:

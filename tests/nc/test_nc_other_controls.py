@@ -305,19 +305,10 @@ def test_corners_are_no_words_of_linuxcnc():
 # -- messages ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("block", "word"),
-    [
-        ("IF [#1 GT 2] GOTO 10", "IF"),
-        ("GOTO 10", "GOTO"),
-        ("WHILE [#1 LT 2] DO1", "WHILE"),
-        ("END1", "END"),
-        ("POPEN", "POPEN"),
-    ],
-)
-def test_a_macro_statement_is_called_one(block, word):
-    with pytest.raises(InputError, match=f"^p.nc:3:1: {word} is a statement of a control's macro language"):
-        read(block, "fanuc")
+def test_a_macro_statement_that_moves_nothing_is_called_one():
+    """The others are in tests/nc/test_parametric.py."""
+    with pytest.raises(InputError, match=r"^p.nc:3:1: POPEN is a statement of a control's macro language"):
+        read("POPEN", "fanuc")
 
 
 def test_what_a_code_would_change_is_that_code_s():

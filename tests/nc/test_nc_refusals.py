@@ -122,7 +122,7 @@ def test_missing_file_and_folder(tmp_path):
         ("T1 Z1e9", "Z = "),
         ("T1 Z5\nT\N{SUPERSCRIPT TWO} Z5", "tools.tbl:2: .* is not a tool"),
         (f"T{'1' * 5000} Z5", "is not a tool"),
-        (f'tool,length_mm,remark\n1,5,"{"x" * 140_000}"', "tools.tbl:2: not a row of CSV: field larger"),
+        (f'tool,length_mm,remark\n1,5,"{"x" * 140_000}"', "tools.tbl:2: a row that cannot be read: field larger"),
     ],
 )
 def test_bad_tool_tables(tmp_path, table, words):

@@ -151,7 +151,6 @@ def test_a_tilted_original_set_up(turn):
         ("G1 A30 B40", at(turn=90), 3, "lean.*--linearise"),
         ("G28 X1", at(turn=37), 3, "G28.*without Y.*name Y"),
         ("G28 Y1", at(a=3), 3, "without Z.*name Z"),
-        ("G1 X0.00003\nG3 X0 Y0.00003 R0.00003", at(turn=37), 4, "decimals"),
     ],
 )
 def test_refusals_give_line_and_reason(text, there, line, message):
@@ -159,6 +158,13 @@ def test_refusals_give_line_and_reason(text, there, line, message):
     with pytest.raises(InputError, match=f"(?is){message}") as caught:
         rewrite_program(program, there, HERE)
     assert (caught.value.file, caught.value.line) == ("part.nc", line)
+
+
+def test_what_the_decimals_cannot_hold_is_refused():
+    program = parse_program(START + "G1 X0.004\nG3 X0 Y0.004 R0.004\nG80 G1 X9\n", "part.nc", origin=at(turn=37))
+    with pytest.raises(InputError, match="decimals") as caught:
+        rewrite_program(program, at(turn=37), HERE, decimals=2)
+    assert caught.value.line == 4
 
 
 def test_a_first_cut_from_nowhere_is_refused():

@@ -17,7 +17,7 @@ from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
-from toolpath_stiff.report import case_study, figure, machine, plan
+from toolpath_stiff.report import case_study, figure, machine, measuring
 from toolpath_stiff.report import map as map_report
 from toolpath_stiff.report.analysis import summary_with_options
 from toolpath_stiff.report.analysis.page import page
@@ -42,7 +42,7 @@ def last(monkeypatch):
     """The figures that were drawn, last one last."""
     figures = []
     for module in (
-        case_study, compare_pictures, diagnose_pictures, machine, map_report, plan,
+        case_study, compare_pictures, diagnose_pictures, machine, map_report, measuring,
     ):  # fmt: skip
 
         def kept(*size, new=module.new_figure):
@@ -167,7 +167,7 @@ def visits_at(z):
 @pytest.mark.parametrize("heights", [[0.43, 0.78, 1.2, 1.49], [0.07, 0.43, 0.78, 1.13, 1.49, 1.2], [0.5]])
 def test_every_pose_is_in_the_panel_of_its_own_height(last, heights):
     visits = visits_at(np.array([*heights, heights[0]]))
-    plan.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
+    measuring.plan_picture(visits, range(len(heights) + 1), ["vertical"] * (len(heights) + 1), None, "title", "text")
     found = {}
     for axes in last[-1].axes:
         z = float(re.match(r"z = ([\d.]+) mm", axes.get_title(loc="left")).group(1))

@@ -17,15 +17,27 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from toolpath_stiff.errors import InputError, ProgramError
 
-if TYPE_CHECKING:
-    from toolpath_stiff.nc.parametric.variables import Variables
-
 NGC, MACRO_B, EITHER = "RS274/NGC", "Macro B", "either family"
-Value = Callable[["Variables"], "float | None"]  # None: an empty variable of Macro B
+
+
+class Variables(Protocol):
+    """What expressions ask of the variables (`variables.Variables`)."""
+
+    def get(self, place: str | int, line: int, column: int, name: str) -> float | None:
+        """The value of a variable; None: empty."""
+
+    def exists(self, name: str) -> bool:
+        """Whether a named variable has a value."""
+
+    def angle(self, y: float, x: float) -> float:
+        """ATAN[y]/[x], degrees."""
+
+
+Value = Callable[[Variables], float | None]  # None: an empty variable of Macro B
 
 NUMBER = re.compile(r"\d+\.?\d*|\.\d+", re.ASCII)
 NAME = re.compile(r"<([^<>]*)>")

@@ -90,6 +90,7 @@ class ParametricRun(ProgramRun):
         self._steps = 0
         self._modal: MacroCall | None = None
         self._at = 0
+        self._began = False  # a variable was set, or the flow steered
 
     # -- blocks ----------------------------------------------------------------------------------------------------
 
@@ -118,6 +119,9 @@ class ParametricRun(ProgramRun):
             raise self._fail(at, f"more than {MOST_STEPS:,} blocks have run", "a loop that ends")
         statement = self._statement(at)
         self.variables.line = statement.line
+        if statement.percent and self._began:  # as after a word, the tape mark is the last one
+            return len(self.lines)
+        self._began |= bool(statement.assignments or statement.steering)
         if statement.optional and statement.switch in self.switches:
             return at + 1
         if statement.steering is None:

@@ -150,6 +150,8 @@ def joint_columns(model: StiffnessModel, readings: Measurements) -> FloatArray:
 def principal(columns: FloatArray, share: float = 1e-3) -> FloatArray:
     """(m, k) columns with the same covariance as (m, q), but for a share of the variance at most."""
     values, vectors = np.linalg.eigh(columns.T @ columns)
+    if not values.any():
+        return columns[:, :0]
     least = values[np.cumsum(values) > share * values.sum()][0]
     # Of equal values, which a symmetric machine has, all or none: which of them comes first is chance.
     return np.asarray(columns @ vectors[:, values >= (1.0 - ALIKE) * least])
