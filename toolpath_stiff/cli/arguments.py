@@ -140,6 +140,10 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
         metavar="N,N",
         help="leave out blocks that begin with / (with 2,3: those that begin with /2 or /3; / is /1)",
     )
+    _add_interpreter_options(group)
+
+
+def _add_interpreter_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--interpreter",
         choices=("builtin", "linuxcnc", "auto"),

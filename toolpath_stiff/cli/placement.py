@@ -38,11 +38,8 @@ report.html (click a placement of the front, see the path there).
 """
 
 
-def place_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.epilog = PLACE_EPILOG
-    parser.add_argument("program", metavar="PROGRAM", help="NC program or cutter-location file")
+def _add_bounds(parser: argparse.ArgumentParser) -> None:
+    """Options about what a search may vary."""
     group = parser.add_argument_group(
         "what may vary (LO:HI, or one number to fix it; default: as far as the machine reaches)"
     )
@@ -78,6 +75,14 @@ def place_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="let struts leave the lengths of their law at more samples than now",
     )
+
+
+def place_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = PLACE_EPILOG
+    parser.add_argument("program", metavar="PROGRAM", help="NC program or cutter-location file")
+    _add_bounds(parser)
     parser.add_argument(
         "--objective",
         type=_objective,

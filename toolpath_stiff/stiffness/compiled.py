@@ -31,38 +31,6 @@ def _trusted(kernel: ClosedForm, det: FloatArray, values: FloatArray) -> BoolArr
     return np.asarray(well_conditioned(kernel, det[0], det[1]) & np.isfinite(values))
 
 
-def tip_compliance_columns(
-    kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None = None
-) -> tuple[FloatArray, BoolArray]:
-    """Tip compliance with poses last, the fastest form.
-
-    Parameters
-    ----------
-    kernel
-        From `closed_form.prepare`.
-    position
-        (3, n) m, contiguous.
-    rotation
-        (9, n) rows of the rotation matrices one after the other, contiguous; None: vertical spindle.
-
-    Returns
-    -------
-    compliance, good
-        (6, n) m/N: xx, yy, zz, xy, xz, yz, nan where a strut is so long that the law leaves it no stiffness; (n,) as in
-        `closed_form.tip_compliance`.
-    """
-    from toolpath_stiff.stiffness import compiled_loops
-
-    n = position.shape[1]
-    out, det = np.empty((6, n)), np.empty((2, n))
-    arms, frame = _joints(kernel)
-    if rotation is None:
-        compiled_loops.tensor_vertical(n, position, arms, frame, kernel.intercept, kernel.slope, out, det)
-    else:
-        compiled_loops.tensor_tilted(n, position, rotation, arms, frame, kernel.intercept, kernel.slope, out, det)
-    return out, _trusted(kernel, det, out[2])
-
-
 def tip_compliance(
     kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None = None
 ) -> tuple[FloatArray, BoolArray]:
@@ -95,7 +63,7 @@ def compliance_along_columns(
     position, direction
         (3, n) m and unit vectors, contiguous.
     rotation
-        (9, n) or None, as in `tip_compliance_columns`.
+        (9, n) rows of the rotation matrices one after the other, contiguous; None: vertical spindle.
 
     Returns
     -------

@@ -133,11 +133,6 @@ class Diagnosis:
         return self.fits[self.best].residual
 
     @property
-    def winner(self) -> tuple[ActiveEffect, ...]:
-        """Effects of the best explanation."""
-        return () if self.best is None else self.fits[self.best].effects
-
-    @property
     def law(self) -> FloatArray:
         """(2,) the strut law's logarithms with the best explanation."""
         return self.base.law if self.best is None else self.fits[self.best].law
