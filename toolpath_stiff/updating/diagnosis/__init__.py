@@ -19,7 +19,7 @@ from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
-from toolpath_stiff.stiffness.model import ActiveEffect, build_model, setup_of
+from toolpath_stiff.stiffness.model import build_model, setup_of
 from toolpath_stiff.updating.inference import NONE, Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
