@@ -33,6 +33,7 @@ from toolpath_stiff.report.batch.programs import (
     find_programs,
     report_folders,
 )
+from toolpath_stiff.report.words import counted
 from toolpath_stiff.results_folder import Rules, check_folder, clear_up, write_folder
 
 if TYPE_CHECKING:
@@ -111,8 +112,7 @@ class ManyAnalyses(Result):
         return text(self.outcomes)
 
     def _short(self) -> str:
-        count = len(self.outcomes)
-        return f"{count} program{'' if count == 1 else 's'}, {len(self.failed) or 'none'} failed"
+        return f"{counted(len(self.outcomes), 'program')}, {len(self.failed) or 'none'} failed"
 
 
 def analyze_many(
