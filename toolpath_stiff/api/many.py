@@ -20,9 +20,9 @@ from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import TABLES, analyze, path_options
 from toolpath_stiff.api.results import Progress, Result, one_of
-from toolpath_stiff.defaults import FORCE, LOAD
+from toolpath_stiff.defaults import FORCE, LOAD, job_count
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.processes import ProcessDied, ProcessPool, job_count
+from toolpath_stiff.processes import ProcessDied, ProcessPool
 from toolpath_stiff.report.batch import files, names, text
 from toolpath_stiff.report.batch.programs import (
     Found,

@@ -83,7 +83,7 @@ def find_programs(arguments: Sequence[str | Found]) -> tuple[list[Found], list[F
 
 def endings() -> tuple[str, ...]:
     """Endings of the files that a folder stands for: NC programs, and cutter-location files."""
-    from toolpath_stiff.nc.cutter_location.statements import EXTENSIONS
+    from toolpath_stiff.nc.words import EXTENSIONS
 
     return NC_ENDINGS + EXTENSIONS
 
