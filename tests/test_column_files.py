@@ -1,4 +1,4 @@
-"""Columns to files: Arrow's rows against Python's own formatting, Parquet against pyarrow's reader."""
+"""Columns to files: rows by arithmetic against Python's own formatting, Parquet against pyarrow's reader."""
 
 import csv
 import io
@@ -31,23 +31,35 @@ any_number = st.floats(-1e8, 1e8) | st.just(float("nan")) | st.sampled_from([0.5
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(any_number, min_size=1, max_size=50))
-def test_arrow_writes_what_python_formats(numbers):
+def test_arithmetic_writes_what_python_formats(numbers):
     columns = columns_of(numbers)
-    rows = column_files._by_arrow(columns, DECIMALS)
+    rows = column_files._by_digits(columns, DECIMALS)
     assert rows is None or rows.decode() == csv_rows(columns, DECIMALS)
 
 
 def test_decimals_are_those_of_the_printed_number():
     columns = {"x": np.array([1.0, -0.25, np.nan, -1e-7])}
-    assert column_files._by_arrow(columns, {"x": 3}) == b"1.000\n-0.250\n\n0.000\n"
+    assert column_files._by_digits(columns, {"x": 3}) == b"1.000\n-0.250\n\n0.000\n"
 
 
 @pytest.mark.parametrize("number", [np.inf, 1e300])
-def test_numbers_that_arrow_cannot_hold_are_written_all_the_same(number, monkeypatch):
-    monkeypatch.setattr(column_files, "FEWEST_FOR_ARROW", 1)
+def test_numbers_that_whole_units_cannot_hold_are_written_all_the_same(number):
     columns = {"x": np.array([1.0, number])}
     text = text_of(csv_pieces(lambda rows: {"x": columns["x"][rows]}, 2, {"x": 1}))
     assert [float(cell) for cell in text.split()[1:]] == [1.0, number]
+
+
+def test_words_beyond_ascii_and_minus_signs_are_written_all_the_same():
+    words = {"word": np.array(["Fr\u00e4sen", "", "x"]), "n": np.array([-12, 0, 7]), "x": np.array([-1.5, -1.5, -1.5])}
+    decimals = {"word": None, "n": None, "x": 2}
+    assert text_of(csv_pieces(lambda rows: words, 3, decimals)).splitlines()[1:] == [
+        "Fr\u00e4sen,-12,-1.50",
+        ",0,-1.50",
+        "x,7,-1.50",
+    ]
+    plain = {**words, "word": np.array(["a", "", "b"])}
+    assert column_files._by_digits(plain, decimals) == b"a,-12,-1.50\n,0,-1.50\nb,7,-1.50\n"
+    assert column_files._by_digits(words, decimals) is None
 
 
 def test_blocks_join_without_seam(monkeypatch):
@@ -58,9 +70,7 @@ def test_blocks_join_without_seam(monkeypatch):
         return {name: column[rows] for name, column in columns.items()}
 
     expected = ",".join(DECIMALS) + "\n" + csv_rows(columns, DECIMALS)
-    for fewest in (1, 1000):
-        monkeypatch.setattr(column_files, "FEWEST_FOR_ARROW", fewest)
-        assert text_of(csv_pieces(some, 100, DECIMALS)) == expected
+    assert text_of(csv_pieces(some, 100, DECIMALS)) == expected
     table = parquet.read_table(io.BytesIO(b"".join(parquet_pieces(some, 100))))
     assert table.num_rows == 100
     for name, column in columns.items():

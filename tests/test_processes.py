@@ -11,8 +11,9 @@ from concurrent.futures import CancelledError, as_completed
 
 import pytest
 
+from toolpath_stiff.defaults import THREADS, job_count
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.processes import THREADS, ProcessDied, ProcessPool, job_count
+from toolpath_stiff.processes import ProcessDied, ProcessPool
 
 
 def multiply(factor, item):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, rad_from_deg
 
 VERSION = "0.2.0"  # of the package; pyproject.toml reads it from this text
@@ -40,3 +42,23 @@ NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 # Environment variables by which linear algebra is told how many threads it may have, before it is loaded. One, by
 # design: on matrices of this size a second one costs four times the CPU, and sums keep their order.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def usable_cpus() -> int:
+    """CPUs that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def job_count(asked: int | None, items: int) -> int:
+    """Processes for so many items: as asked, else one a CPU. Raises `InputError` for fewer than one."""
+    if asked is not None and asked < 1:
+        raise InputError(f"--jobs {asked}", expected="1 or more")
+    return max(1, min(asked or usable_cpus(), items))
+
+
+def one_thread() -> None:
+    """Linear algebra on one thread, if it is not loaded yet: the processes share the CPUs, sums keep their order."""
+    for name in THREADS:
+        os.environ[name] = "1"

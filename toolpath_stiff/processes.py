@@ -25,8 +25,7 @@ from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import Any, ParamSpec, TypeVar
 
-from toolpath_stiff.defaults import THREADS
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.defaults import THREADS, one_thread
 
 Arguments = ParamSpec("Arguments")
 Answer = TypeVar("Answer")
@@ -34,26 +33,6 @@ Answer = TypeVar("Answer")
 LEAVE_SECONDS = 5.0  # for a process that is told to stop, to remove its temporary files
 BLOCKED = [getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGTERM") if hasattr(signal, name)]
 _ONE_BY_ONE = threading.Lock()  # processes are started and reaped by one thread at a time
-
-
-def usable_cpus() -> int:
-    """CPUs that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def job_count(asked: int | None, items: int) -> int:
-    """Processes for so many items: as asked, else one a CPU. Raises `InputError` for fewer than one."""
-    if asked is not None and asked < 1:
-        raise InputError(f"--jobs {asked}", expected="1 or more")
-    return max(1, min(asked or usable_cpus(), items))
-
-
-def one_thread() -> None:
-    """Linear algebra on one thread, if it is not loaded yet: the processes share the CPUs, sums keep their order."""
-    for name in THREADS:
-        os.environ[name] = "1"
 
 
 class ProcessDied(RuntimeError):

@@ -15,10 +15,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import cutter_location, parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import DIALECTS, Controller
-from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.geometry import move_lengths
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED
 from toolpath_stiff.nc.operations import operations
+from toolpath_stiff.nc.words import looks_like_cutter_location
 from toolpath_stiff.rewriting import offset_blocks
 from toolpath_stiff.rotations import rotation_matrices
 

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from tests.browser import needs_browser, painted
@@ -102,9 +103,12 @@ def used_width(figure):
 
 
 @pytest.mark.parametrize("pose", [(-0.3, 0.3, 0.3, np.radians(-30.0), 0.0, 0.0), (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)])
-def test_the_machine_is_whole_and_its_axes_named(last, pose):
+def test_the_machine_is_whole_and_its_axes_named(last, pose, monkeypatch):
+    draws, draw = [], Figure.draw_without_rendering
+    monkeypatch.setattr(Figure, "draw_without_rendering", lambda self: (draws.append(1), draw(self)))
     at = np.array(pose)
     machine.machine_picture(nist(), at, solve_struts(nist(), at[None, :3], at[None, 3:]))
+    assert len(draws) <= 4  # the zoom is foreseen, not searched
     figure = last[-1]
     figure.draw_without_rendering()
     for i, axes in enumerate(figure.axes):

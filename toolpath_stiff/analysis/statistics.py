@@ -183,7 +183,7 @@ def _plunges(path: EvaluatedPath, rows: IntArray) -> dict[str, Any]:
     samples = path.samples
     return {
         "samples": len(rows),
-        "moves": len(np.unique(samples.move[rows])),
+        "moves": 1 + int(np.count_nonzero(np.diff(samples.move[rows]))),  # they rise along the path
         "length_mm": mm_from_m(float(samples.weight[rows].sum())),
         **_figures_and_weakest(path, rows),
     }

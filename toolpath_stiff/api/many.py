@@ -20,9 +20,9 @@ from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import TABLES, analyze, path_options
 from toolpath_stiff.api.results import Progress, Result, one_of
-from toolpath_stiff.defaults import FORCE, LOAD
+from toolpath_stiff.defaults import FORCE, LOAD, job_count
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.processes import ProcessDied, ProcessPool, job_count
+from toolpath_stiff.processes import ProcessDied, ProcessPool
 from toolpath_stiff.report.batch import files, names, text
 from toolpath_stiff.report.batch.programs import (
     Found,
@@ -33,6 +33,7 @@ from toolpath_stiff.report.batch.programs import (
     find_programs,
     report_folders,
 )
+from toolpath_stiff.report.words import counted
 from toolpath_stiff.results_folder import Rules, check_folder, clear_up, write_folder
 
 if TYPE_CHECKING:
@@ -111,8 +112,7 @@ class ManyAnalyses(Result):
         return text(self.outcomes)
 
     def _short(self) -> str:
-        count = len(self.outcomes)
-        return f"{count} program{'' if count == 1 else 's'}, {len(self.failed) or 'none'} failed"
+        return f"{counted(len(self.outcomes), 'program')}, {len(self.failed) or 'none'} failed"
 
 
 def analyze_many(

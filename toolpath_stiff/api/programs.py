@@ -398,8 +398,9 @@ class ProgramCheck(Result):
         return text(self._document)
 
     def _short(self) -> str:
-        count = len(self.errors)
-        return f"{self._document['program']}, {count or 'no'} error{'' if count == 1 else 's'}"
+        from toolpath_stiff.report.words import counted
+
+        return f"{self._document['program']}, {counted(len(self.errors), 'error') if self.errors else 'no errors'}"
 
 
 def check(

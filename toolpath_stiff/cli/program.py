@@ -130,7 +130,7 @@ def analyze_arguments(parser: argparse.ArgumentParser) -> None:
 
 def analyze(args: argparse.Namespace) -> int:
     """Analyze one program, or several, or those of a folder."""
-    from toolpath_stiff.processes import job_count, one_thread
+    from toolpath_stiff.defaults import job_count, one_thread
 
     one_thread()  # before numpy is loaded
     from toolpath_stiff.report.batch.programs import find_programs

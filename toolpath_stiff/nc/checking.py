@@ -18,7 +18,6 @@ from toolpath_stiff.nc import cutter_location
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning, would_change
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain, switches_on
-from toolpath_stiff.nc.cutter_location.statements import looks_like_cutter_location
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
@@ -35,7 +34,7 @@ from toolpath_stiff.nc.reader import (
 )
 from toolpath_stiff.nc.state import Flow, State, Then
 from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
-from toolpath_stiff.nc.words import Block
+from toolpath_stiff.nc.words import Block, looks_like_cutter_location
 from toolpath_stiff.units import Pose, m_from_mm, pose_in_mm, pose_in_si
 
 ERROR, WARNING, NOTE = "error", "warning", "note"

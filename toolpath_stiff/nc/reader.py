@@ -13,16 +13,14 @@ from functools import partial
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc import cutter_location
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
-from toolpath_stiff.nc.cutter_location.statements import HEAD_LINES, looks_like_cutter_location
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.moves import RAPID, Moves, Program
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
-from toolpath_stiff.nc.words import read_lines, split_lines
+from toolpath_stiff.nc.words import HEAD_LINES, looks_like_cutter_location, read_lines, split_lines
 from toolpath_stiff.units import Pose, ShopPose, mm_per_min_from_m_per_s, pose_in_mm, pose_in_si
 
 # -- other languages ---------------------------------------------------------------------------------------------------
@@ -247,6 +245,8 @@ def _read(asked: _Request) -> Program:
 
 
 def _read_cutter_location(asked: _Request) -> Program:
+    from toolpath_stiff.nc import cutter_location
+
     if asked.interpreter == "linuxcnc":
         raise ProgramError(
             "LinuxCNC's interpreter reads no cutter-location files",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
@@ -38,6 +38,16 @@ LONGEST_NUMBER = 100  # characters
 LONGEST_LEADER = 50  # lines of text before the first tape mark
 MOST_DIGITS = 9  # of a program number, its O included
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
+# Of cutter-location files, which are not blocks of words: what tells them from G code is known here, their own
+# reader is loaded for them alone.
+EXTENSIONS = (".apt", ".aptsource", ".cl", ".cls", ".clsf", ".ncl")
+HEAD_LINES = 50  # a file says what it is at its beginning, comments and blank lines apart
+# What no line of G code looks like.
+STATEMENT = re.compile(
+    r"\s*(?:N?\d+\s+)?(?:(?:GOTO|FROM|FEDRAT|CUTTER|LOADTL|UNITS?|MACHIN|SPINDL|TLDATA|MSYS|TOOL\s+PATH|TLAXIS|TOOLNO"
+    r"|GODLTA|INTOL|OUTTOL)\s*/|PPRINT\b|PARTNO\b|MULTAX\s*(?:/|$)|(?:RAPID|FINI)\s*$)",
+    re.IGNORECASE,
+)
 
 
 class Word(NamedTuple):
@@ -403,3 +413,33 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
             line=at,
         )
     return tuple(found)
+
+
+def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
+    """Whether a file is a cutter-location file, by its extension or by how it begins.
+
+    Examples
+    --------
+    >>> looks_like_cutter_location(("$$ part 7", "UNITS/MM", "GOTO/1,2,3"), "part.txt")
+    True
+    >>> looks_like_cutter_location(("G21", "G1 X1 F100"), "part.txt")
+    False
+    """
+    if name.lower().endswith(EXTENSIONS):
+        return True
+    seen = 0
+    for line in lines:
+        text = line.strip()
+        if not text or text.startswith("$$"):
+            continue
+        if STATEMENT.match(text):
+            return True
+        seen += 1
+        if seen >= HEAD_LINES:
+            break
+    return False
+
+
+def any_statement(lines: Iterable[str]) -> bool:
+    """Whether any of these lines is a statement that no other text looks like."""
+    return any(STATEMENT.match(line) for line in lines)

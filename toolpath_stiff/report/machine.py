@@ -37,6 +37,7 @@ POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 TOP = 0.84  # of the picture's height, below the headings
 BELOW = -0.1  # of the picture's height: the views' empty rims lie beyond it
 ZOOMS = np.arange(1.5, 0.5, -0.05)  # of a view, the largest at which its axes and labels stay in its half
+USUAL_ZOOM = 0.8  # of the packaged machines, within 0.05
 
 
 @picture
@@ -50,8 +51,7 @@ def machine_picture(machine: Machine, pose: FloatArray, struts: Struts) -> Figur
         _draw_whole(whole, machine, mm_from_m(joints), mm_from_m(nodes), struts)
         detail = figure.add_axes((0.5, BELOW, 0.5, 1.0), projection="3d")
         _draw_platform(detail, machine, mm_from_m(nodes))
-        for axes in (whole, detail):
-            _fit(figure, axes)
+        _fit(figure, (whole, detail))
         _heading(figure, machine, pose)
         return figure
 
@@ -89,26 +89,55 @@ def _draw_whole(axes: Any, machine: Machine, joints: FloatArray, nodes: FloatArr
     _finish(axes, np.vstack([frame, nodes]))
 
 
-def _fit(figure: Figure, axes: Any) -> None:
-    """Zoom a view so that it fills its half of the picture with nothing beyond it."""
-    span = [high - low for low, high in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
-    room = axes.get_window_extent()
-    for zoom in ZOOMS:
-        axes.set_box_aspect(span, zoom=float(zoom))
+def _fit(figure: Figure, views: Sequence[Any]) -> None:
+    """Zoom each view so that it fills its half of the picture with nothing beyond it.
+
+    One drawing shows how far figures and names reach beyond the box, which changes little with the zoom; the second
+    shows that what was foreseen fits.
+    """
+    for axes in views:
+        _box(axes, USUAL_ZOOM)
+    figure.draw_without_rendering()
+    reach = [_reach(axes) for axes in views]
+    left = [[zoom for zoom in ZOOMS if _fits(figure, axes, _box(axes, zoom) + beyond)] or [ZOOMS[-1]]
+            for axes, beyond in zip(views, reach, strict=True)]  # fmt: skip
+    while True:
+        for axes, zooms in zip(views, left, strict=True):
+            _box(axes, zooms[0])
         figure.draw_without_rendering()
-        low, high = _extent(axes)
-        if room.x0 <= low[0] and high[0] <= room.x1 and low[1] >= 0.0 and high[1] <= TOP * figure.bbox.height:
+        too_large = [
+            zooms for axes, zooms in zip(views, left, strict=True)
+            if len(zooms) > 1 and not _fits(figure, axes, _box(axes, zooms[0]) + _reach(axes))
+        ]  # fmt: skip
+        if not too_large:
             return
+        for zooms in too_large:
+            zooms.pop(0)
 
 
-def _extent(axes: Any) -> tuple[FloatArray, FloatArray]:
-    """Lower left and upper right corner in pixels of a view: its box, its figures and what the axes are called."""
-    corners = np.array(list(product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim(), (1.0,))))
-    seen = corners @ axes.get_proj().T  # homogeneous
-    boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
-    ends = [box.get_points() for box in boxes if box is not None]
-    points = np.concatenate([axes.transData.transform(seen[:, :2] / seen[:, 3:]), *ends])
-    return points.min(axis=0), points.max(axis=0)
+def _box(axes: Any, zoom: float | None = None) -> FloatArray:
+    """(2, 2) pixels of the lower left and upper right corner of a view's box, zoomed if asked."""
+    limits = axes.get_xlim(), axes.get_ylim(), axes.get_zlim()
+    if zoom is not None:
+        axes.set_box_aspect([high - low for low, high in limits], zoom=float(zoom))
+    seen = np.array(list(product(*limits, (1.0,)))) @ axes.get_proj().T  # homogeneous
+    points = axes.transData.transform(seen[:, :2] / seen[:, 3:])
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def _reach(axes: Any) -> FloatArray:
+    """(2, 2) pixels by which a view's figures and what its axes are called reach beyond its box, as it is drawn."""
+    box = _box(axes)
+    found = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    ends = np.concatenate([box, *(one.get_points() for one in found if one is not None)])
+    return np.array([ends.min(axis=0), ends.max(axis=0)]) - box
+
+
+def _fits(figure: Figure, axes: Any, extent: FloatArray) -> bool:
+    """Whether corners (2, 2) in pixels lie in the view's half of the picture, below the headings."""
+    (left, below), (right, above) = extent
+    room = axes.get_window_extent()
+    return bool(room.x0 <= left and right <= room.x1 and below >= 0.0 and above <= TOP * figure.bbox.height)
 
 
 _LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}

@@ -32,6 +32,11 @@ def number(value: float | None, digits: int = 0) -> str:
     return text.replace("-", "", 1) if float(text.replace(" ", "")) == 0.0 else text
 
 
+def counted(count: float, thing: str) -> str:
+    """So many of a thing: "1 line", "1 405 lines"."""
+    return f"{number(count)} {thing}{'' if count == 1 else 's'}"
+
+
 def span_of(figures: Mapping[str, Any]) -> str:
     """Lowest and highest stiffness of a block of figures: "122 988 to 123 770"."""
     return f"{number(figures['min_N_per_mm'])} to {number(figures['max_N_per_mm'])}"

@@ -22,7 +22,6 @@ from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import State
 from toolpath_stiff.nc.cutter_location.statements import (
     Statement,
-    any_statement,
     frame_in_comment,
     plain_point,
     read_statement,
@@ -31,6 +30,7 @@ from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.nc.words import any_statement
 from toolpath_stiff.units import Pose
 
 NO_CUT = "no cutting move"

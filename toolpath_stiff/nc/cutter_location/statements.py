@@ -8,24 +8,15 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from operator import itemgetter
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.tables import LARGEST_MM
 
-EXTENSIONS = (".apt", ".aptsource", ".cl", ".cls", ".clsf", ".ncl")
-HEAD_LINES = 50  # a file says what it is at its beginning, comments and blank lines apart
-
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[EeDd][+-]?\d++)?"
 _IS_NUMBER = re.compile(_NUMBER)
-# What no line of G code looks like.
-_SIGN = re.compile(
-    r"\s*(?:N?\d+\s+)?(?:(?:GOTO|FROM|FEDRAT|CUTTER|LOADTL|UNITS?|MACHIN|SPINDL|TLDATA|MSYS|TOOL\s+PATH|TLAXIS|TOOLNO"
-    r"|GODLTA|INTOL|OUTTOL)\s*/|PPRINT\b|PARTNO\b|MULTAX\s*(?:/|$)|(?:RAPID|FINI)\s*$)",
-    re.IGNORECASE,
-)
 _LABEL = re.compile(r"\s*(?:N?\d+\s+(?=[A-Za-z])|[A-Za-z0-9]+\))")
 # These carry free text, which no `$` continues.
 _TEXT_WORD = re.compile(r"\s*(PARTNO|PPRINT|REMARK|INSERT|LETTER|TITLES|MFGNO)", re.IGNORECASE)
@@ -71,36 +62,6 @@ class Statement:
         arguments = ",".join(" ".join(argument.text.split()) for argument in self.arguments)
         shown = f"{self.word}/{arguments}" if arguments else self.word or self.text
         return shown if len(shown) <= 60 else shown[:57] + "..."
-
-
-def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
-    """Whether a file is a cutter-location file, by its extension or by how it begins.
-
-    Examples
-    --------
-    >>> looks_like_cutter_location(("$$ part 7", "UNITS/MM", "GOTO/1,2,3"), "part.txt")
-    True
-    >>> looks_like_cutter_location(("G21", "G1 X1 F100"), "part.txt")
-    False
-    """
-    if name.lower().endswith(EXTENSIONS):
-        return True
-    seen = 0
-    for line in lines:
-        text = line.strip()
-        if not text or text.startswith("$$"):
-            continue
-        if _SIGN.match(text):
-            return True
-        seen += 1
-        if seen >= HEAD_LINES:
-            break
-    return False
-
-
-def any_statement(lines: Iterable[str]) -> bool:
-    """Whether any of these lines is a statement that no other text looks like."""
-    return any(_SIGN.match(line) for line in lines)
 
 
 def plain_point(line: str) -> list[float] | None:

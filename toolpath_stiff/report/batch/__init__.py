@@ -18,7 +18,7 @@ from toolpath_stiff import __version__
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.batch.programs import RESERVED, Outcome, summary_csv, terminal_summary
 from toolpath_stiff.report.pages import markup, render
-from toolpath_stiff.report.words import ONLY_PLUNGES, duration, number, only_plunges, plain, shortened
+from toolpath_stiff.report.words import ONLY_PLUNGES, counted, duration, number, only_plunges, plain, shortened
 
 INDEX, SUMMARY = RESERVED
 TEXT = 40  # characters of a program's line that are shown
@@ -45,7 +45,7 @@ def batch_page(outcomes: Sequence[Outcome]) -> str:
         "batch.html",
         styles=["sections.css", "batch.css"],
         scripts=["batch.js"] if table else [],
-        title=f"Stiffness of {_programs(len(outcomes))}",
+        title=f"Stiffness of {counted(len(outcomes), 'program')}",
         verdict=_verdict(good, failed),
         headline=_headline(good),
         text="Every program that could be analyzed has its own report: its name opens it." if good else "",
@@ -59,14 +59,10 @@ def batch_page(outcomes: Sequence[Outcome]) -> str:
     )
 
 
-def _programs(count: int) -> str:
-    return f"{number(count)} program{'' if count == 1 else 's'}"
-
-
 def _verdict(good: Sequence[Outcome], failed: Sequence[Outcome]) -> str:
     if failed:
-        return f"{number(len(failed))} of {_programs(len(good) + len(failed))} failed"
-    return f"{_programs(len(good))} analyzed"
+        return f"{number(len(failed))} of {counted(len(good) + len(failed), 'program')} failed"
+    return f"{counted(len(good), 'program')} analyzed"
 
 
 def _headline(good: Sequence[Outcome]) -> str:

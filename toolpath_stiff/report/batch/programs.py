@@ -16,7 +16,7 @@ from typing import Any
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.report.words import duration, number, only_plunges, plain, shortened
+from toolpath_stiff.report.words import counted, duration, number, only_plunges, plain, shortened
 
 # Endings of NC programs and of nothing else: `.txt` is as often a note or a tool list.
 NC_ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min")
@@ -83,7 +83,7 @@ def find_programs(arguments: Sequence[str | Found]) -> tuple[list[Found], list[F
 
 def endings() -> tuple[str, ...]:
     """Endings of the files that a folder stands for: NC programs, and cutter-location files."""
-    from toolpath_stiff.nc.cutter_location.statements import EXTENSIONS
+    from toolpath_stiff.nc.words import EXTENSIONS
 
     return NC_ENDINGS + EXTENSIONS
 
@@ -332,15 +332,11 @@ def terminal_summary(outcomes: Sequence[Outcome]) -> str:
     below = [one for one in good if _figure(one, "lines_below_required")]
     if below:
         lines.append(f"below the required {_figure(below[0], 'required_N_per_mm'):g} N/mm:")
-        lines += [f"  {plain(one.name)}: {_lines(_figure(one, 'lines_below_required'))}" for one in below]
+        lines += [f"  {plain(one.name)}: {counted(_figure(one, 'lines_below_required'), 'line')}" for one in below]
     if failed:
         lines.append(f"{len(failed)} of {len(outcomes)} programs failed:")
         lines += [f"  {plain(one.reason)}" for one in failed]
     return "\n".join(lines)
-
-
-def _lines(count: float) -> str:
-    return f"{number(count)} line{'' if count == 1 else 's'}"
 
 
 def _figure(one: Outcome, name: str) -> Any:
