@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 import random
+import shutil
+import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -239,3 +242,12 @@ def test_chosen_programs(text, tmp_path):
     canon = rs274.run(program, tmp_path)
     assert not canon.error
     assert_same_path(read_program(program), canon)
+
+
+def debian_programs() -> list[Path]:
+    """NC programs that Debian's linuxcnc-uspace installs and that run nothing."""
+    if not rs274.AVAILABLE or shutil.which("dpkg") is None:
+        return []
+    listing = subprocess.run(["dpkg", "-L", "linuxcnc-uspace"], capture_output=True, text=True, check=False).stdout
+    files = [Path(line) for line in listing.splitlines() if line.endswith((".ngc", ".nc"))]
+    return [f for f in files if f.is_file() and not rs274.UNSAFE.search(f.read_text(errors="replace"))]
