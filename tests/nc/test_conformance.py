@@ -2,25 +2,97 @@
 
 from __future__ import annotations
 
+from functools import cache
+from pathlib import Path
+
 import pytest
 
 from benchmarks import conformance
 from tests.nc import rs274
-from toolpath_stiff.nc import parse_program
+from tests.nc.test_nc_against_rs274 import assert_same_path, debian_programs
+from toolpath_stiff.nc import Program, parse_program
 
 ARC = "G1 X10 F100\nG2 X30 I10\nG1 X40 A5\n"
 
 
-def test_never_another_path(tmp_path):
-    files = conformance.installed_programs() if rs274.AVAILABLE else []
-    if not files:
-        pytest.skip("LinuxCNC's programs are not installed")
-    rows = conformance.measure(files, tmp_path)
-    assert [row for row in rows if row.verdict == conformance.OTHER] == []
-    ran = [row for row in rows if row.runs]
+# Lengths that rs274's four decimals of an inch hold; its own table is in inches.
+LENGTHS_MM = {n: n * 2.54 for n in range(1, 100)}
+OURS = "tool,length_mm,diameter_mm\n" + "".join(f"{n},{z:.2f},6.35\n" for n, z in LENGTHS_MM.items())
+THEIRS = "".join(f"T{n} P{n} Z{z / 25.4:.1f} D0.25 ;\n" for n, z in LENGTHS_MM.items())
+
+
+class Installed:
+    """The programs that Debian installs: each is read once by either reader, and run once by rs274 itself."""
+
+    def __init__(self, folder: Path) -> None:
+        files = conformance.installed_programs() if rs274.AVAILABLE else []
+        if not files:
+            pytest.skip("LinuxCNC's programs are not installed")
+        self.folder, self.canons = folder, {}
+        self.reading = cache(conformance.read)
+        self.harmless = debian_programs()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(conformance, "read", self.reading)
+            patch.setattr(conformance, "TOOL_TABLE", OURS)
+            self.rows = conformance.measure(files, folder)
+
+    def read(self, file: Path, interpreter: str) -> Program | None:
+        """The program, or None where it is refused with file, line and column or makes no cut."""
+        program, said = self.reading(file, self.folder / "tools.csv", interpreter, None)
+        assert program or said == conformance.NONE or said.startswith(file.name), said
+        return program
+
+    def canon(self, file: Path) -> rs274.Canon:
+        """The file itself, not what `linuxcnc` makes of it, through the tests' own parser; in a home of its own."""
+        if file not in self.canons:
+            home = self.folder / f"home{len(self.canons)}"  # rs274 keeps its parameters from run to run
+            home.mkdir()
+            self.canons[file] = rs274.run(file, home, THEIRS)
+        return self.canons[file]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    return Installed(tmp_path_factory.mktemp("installed"))
+
+
+def test_never_another_path(installed):
+    assert [row for row in installed.rows if row.verdict == conformance.OTHER] == []
+    ran = [row for row in installed.rows if row.runs]
     assert len(ran) > 150
     # A reader that refuses everything would pass too: these it reads.
     assert sum(row.verdict == conformance.SAME for row in ran) >= 22
+
+
+def test_programs_of_others(installed):
+    """Each is read as LinuxCNC does, or refused with file, line and column."""
+    same = 0
+    for file in installed.harmless:
+        program = installed.read(file, "builtin")
+        if program is None:
+            continue
+        canon = installed.canon(file)
+        said = [line for line in canon.error.splitlines() if not line.strip().startswith(("executing", "link"))]
+        if said:  # it refuses user M codes above 199, which do not concern us
+            assert any("M-code greater than 199" in line for line in said), (file, canon.error)
+            continue
+        assert_same_path(program, canon)
+        same += 1
+    assert same >= 20
+
+
+def test_programs_of_others_against_an_independent_reading(installed):
+    """O words and all: LinuxCNC's interpreter as the tool runs it against the original file."""
+    read = 0
+    for file in installed.harmless:
+        program = installed.read(file, "linuxcnc")
+        if program is None or "G33.1" in file.read_text(errors="replace"):  # the tests' parser knows no rigid tapping
+            continue
+        if any(text.startswith("left out for") for text in program.assumptions):  # rs274 alone refuses it
+            continue
+        assert_same_path(program, installed.canon(file))
+        read += 1
+    assert read >= 25
 
 
 def test_a_path_in_other_pieces_is_the_same():

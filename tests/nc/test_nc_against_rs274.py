@@ -1,4 +1,4 @@
-"""Our moves against LinuxCNC's interpreter: random programs over every supported code, and programs of others."""
+"""Our moves against LinuxCNC's interpreter: random programs over every supported code."""
 
 from __future__ import annotations
 
@@ -251,29 +251,3 @@ def debian_programs() -> list[Path]:
     listing = subprocess.run(["dpkg", "-L", "linuxcnc-uspace"], capture_output=True, text=True, check=False).stdout
     files = [Path(line) for line in listing.splitlines() if line.endswith((".ngc", ".nc"))]
     return [f for f in files if f.is_file() and not rs274.UNSAFE.search(f.read_text(errors="replace"))]
-
-
-def test_programs_of_others(tmp_path):
-    """Each is read as LinuxCNC does, or refused with file, line and column."""
-    table = tmp_path / "ours.tbl"
-    table.write_text("".join(f"T{n} P{n} Z{n * 2.54} D6 ;\n" for n in range(1, 60)))
-    for_rs274 = "".join(f"T{n} P{n} Z{n * 0.1} D0.25 ;\n" for n in range(1, 60))
-    files = debian_programs()
-    assert files, "the package lists no programs"
-    same = 0
-    for index, file in enumerate(files):
-        try:
-            program = read_program(file, tool_table=table)
-        except TpsError as error:
-            assert str(error).startswith(file.name), error
-            continue
-        own = tmp_path / f"home{index}"  # it keeps its parameters from run to run
-        own.mkdir(exist_ok=True)
-        canon = rs274.run(file, own, for_rs274)
-        said = [line for line in canon.error.splitlines() if not line.strip().startswith(("executing", "link"))]
-        if said:  # it refuses user M codes above 199, which do not concern us
-            assert any("M-code greater than 199" in line for line in said), (file, canon.error)
-            continue
-        assert_same_path(program, canon)
-        same += 1
-    assert same >= 20

@@ -543,7 +543,7 @@ CALL = st.sampled_from(["call 20", "twice 20"])
 ITEMS = st.lists(ITEM, max_size=5)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=100)
 @given(
     st.lists(ITEM | CALL | st.sampled_from(["call 10", "twice 10"]), max_size=12),
     st.lists(ITEM | CALL, max_size=5),

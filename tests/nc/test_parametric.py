@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.hunt import OTHER, hunt_one
@@ -303,6 +303,7 @@ def test_check_counts_what_runs_and_goes_on_after_an_error():
     assert not checked.complete and len(checked.moves) == 4
 
 
+@settings(max_examples=30)
 @given(st.integers(-99, 99), st.integers(-99, 99), st.sampled_from(["+", "-", "*"]))
 def test_sums_and_products_agree_in_both_families(one, other, operator):
     expected = {"+": one + other, "-": one - other, "*": one * other}[operator]

@@ -123,7 +123,7 @@ modal = st.sampled_from(
 )  # fmt: skip
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(
     st.lists(st.one_of(plain(), plain(), plain(), arc(), modal), min_size=1, max_size=30),
     st.sampled_from(sorted(DIALECTS)),
@@ -135,7 +135,7 @@ def test_random_programs(blocks, dialect):
     assert_same(split_lines("G21 G90 G17 F300\nG0 X0. Y0. Z0.\n" + "\n".join(blocks), "p"), dialect)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.lists(st.one_of(plain(), arc(), modal), min_size=1, max_size=20))
 def test_random_programs_are_checked_alike(blocks):
     lines = split_lines("F300\n" + "\n".join(blocks), "p")

@@ -321,7 +321,7 @@ def small_programs(draw) -> str:
     return "\n".join([*lines, "G1 X3.25 Y3", "M2", ""])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     text=small_programs(),
     shift=st.tuples(*[st.integers(-300_000, 300_000)] * 3),

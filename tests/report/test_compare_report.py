@@ -7,6 +7,7 @@ import io
 import json
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from toolpath_stiff.machine import load_machine
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.report.compare import QUESTIONS, compare_html, compare_pictures, residuals_csv
 from toolpath_stiff.report.compare import text as terminal_text
+from toolpath_stiff.report.compare.variables import load_path_png
 from toolpath_stiff.updating.comparison import Comparison, compare
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -49,10 +51,16 @@ def with_a_wild_reading() -> Measurements:
 DATA = {"paper": table_1, "one": one_reading, "oblique": oblique, "wild": with_a_wild_reading}
 
 
+@cache
+def compared(name: str) -> tuple[Comparison, dict[str, bytes]]:
+    """The comparison and its pictures."""
+    found = quick(DATA[name]())
+    return found, compare_pictures(found)
+
+
 @pytest.mark.parametrize("name", DATA)
 def test_pictures_and_page_for_any_data(name):
-    found = quick(DATA[name]())
-    pictures = compare_pictures(found)
+    found, pictures = compared(name)
     assert list(pictures) and set(pictures) == set(QUESTIONS)
     for picture in pictures.values():
         height, width = imread(io.BytesIO(picture), format="png").shape[:2]
@@ -66,12 +74,11 @@ def test_pictures_and_page_for_any_data(name):
 
 
 def test_the_same_comparison_gives_the_same_bytes():
-    first, again = (compare_pictures(quick(table_1())) for _ in range(2))
-    assert first == again
+    assert compared("paper")[1] == compare_pictures(quick(table_1()))
 
 
 def test_the_page_says_what_the_figures_are():
-    found = quick(table_1())
+    found, _ = compared("paper")
     page = compare_html(found, dict.fromkeys(QUESTIONS, b""))
     assert "9.62 %" in page
     assert "No pattern stands out from scatter" in page
@@ -82,7 +89,7 @@ def test_the_page_says_what_the_figures_are():
 
 def test_residuals_as_a_table_say_what_they_are():
     data = table_1()
-    found = quick(data)
+    found, _ = compared("paper")
     rows = list(csv.DictReader(io.StringIO(residuals_csv(found))))
     assert len(rows) == len(data)
     for row, stiffness, residual in zip(rows, data.stiffness, found.residual, strict=True):
@@ -97,7 +104,7 @@ def test_residuals_as_a_table_say_what_they_are():
 
 
 def test_terminal_steers_nothing_and_names_a_wild_reading():
-    text = terminal_text(quick(with_a_wild_reading()).document)
+    text = terminal_text(compared("wild")[0].document)
     assert "readings far off" in text
     assert "+2" in text.split("readings far off")[1]
     data = replace(oblique(), setup=np.array(["\x1b[31mred"] * 9))
@@ -161,5 +168,5 @@ def test_a_machine_with_effects_shows_them_in_the_load_path():
     assert len(found.shares.links) == 8
     # The table is 5, 4, 3 nm/N soft along X, Y, Z whatever the pose, the upright spindle 8, 8, 2.
     assert found.shares.compliance[:, 6:] * 1e9 == pytest.approx(np.array([[5.0, 8.0], [4.0, 8.0], [3.0, 2.0]]))
-    picture = compare_pictures(found)["load_path.png"]
+    picture = load_path_png(found)
     assert imread(io.BytesIO(picture), format="png").shape[1] >= 1000

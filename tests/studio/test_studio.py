@@ -422,26 +422,29 @@ def test_axe_finds_nothing_serious(running, browser, width, scheme):
     tab.close()
 
 
-def test_a_killed_studio_resumes_where_it_was(running, browser):
+@pytest.fixture(scope="module")
+def resumed(running, browser):
+    """What the studio knew, and another on its folder after the first was killed."""
     before = running.idle()
     running.process.kill()
     running.process.wait()
     again = Running(running.folder)
-    try:
-        after = again.idle()
-    finally:
-        again.end()
+    yield before, again
+    again.end()
+
+
+def test_a_killed_studio_resumes_where_it_was(resumed):
+    before, again = resumed
+    after = again.idle()
     for name in ("history", "verdict", "gauge", "readings", "exercise"):
         assert after[name] == before[name]
 
 
-def test_the_export_is_read_without_a_studio(running, browser, tmp_path):
-    again = Running(running.folder)
-    try:
-        content = again.ask("GET", "/export")[1]
-        state = again.idle()
-    finally:
-        again.end()
+def test_the_export_is_read_without_a_studio(resumed, browser, tmp_path):
+    _, again = resumed
+    content = again.ask("GET", "/export")[1]
+    state = again.idle()
+    again.end()
     assert again.token.encode() not in content
     (tmp_path / "case.html").write_bytes(content)
     tab = Tab(browser, (tmp_path / "case.html").as_uri())
