@@ -227,7 +227,17 @@ def test_return_to_a_block_of_the_caller():
         ("G1 F9 X[1 AND 1]\n", UNKNOWN_CONTROL, 1, "truth values on LinuxCNC and on bits"),
         ("G1 F9 X[FIX[-1.5]]\n", UNKNOWN_CONTROL, 1, "controls differ in FIX"),
         ("#33=1\nG1 F9 X#33\n", UNKNOWN_CONTROL, 1, "#33 cannot be set here"),
-        ("IF[1 EQ 1]GOTO1\no1 if [1]\no1 endif\nN1 G1 X1 F9\n", UNKNOWN_CONTROL, None, "signs of LinuxCNC's language"),
+        ("IF[1 EQ 1]GOTO1\no1 if [1]\no1 endif\nN1 G1 X1 F9\n", UNKNOWN_CONTROL, 2, "is of LinuxCNC's language"),
+        ("G1 F9 X" + "#" * 1900 + "1", LINUXCNC, 1, "within each other"),
+        ("G1 F9 X[" + "1+" * 900 + "1]", LINUXCNC, 1, "operators in a block"),
+        ("G1 F9 X[" + "1+" * 3000 + "1]", LINUXCNC, 1, "characters without comments"),
+        ("#[10**300]=1\n", LINUXCNC, 1, "#1e+300"),
+        ("#1=1 T1.5 M6\n", LINUXCNC, 1, "'T1.5' cannot be read"),
+        ("T[1.5] M6\n", LINUXCNC, 1, "T[1.5] is T1.5"),
+        ("G1 F9 X1\nG2 X10 I[10**15]\n", LINUXCNC, 2, "beyond any number"),
+        ("#1=1\nO" + "1" * 500, FANUC, 2, "program number of 500 digits"),
+        ("GOTO 7\nWHILE[1 EQ 0]DO1\nN7 X5.\nEND1\n", FANUC, 1, "a jump into the loop that begins in line 2"),
+        ("N0 G1 F9. X1.\nGOTO 1.5\n", FANUC, 2, "N1.5, which no block has"),
         ("G1 F9. X#500\n", FANUC, 1, "keeps its value from earlier programs"),
         ("G1 F9. X#3001\n", FANUC, 1, "system variable #3001"),
         ("G1 F9. X[ROUND[1.5]]\n", FANUC, 1, "rounds to the least increment"),
@@ -279,6 +289,19 @@ def test_subprograms_of_a_folder(tmp_path):
     assert program.moves.line.tolist() == [2, 2, 3], "moves of the file are of the line that calls it"
     error = refusal("G21 F100\no<slot> call [5] [0]\n", replace(LINUXCNC, subprograms=str(tmp_path)))
     assert (error.file, error.line) == ("slot.ngc", 3)
+
+
+def test_check_names_the_line_of_a_subprogram_s_file(tmp_path):
+    (tmp_path / "slot.ngc").write_text("o<slot> sub\nG1 X[1/#1]\nG77\no<slot> endsub\n")
+    control = replace(LINUXCNC, subprograms=str(tmp_path))
+    checked = check_lines(("G21 F100", "o<slot> call [0]", "G1 X2"), "part.ngc", controller=control)
+    errors = [finding for finding in checked.findings if finding.severity == "error"]
+    assert [error.line for error in errors] == [2, 3] and len(checked.moves) == 1
+
+
+def test_a_computed_number_never_counts_increments():
+    """Fanuc: a value has a decimal point; X[5] is 5 mm where X5 is 0.005 mm, a large one too."""
+    assert ends("G1 F100. X[5]\nX[90000]\n#1=5\nX#1\nX5\n", FANUC)[:, 0].tolist() == [5, 90000, 5, 0.005]
 
 
 @pytest.mark.parametrize("name", ["../slot", "/etc/slot", "a/b"])

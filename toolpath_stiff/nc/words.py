@@ -98,13 +98,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
         return Block(line, ())
     if compact == "%":
         return Block(line, (), percent=True)
-    if len(compact) > LONGEST_BLOCK:
-        raise ProgramError(
-            f"a block of {len(compact)} characters without comments and blanks",
-            expected=f"at most {LONGEST_BLOCK}",
-            file=name,
-            line=line,
-        )
+    check_length(compact, line, name)
     slash, start, rest, switch = compact.find("/"), 0, None, 1
     if slash > 0 and EXPRESSION.search(compact):  # a quotient
         slash = -1
@@ -112,12 +106,12 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
         behind, switch = block_delete(compact, slash, columns, line, name)
         start = 0 if slash else behind
     if compact.startswith(("O", ":"), start):  # `:` is O on ISO tape
-        return _program_number(compact[start:], columns[start], line, name)
+        return program_number(compact[start:], columns[start], line, name)
     words = _tokens(compact, columns, start, text, line, name, slash if slash > 0 else None)
     if slash > 0:
         rest = len(words)
         words += _tokens(compact, columns, behind, text, line, name)
-    return Block(line, _through_pygcode(words, line, name), optional=slash == 0, switch=switch, rest=rest)
+    return Block(line, through_pygcode(words, line, name), optional=slash == 0, switch=switch, rest=rest)
 
 
 def block_delete(compact: str, at: int, columns: Sequence[int], line: int, name: str) -> tuple[int, int]:
@@ -137,7 +131,18 @@ def block_delete(compact: str, at: int, columns: Sequence[int], line: int, name:
     return end, switch
 
 
-def _program_number(compact: str, column: int, line: int, name: str) -> Block:
+def check_length(compact: str, line: int, name: str) -> None:
+    """Refuse a block that no control reads."""
+    if len(compact) > LONGEST_BLOCK:
+        raise ProgramError(
+            f"a block of {len(compact)} characters without comments and blanks",
+            expected=f"at most {LONGEST_BLOCK}",
+            file=name,
+            line=line,
+        )
+
+
+def program_number(compact: str, column: int, line: int, name: str) -> Block:
     """`O1234` alone is a program's number; any other O word controls subprograms or loops."""
     if compact[1:].isascii() and compact[1:].isdigit():
         if len(compact) > MOST_DIGITS:
@@ -277,7 +282,7 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
     return ProgramError(found, expected=expected, hint=hint, file=name, line=line, column=column)
 
 
-def _through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...]:
+def through_pygcode(words: list[Word], line: int, name: str) -> tuple[Word, ...]:
     """Let pygcode read the normalised words; what it does not return exactly is an error."""
     if not words:
         return ()

@@ -54,7 +54,9 @@ BINDS = {
     EITHER: _SHARED,
 }
 EQUAL = 1e-4  # NGC's EQ and NE: LinuxCNC's rs274 takes 5 and 5.00009 for equal, 5 and 5.0002 not
-DEEPEST = 50  # brackets within each other
+DEEPEST = 50  # brackets, or variables of variables, within each other
+MOST_OPERATIONS = 200  # in a block; LinuxCNC's has at most 255 characters
+LARGEST_PLACE = 1e9
 LARGEST_BITS = 2**31
 NO_TANGENT_DEGREES = 1e-9
 
@@ -75,8 +77,8 @@ class Scanner:
         Whether a word's value is read, not an assignment's or a condition's.
     at
         The next character.
-    depth
-        Brackets that are open.
+    depth, operations
+        Brackets that are open; operators so far.
     """
 
     text: str
@@ -87,6 +89,7 @@ class Scanner:
     of_word: bool = False
     at: int = 0
     depth: int = 0
+    operations: int = 0
 
     @property
     def done(self) -> bool:
@@ -157,14 +160,17 @@ class Scanner:
         column = self.column
         if not self.next("["):
             raise self.fail(f"{self.rest()} is not a bracket" if not self.done else "the block ends here", "[")
-        self.depth += 1
-        if self.depth > DEEPEST:
-            raise self.fail(f"more than {DEEPEST} brackets within each other", column=column)
+        self._deeper(column)
         value = self.expression()
         if not self.next("]"):
             raise self.fail("a bracket that is not closed", "]", column=column)
         self.depth -= 1
         return value
+
+    def _deeper(self, column: int) -> None:
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise self.fail(f"more than {DEEPEST} brackets within each other", column=column)
 
     def variable(self) -> Value:
         """The variable after a `#`."""
@@ -185,7 +191,9 @@ class Scanner:
             return lambda variables: word
         inner: Value
         if self.next("#"):
+            self._deeper(column)
             inner = self.variable()
+            self.depth -= 1
         elif not self.done and self.text[self.at] == "[":
             inner = self.bracket()
         else:
@@ -199,7 +207,7 @@ class Scanner:
 
         def numbered(variables: Variables) -> int:
             found = number(inner(variables))
-            if abs(found - round(found)) > EQUAL:
+            if not abs(found) < LARGEST_PLACE or abs(found - round(found)) > EQUAL:
                 raise self.fail(f"#{found:g}", "a whole number", column=column)
             return round(found)
 
@@ -227,6 +235,9 @@ class Scanner:
             if rank <= tightest:
                 self.at = begin
                 return left
+            self.operations += 1
+            if self.operations > MOST_OPERATIONS:
+                raise self.fail(f"more than {MOST_OPERATIONS} operators in a block", column=column)
             left = self._operation(operator, left, self.expression(rank), column)
 
     def _operation(self, operator: str, left: Value, right: Value, column: int) -> Value:

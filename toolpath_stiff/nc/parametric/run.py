@@ -7,11 +7,11 @@ calls. Subprograms of other files are read from one folder that the caller names
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.interpreter import (
     DEEPEST,
@@ -39,6 +39,9 @@ from toolpath_stiff.nc.words import Block, Word, read_lines
 
 MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
+SHOWN = 40  # characters of the program in a message
+LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
+WHOLE_WORDS = frozenset("GMTL")  # codes and numbers, which a value must be
 MACRO_CALLS = ("G65", "G66", "G67")
 
 
@@ -56,7 +59,6 @@ class MacroLevel(Subprogram):
 
     arguments: dict[int, float | None] = field(default_factory=dict)
     modal: bool = False
-    repeats: dict[int, int] = field(default_factory=dict)
 
 
 class ParametricRun(ProgramRun):
@@ -82,10 +84,11 @@ class ParametricRun(ProgramRun):
         self.variables = Variables(self.family, state)
         self.folder = None if folder is None else Path(folder)
         self._main_lines = len(lines)
-        self._files: list[tuple[int, int, str, int]] = []  # first line, line after the last, name, line of the call
+        self._files: list[tuple[int, int, str]] = []  # first line, line after the last, name
         self._statements: dict[int, Statement] = {}
         self._structure: Structure | None = None
         self._loops: dict[int, int] | None = None
+        self._numbers: dict[tuple[int, int], list[int]] | None = None  # N number in a program: lines
         self._counts: list[dict[int, int]] = [{}]  # repeats left, by line, of each call
         self._steps = 0
         self._modal: MacroCall | None = None
@@ -94,20 +97,16 @@ class ParametricRun(ProgramRun):
 
     # -- blocks ----------------------------------------------------------------------------------------------------
 
-    def run(self) -> list[str]:
-        """Run to the program's end; returns warnings. Raises `InputError` with the line, of a subprogram's file too."""
-        try:
-            return super().run()
-        except InputError as error:
-            raise self._placed(error) from None
+    def _place(self, at: int) -> tuple[str, int]:
+        """File and line (from 1) of a line that is read."""
+        for first, stop, name in self._files:
+            if first <= at < stop:
+                return name, at - first + 1
+        return self.name, at + 1
 
-    def _placed(self, error: InputError) -> InputError:
-        """An error with its place in the file of a subprogram, if that is where it is."""
-        if error.line is not None and error.line > self._main_lines:
-            for first, stop, name, _ in self._files:
-                if first < error.line <= stop:
-                    error.file, error.line = name, error.line - first
-        return error
+    def _fail(self, at: int, found: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
+        name, line = self._place(at)
+        return ProgramError(found, expected=expected, hint=hint, file=name, line=line, column=column)
 
     def _steered(self, at: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
@@ -134,7 +133,8 @@ class ParametricRun(ProgramRun):
     def _statement(self, at: int) -> Statement:
         found = self._statements.get(at)
         if found is None:
-            found = read_statement(self.lines[at], at + 1, self.name, self.family, self.state.dialect)
+            name, line = self._place(at)
+            found = read_statement(self.lines[at], line, name, self.family, self.state.dialect)
             self._statements[at] = found
         return found
 
@@ -150,26 +150,27 @@ class ParametricRun(ProgramRun):
             worked = value(self.variables) if callable(value) else value
             if worked is None:  # an empty variable: the word is as if it were not there (Macro B)
                 continue
-            if computed and letter in "GM":
-                worked = self._code(letter, worked, at, column, written)
+            if computed and letter in WHOLE_WORDS:
+                worked = self._whole(letter, worked, at, column, written)
             words.append(plain_word(letter, worked, column, written, computed))
         self._assign(statement.assignments, at)
         line = statement.line if at < self._main_lines else self._line_of_call()
         return Block(line, tuple(words), statement.optional, statement.percent, statement.switch)
 
-    def _code(self, letter: str, value: float, at: int, column: int, written: str) -> float:
-        code = round(value, 1)
-        if abs(code - value) > EQUAL or code < 0.0:
-            raise self._fail(
-                at, f"{written} is {letter}{value:g}", f"a code such as {letter}1 or {letter}59.3", column=column
-            )
-        return code
+    def _whole(self, letter: str, value: float, at: int, column: int, written: str) -> float:
+        """The code or number that a value stands for, as LinuxCNC's interpreter rounds it."""
+        known = round(value, 1 if letter in "GM" else 0)
+        if abs(known - value) > EQUAL or known < 0.0:
+            expected = f"a code such as {letter}1 or {letter}59.3" if letter in "GM" else "a whole number from 0"
+            raise self._fail(at, f"{written[:SHOWN]} is {letter}{value:g}", expected, column=column)
+        return known
 
     def _assign(self, assignments: tuple[Assignment, ...], at: int) -> None:
         """Set variables, once all values are known (LinuxCNC, "Numbered Parameters")."""
         known = [(a.place(self.variables), a.value(self.variables), a.column) for a in assignments]
+        name, line = self._place(at)
         for place, value, column in known:
-            self.variables.set(place, value, at + 1, column, self.name)
+            self.variables.set(place, value, line, column, name)
 
     def _line_of_call(self) -> int:
         """The line of the main file from which a subprogram's file is called: its moves are of that line."""
@@ -182,8 +183,7 @@ class ParametricRun(ProgramRun):
         try:
             return self._act(block)
         except InputError as error:
-            if self._at >= self._main_lines:
-                error.line = self._at + 1
+            error.file, error.line = self._place(self._at)  # the block stands on the line that calls its file
             raise
 
     def _act(self, block: Block) -> Then:
@@ -217,26 +217,26 @@ class ParametricRun(ProgramRun):
             return None, replace(block, words=after)
         given = {w.letter: w for w in after if w.letter in "PL"}
         if "P" not in given:
-            raise self._fail(block.line - 1, f"{code} without P", "P with the number of the macro", column=word.column)
-        number_of, repeats = (self._count(given[k], block.line) if k in given else 1 for k in "PL")
+            raise self._fail(self._at, f"{code} without P", "P with the number of the macro", column=word.column)
+        number_of, repeats = (self._count(given[k]) if k in given else 1 for k in "PL")
         call = MacroCall(
             number_of,
             repeats,
             word.column,
-            arguments=arguments_of(after, self.state.dialect.increments, self._word_fault(block.line)),
+            arguments=arguments_of(after, self.state.dialect.increments, self._word_fault),
             modal=code == "G66",
         )
         if call.modal:
             self._modal = call
         return call, replace(block, words=())
 
-    def _count(self, word: Word, line: int) -> int:
-        if word.value != round(word.value) or not 1 <= word.value <= 99_999_999:
-            raise self._fail(line - 1, f"{word.text} is not a count", "a whole number from 1", column=word.column)
+    def _count(self, word: Word) -> int:
+        if word.value != round(word.value) or not 1 <= word.value <= LARGEST_NUMBER:
+            raise self._word_fault(word, "is not a count", "a whole number from 1")
         return int(word.value)
 
-    def _word_fault(self, line: int) -> Callable[[Word, str, str], InputError]:
-        return lambda word, found, expected: self._fail(line - 1, f"{word.text} {found}", expected, column=word.column)
+    def _word_fault(self, word: Word, found: str, expected: str) -> InputError:
+        return self._fail(self._at, f"{word.text} {found}", expected, column=word.column)
 
     def _in_modal(self) -> bool:
         return any(isinstance(level, MacroLevel) and level.modal for level in self._levels)
@@ -299,12 +299,12 @@ class ParametricRun(ProgramRun):
     def _target(self, at: int, call: Call) -> tuple[int, int]:
         heads = self._heads()
         if call.number not in heads and self.folder is not None and call.number < 10_000:
-            self._load(at, (f"O{call.number:04d}", f"O{call.number}", f"{call.number}", f"{call.number:04d}"))
+            self._load((f"O{call.number:04d}", f"O{call.number}", f"{call.number}", f"{call.number:04d}"))
         if isinstance(call, MacroCall):
             return call.number, call.repeats or 1
         return super()._target(at, call)
 
-    def _load(self, at: int, names: tuple[str, ...]) -> bool:
+    def _load(self, names: tuple[str, ...]) -> None:
         """Read a subprogram's file from the folder, if it is there; its lines follow those that are read."""
         assert self.folder is not None
         for name in names:
@@ -313,10 +313,9 @@ class ParametricRun(ProgramRun):
                 if file.is_file():
                     first = len(self.lines)
                     self.lines = (*self.lines, *read_lines(file))
-                    self._files.append((first, len(self.lines), file.name, at + 1))
-                    self._programs = self._structure = self._loops = self._sequence = None
-                    return True
-        return False
+                    self._files.append((first, len(self.lines), file.name))
+                    self._programs = self._structure = self._loops = self._numbers = None
+                    return
 
     # -- steering --------------------------------------------------------------------------------------------------
 
@@ -399,20 +398,20 @@ class ParametricRun(ProgramRun):
         if label not in structure.subs and self.folder is not None:
             name = label.strip("<>")
             if Path(name).name != name:
-                raise self._fail(at, f"o{label.lower()} is not the name of a file", column=steering.column)
-            self._load(at, (name.lower(), name, *(() if label.startswith("<") else (f"o{name}",))))
+                raise self._fail(at, f"o{label.lower()[:SHOWN]} is not the name of a file", column=steering.column)
+            self._load((name.lower(), name, *(() if label.startswith("<") else (f"o{name}",))))
             structure = self._ngc()
         if label not in structure.subs:
             where = "" if self.folder is None else f", and {str(self.folder)!r} has no file of it"
             raise self._fail(
                 at,
-                f"o{label.lower()} call: the program has no such sub{where}",
+                f"o{label.lower()[:SHOWN]} call: the program has no such sub{where}",
                 hint="" if self.folder else "name the folder of its subprograms with --subprograms FOLDER",
                 column=steering.column,
             )
         first = structure.subs[label] + 1
         values = {place: number(value(self.variables)) for place, value in enumerate(steering.values, 1)}
-        to = self._call(MacroLevel(f"o{label.lower()}", first, at + 1, 0), at, steering.column)
+        to = self._call(MacroLevel(f"o{label.lower()[:SHOWN]}", first, at + 1, 0), at, steering.column)
         self._push(Level(dict(values)))
         return to
 
@@ -441,28 +440,38 @@ class ParametricRun(ProgramRun):
         return loops[at]
 
     def _numbered(self, at: int, target: float, column: int) -> int:
-        """The block with an N number in the program that runs. Raises `InputError` unless there is one."""
-        first, stop = self._program_of(at)
-        found = [
-            index
-            for index in range(first, stop)
-            if (match := SEQUENCE.match(self.lines[index])) and int(match[1][:9]) == target
-        ]
+        """The block with an N number in the program that runs. Raises `InputError` unless there is one to jump to."""
+        if self._numbers is None:
+            self._numbers = {}
+            for index, line in enumerate(self.lines):
+                match = SEQUENCE.match(line)
+                if match:
+                    self._numbers.setdefault((self._program_of(index), int(match[1] or 0)), []).append(index)
+        found = self._numbers.get((self._program_of(at), round(target)), []) if target == round(target) else []
         if len(found) != 1:
-            places = ", ".join(str(index + 1) for index in found)
+            places = ", ".join(str(self._place(index)[1]) for index in found)
             raise self._fail(
                 at,
                 f"the run goes on at N{target:g}, which " + (f"is in the lines {places}" if found else "no block has"),
                 "one block with that N number in the program",
                 column=column,
             )
+        for start, end in self._macro_loops().items():
+            if start < found[0] < end and not start < at < end:
+                raise self._fail(
+                    at,
+                    f"a jump into the loop that begins in line {self._place(start)[1]}",
+                    "a block outside of loops",
+                    column=column,
+                )
         return found[0]
 
-    def _program_of(self, at: int) -> tuple[int, int]:
-        """First line and line after the last of the program (O number to O number) that holds a line."""
-        heads = [index for index, line in enumerate(self.lines) if HEAD.match(line)]
-        bounds = [0, *heads, *(first for first, *_ in self._files), len(self.lines)]
-        return max(b for b in bounds if b <= at), min(b for b in bounds if b > at)
+    def _program_of(self, at: int) -> int:
+        """The line at which the program (from O number to O number) begins that holds a line."""
+        if self._programs is None:
+            self._heads()
+        begins = sorted({0, *(self._programs or {}).values(), *(first for first, *_ in self._files)})
+        return begins[bisect_right(begins, at) - 1]
 
     def _macro_loops(self) -> dict[int, int]:
         if self._loops is None:

@@ -7,14 +7,23 @@ A block is read once, to a `Statement`; running it works out its values.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.controller import Dialect
 from toolpath_stiff.nc.parametric.expressions import EITHER, MACRO_B, NGC, Scanner, Value
-from toolpath_stiff.nc.words import LETTERS, WORD, Word, block_delete, without_comments
+from toolpath_stiff.nc.words import (
+    LETTERS,
+    WORD,
+    Word,
+    block_delete,
+    check_length,
+    program_number,
+    through_pygcode,
+    without_comments,
+)
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.parametric.variables import Variables
@@ -35,6 +44,7 @@ _NGC_SIGN = re.compile(
 _MACRO_SIGN = re.compile(rf"{_BEGIN}(?:IF\[|WHILE\[|GOTO[\d#\[]|DO\d|END\d)|G6[5-7](?!\d)|POW\[")
 _ANY_SIGN = re.compile(r"[#\[]")
 _COMMENT = re.compile(r"\([^)]*\)|;.*")
+_SUSPECT = re.compile(r"[#\[oOiIwWdD]|[gG]\s*0*6")
 
 
 def uses_variables(lines: tuple[str, ...]) -> bool:
@@ -45,13 +55,14 @@ def uses_variables(lines: tuple[str, ...]) -> bool:
     >>> uses_variables(("G1 X10 (#1)",)), uses_variables(("#1 = 5", "G1 X#1"))
     (False, True)
     """
-    return any(_ANY_SIGN.search(text) or _NGC_SIGN.search(text) or _MACRO_SIGN.search(text) for text in _bare(lines))
+    return any(sign.search(text) for _, text in _bare(lines) for sign in (_ANY_SIGN, _NGC_SIGN, _MACRO_SIGN))
 
 
-def _bare(lines: tuple[str, ...]) -> list[str]:
-    """Lines that may matter, without comments and blanks, in upper case."""
-    suspects = (line for line in lines if any(mark in line for mark in "#[oO") or re.search("[gG]0*6|[iIwWdD]", line))
-    return ["".join(_COMMENT.sub(" ", line).split()).upper() for line in suspects]
+def _bare(lines: tuple[str, ...]) -> Iterator[tuple[int, str]]:
+    """Number and text of lines that may matter, without comments and blanks, in upper case."""
+    for number, line in enumerate(lines, 1):
+        if _SUSPECT.search(line):
+            yield number, "".join(_COMMENT.sub(" ", line).split()).upper()
 
 
 def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
@@ -66,18 +77,20 @@ def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
         return NGC
     if dialect.name in ("fanuc", "haas"):
         return MACRO_B
-    signs = [
-        family
-        for family, sign in ((NGC, _NGC_SIGN), (MACRO_B, _MACRO_SIGN))
-        if any(sign.search(text) for text in _bare(lines))
-    ]
+    signs = {}
+    for family, sign in ((NGC, _NGC_SIGN), (MACRO_B, _MACRO_SIGN)):
+        first = next((number for number, text in _bare(lines) if sign.search(text)), None)
+        if first is not None:
+            signs[family] = first
     if len(signs) == 2:
         raise ProgramError(
-            "the program shows signs of LinuxCNC's language (O words) and of Macro B (IF GOTO, WHILE DO, G65)",
+            f"line {signs[NGC]} is of LinuxCNC's language (O words, #<name>, **), line {signs[MACRO_B]} of Macro B "
+            "(IF GOTO, WHILE DO, G65)",
             hint="name the control with --dialect",
             file=name,
+            line=max(signs.values()),
         )
-    return signs[0] if signs else EITHER
+    return next(iter(signs), EITHER)
 
 
 @dataclass(frozen=True)
@@ -170,6 +183,7 @@ def read_statement(text: str, line: int, name: str, family: str, dialect: Dialec
         return Statement(line)
     if compact == "%":
         return Statement(line, percent=True)
+    check_length(compact, line, name)
     start, switch = block_delete(compact, 0, columns, line, name) if compact[0] == "/" else (0, 1)
     block = Scanner(compact, columns, line, name, family, at=start)
     optional = start > 0
@@ -264,7 +278,7 @@ def _o_word(block: Scanner) -> Steering:
 def _label(block: Scanner, column: int) -> Label:
     digits = block.match(_NUMBERED)
     if digits is not None:
-        return Label(str(int(digits[0][:9])) if len(digits[0]) < 10 else digits[0])
+        return Label(digits[0].lstrip("0") or "0")
     if block.next("<"):
         end = block.text.find(">", block.at)
         if end < 0:
@@ -280,9 +294,8 @@ def _contents(block: Scanner, text: str) -> tuple[list[tuple[str, Value | float,
     words: list[tuple[str, Value | float, int, str]] = []
     assignments: list[Assignment] = []
     if block.text[block.at] in "O:":  # the program's number
-        column = block.column
-        words.append(("O", float(block.text[block.at + 1 :]), column, block.text[block.at :]))
-        return words, assignments
+        (word,) = program_number(block.text[block.at :], block.column, block.line, block.name).words
+        return [(word.letter, word.value, word.column, word.text)], assignments
     while not block.done:
         column = block.column
         if block.text[block.at] == "#":
@@ -306,6 +319,9 @@ def _contents(block: Scanner, text: str) -> tuple[list[tuple[str, Value | float,
                 f"line number {written!r} after another word", "N at the beginning of the line", column=column
             )
         words.append((letter, value, column, written))
+    # The numbers that codes and tools may have, as in any other program.
+    plain_words = [Word(one[0], one[1], one[2], one[3]) for one in words if isinstance(one[1], float)]
+    through_pygcode(plain_words, block.line, block.name)
     return words, assignments
 
 
@@ -336,5 +352,6 @@ def plain_word(letter: str, value: float, column: int, written: str, computed: b
 
 
 def _decimal(value: float) -> str:
-    text = f"{value:.6f}".rstrip("0")
-    return text if not text.endswith(".") else text + "0"
+    """A few digits, with a decimal point whatever they are: a computed number never counts increments."""
+    text = f"{value:#.7g}"
+    return text if "e" in text else text.rstrip("0") + "0" * text.rstrip("0").endswith(".")

@@ -14,6 +14,7 @@ from toolpath_stiff.nc.words import Word
 
 Fail = Callable[..., InputError]  # (line from 0, found, expected, hint, column)
 OPENERS = {"ENDSUB": "SUB", "ENDIF": "IF", "ENDWHILE": "WHILE", "ENDREPEAT": "REPEAT"}
+SHOWN = 40  # characters of a label in a message
 LOOPS = ("WHILE", "DO", "REPEAT")
 # Macro B, argument specification I and II ("Macro call", "Argument specification").
 ARGUMENTS = {
@@ -85,7 +86,7 @@ def structure_of(steerings: Iterable[tuple[int, Steering]], firsts: set[int], fa
         if fault:
             structure.faults[at] = fail(at, *fault, column=steering.column)
     for one in opened:
-        structure.faults[one.at] = fail(one.at, f"o{one.label.lower()} {one.kind.lower()} has no end")
+        structure.faults[one.at] = fail(one.at, f"o{one.label.lower()[:SHOWN]} {one.kind.lower()} has no end")
     return structure
 
 
@@ -123,7 +124,7 @@ def _pair(
 def _open(structure: Structure, opened: list[_Opened], labels: list[dict[str, int]], one: _Opened) -> tuple[str, ...]:
     if one.label in labels[-1] or not one.label:
         place = f"is in line {labels[-1][one.label] + 1} already" if one.label else "is not known before it runs"
-        return (f"the label o{one.label.lower()} {place}", "each label once")
+        return (f"the label o{one.label.lower()[:SHOWN]} {place}", "each label once")
     labels[-1][one.label] = one.at
     opened.append(one)
     if one.kind == "SUB":
@@ -135,7 +136,9 @@ def _open(structure: Structure, opened: list[_Opened], labels: list[dict[str, in
 
 
 def _unpaired(steering: Steering) -> tuple[str, ...]:
-    return (f"o{steering.label.text.lower()} {steering.kind.lower()} does not belong to what is open before it",)
+    return (
+        f"o{steering.label.text.lower()[:SHOWN]} {steering.kind.lower()} does not belong to what is open before it",
+    )
 
 
 def loops_of(steerings: Iterable[tuple[int, Steering]], fail: Fail) -> dict[int, int]:
