@@ -77,7 +77,7 @@ class Editing:
             copy = self._open.get(name, (None, ""))[0]
             text = (copy or self.case.folder / name).read_text("utf-8", "replace")
             fault = self.faults.get(name, "")
-            found.append({"file": name, "text": text, "copy": str(copy or ""), "fault": fault})
+            found.append({"file": name, "text": text, "copy": str(copy.resolve()) if copy else "", "fault": fault})
         return found
 
     def follow(self, looked: Callable[[], None]) -> None:
