@@ -16,7 +16,6 @@ for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 # ruff: noqa: E402 - the thread limits above must come first
 import argparse
 import math
-import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.__main__ import describe_machine
+from benchmarks.processes import describe_machine, whole_command
 from toolpath_stiff import rig
 
 SIZES = (288, 1000, 5000, 10_000)
@@ -62,16 +61,9 @@ def campaign(readings: int) -> str:
 
 
 def run(command: str, readings: int, file: Path, out: Path) -> Run:
-    """One command in a process of its own."""
-    words = [sys.executable, "-m", "toolpath_stiff", command, str(file), *COMMANDS[command]]
-    with subprocess.Popen([*words, "--no-plots", "--json", "--out", str(out)], stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        process.stdout.read()
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode not in (0, 1):  # 1: an update that the data do not support
-        raise SystemExit(f"{command} with {readings} readings ended with {process.returncode}")
-    return Run(command, readings, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0)
+    """One command in a process of its own; an update that the data do not support ends with 1."""
+    words = [command, str(file), *COMMANDS[command], "--no-plots", "--json", "--out", str(out)]
+    return Run(command, readings, *whole_command(words, allowed=(0, 1)))
 
 
 def row(one: Run, first: Run) -> tuple[str, bool]:

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.startup import cpu_seconds
+from benchmarks.processes import whole_process
 
 PROGRAMS = 2000
 BAR = 1.2  # times the CPU of the analyses
@@ -39,8 +39,8 @@ def measure_many(rounds: int, programs: int = PROGRAMS) -> tuple[list[str], bool
     for _ in range(rounds):
         with tempfile.TemporaryDirectory() as folder:
             write_programs(Path(folder) / "programs", programs)
-            seconds.append(cpu_seconds(alone, folder))
-            ratios.append(cpu_seconds(command, folder) / seconds[-1])
+            seconds.append(whole_process(alone, folder)[0])
+            ratios.append(whole_process(command, folder)[0] / seconds[-1])
     ratio, clears = statistics.median(ratios), statistics.median(ratios) <= BAR
     name = f"`tps analyze FOLDER --jobs 1 --no-plots`, {programs:,} small programs"
     return [

@@ -17,7 +17,6 @@ for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 import argparse
 import io
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -25,7 +24,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks.__main__ import describe_machine
+from benchmarks.processes import describe_machine, whole_command
 from benchmarks.size_programs import KINDS, program
 from toolpath_stiff.nc import parse_program
 
@@ -142,23 +141,14 @@ def analyzing(report: Report, lines: int, folder: Path) -> None:
         file = folder / f"{kind}.nc"
         file.write_text(program(kind, lines), encoding="ascii")
         for table in ("csv", "parquet"):
-            seconds, gigabytes = whole_command(
+            seconds, megabytes = whole_command(
                 ["analyze", str(file), "--origin", "0,0,800", "--format", table, "--out", str(folder / "report")]
             )
             bar = report.bar(
-                seconds <= CPU_SECONDS and gigabytes <= GIGABYTES, f"{CPU_SECONDS:g} s, {GIGABYTES:g} GB or less"
+                seconds <= CPU_SECONDS and megabytes <= 1000.0 * GIGABYTES,
+                f"{CPU_SECONDS:g} s, {GIGABYTES:g} GB or less",
             )
-            report.add(f"| {kind} | {table} | {seconds:.1f} | {gigabytes:.2f} | {bar} |")
-
-
-def whole_command(arguments: list[str]) -> tuple[float, float]:
-    """CPU seconds and peak memory (GB) of a `tps` command."""
-    child = subprocess.Popen([sys.executable, "-m", "toolpath_stiff", *arguments], stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(child.pid, 0)
-    child.returncode = os.waitstatus_to_exitcode(status)
-    if child.returncode:
-        raise SystemExit(f"tps {' '.join(arguments)} ended with {child.returncode}")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024 / 1e9
+            report.add(f"| {kind} | {table} | {seconds:.1f} | {megabytes / 1000.0:.2f} | {bar} |")
 
 
 def writing(report: Report, lines: int, rounds: int) -> None:

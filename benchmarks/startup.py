@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import resource
 import statistics
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.processes import whole_command
+
 HELP_BAR, ANALYZE_BAR = 0.15, 0.60  # s of CPU
-
-
-def cpu_seconds(command: list[str], folder: str) -> float:
-    """User and system time of a child process."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def program_of_500_poses() -> str:
@@ -30,15 +21,14 @@ def measure_startup(rounds: int) -> tuple[list[str], bool]:
     """Lines of the table, and whether both bars are cleared."""
     lines = ["| command | CPU seconds, median | bar |", "| --- | ---: | --- |"]
     passed = True
-    tps = [sys.executable, "-m", "toolpath_stiff"]
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "part.nc").write_text(program_of_500_poses())
         for label, command, bar in (
-            ("`tps --help`", [*tps, "--help"], HELP_BAR),
-            ("`tps analyze part.nc --no-plots`, 500 poses", [*tps, "analyze", "part.nc", "--no-plots"], ANALYZE_BAR),
+            ("`tps --help`", ["--help"], HELP_BAR),
+            ("`tps analyze part.nc --no-plots`, 500 poses", ["analyze", "part.nc", "--no-plots"], ANALYZE_BAR),
         ):
-            cpu_seconds(command, folder)
-            median = statistics.median(cpu_seconds(command, folder) for _ in range(rounds))
+            whole_command(command, folder)
+            median = statistics.median(whole_command(command, folder)[0] for _ in range(rounds))
             clears = median < bar
             passed &= clears
             lines.append(f"| {label} | {median:.3f} | under {bar:g}{'' if clears else ': NOT CLEARED'} |")

@@ -162,6 +162,41 @@ def test_a_broken_effect_is_told_with_its_line(running):
     assert running.state()["history"][-1]["kind"] != "effects"
 
 
+def test_own_effects_are_edited_beside_the_page(running, browser, tmp_path):
+    text = tps.effect_template("my_screw").text
+    (tmp_path / "my_screw.py").write_text(text)
+    tab = Tab(browser, running.address)
+    page = tab.page
+    page.wait_for_selector("#sw-table_compliance")
+    page.set_input_files("#file", tmp_path / "my_screw.py")
+    page.wait_for_selector("#ask[open]")
+    page.click("#yes")
+    page.wait_for_selector("#sw-my_screw")
+    page.click("#own-edit-0")
+    page.wait_for_selector("#own-0")
+    # In the page: a fault is told with its line, and the effect stays as it was.
+    page.fill("#own-0", text.replace("link =", "link = = ", 1))
+    page.click("#own-save-0")
+    page.wait_for_selector("#own-fault-0")
+    line = 1 + text[: text.index("link =")].count("\n")
+    assert f"{line}" in tab.text("#own-fault-0")
+    assert running.state()["own_effects"][0]["file"] == "effects/my_screw.py"
+    # In an editor: saving is enough.
+    copy = Path(running.state()["own_effects"][0]["copy"])
+    title = re.search(r'title = "([^"]*)"', text)[1]
+    copy.write_text(text.replace(title, "the screws of the shop give way"))
+    tab.until("document.querySelector('label[for=sw-my_screw]').textContent.includes('screws of the shop')")
+    assert page.locator("#own-fault-0").count() == 0
+    assert tps.Case.open(running.folder).state.effects == ("effects/my_screw-2.py",)
+    # Undone, the first one is back, and gone.
+    page.click("#undo")
+    tab.until(f"document.querySelector('label[for=sw-my_screw]').textContent.includes({json.dumps(title)})")
+    page.click("#undo")
+    tab.until("document.querySelector('#sw-my_screw') === null")
+    assert tab.faults == []
+    tab.close()
+
+
 def test_a_second_studio_of_the_same_case_is_refused(running):
     words = [sys.executable, "-m", "toolpath_stiff", "studio", "--case", str(running.folder), "--no-browser"]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
@@ -309,6 +344,26 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     case = tps.Case.open(running.folder)
     there = tps.try_placement(case.machine, case.program).at(case.state.origin)
     assert tab.number("#pl-mean") == pytest.approx(there["mean_N_per_mm"], abs=0.5)
+    # For the shop floor: every warning, offsets, the set-up sheet, the program for this place.
+    page.click("#set-up")
+    page.wait_for_selector("#set-up-files")
+    kept = json.loads((running.folder / tps.Case.open(running.folder).latest("set_up") / "placement.json").read_text())
+    shown = tab.text("#set-up-files")
+    assert all(" ".join(text.split()) in " ".join(shown.split()) for text in kept["warnings"])
+    assert kept["offset_blocks"]["linuxcnc"] in shown
+    written = page.get_attribute("#set-up-written", "href")
+    status, program, _ = running.ask("GET", written)
+    assert (status, running.ask("GET", page.get_attribute("#set-up-sheet", "href"))[0]) == (200, 200)
+    again = tps.analyze(case.machine, tps.Program.from_text(program.decode()))
+    assert again.mean_N_per_mm == pytest.approx(there["mean_N_per_mm"], rel=1e-6)
+    # The best place; a point of the front becomes the placement.
+    page.click("#best")
+    page.wait_for_selector("button[id^=use-]")
+    page.locator("button[id^=use-]").first.click()
+    tab.until("document.querySelector('#set-up-files') === null")
+    front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
+    settled(running)
+    assert tps.Case.open(running.folder).state.origin[0] == pytest.approx(front["front"][0]["x_mm"], abs=1e-5)
     # Reveal, export.
     tab.go("exercise")
     page.select_option("#claim", "weak_strut")

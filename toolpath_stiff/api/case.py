@@ -13,20 +13,29 @@ The state is what the steps up to `done` have made of it; undo and redo move `do
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from toolpath_stiff.api.case_files import (
+    copied,
+    free_name,
+    machine_bytes,
+    measurements_csv,
+    used_name,
+    without_lines,
+    write_files,
+)
 from toolpath_stiff.api.diagnosis import Measurements
+from toolpath_stiff.api.effects import effects
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.results import FolderResult, Progress
-from toolpath_stiff.api.steps import CaseState, Step, case_text, read_case
+from toolpath_stiff.api.steps import CASE_FILE, History, Step, read_case
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.files import read_bytes
 from toolpath_stiff.hints import command_line, options
 
 if TYPE_CHECKING:
@@ -36,12 +45,9 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.programs import Analysis
 
 Found = TypeVar("Found", bound=FolderResult)
-CASE_FILE = "case.toml"
-UNSAFE = re.compile(r"[^\w.+-]+", re.ASCII)
-LONGEST_NAME = 80
 
 
-class Case:
+class Case(History):
     """A folder that holds a machine, measurements, a program, and every step that was done with them.
 
     Attributes
@@ -65,7 +71,7 @@ class Case:
     """
 
     def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
-        self.folder, self._steps, self._done, self._written = folder, list(steps), done, text
+        super().__init__(folder, steps, done, text)
         self.plots = False
 
     @classmethod
@@ -96,28 +102,6 @@ class Case:
     # -- what there is ------------------------------------------------------------------------------------------------
 
     @property
-    def history(self) -> list[Step]:
-        """The steps that hold."""
-        return self._steps[: self._done]
-
-    @property
-    def undone(self) -> list[Step]:
-        """The steps that redo would bring back, the next one first."""
-        return self._steps[self._done :]
-
-    @property
-    def state(self) -> CaseState:
-        """What holds now."""
-        found = CaseState()
-        for step in self.history:
-            found = replace(found, **step.change)
-        return found
-
-    def path(self, name: str) -> str:
-        """A file of the case, as functions and commands take it."""
-        return str(self.folder / name)
-
-    @property
     def machine(self) -> Machine:
         """The machine, effects of one's own included."""
         state = self.state
@@ -128,7 +112,7 @@ class Case:
         """The files of the readings in use; those with readings set aside are in used/."""
         state = self.state
         touched = {entry.rpartition(":")[0] for entry in state.aside}
-        return tuple(_used(name) if name in touched else name for name in state.data)
+        return tuple(used_name(name) if name in touched else name for name in state.data)
 
     @property
     def data(self) -> Measurements:
@@ -155,9 +139,9 @@ class Case:
 
     def set_machine(self, machine: str | Path) -> None:
         """Use another machine: a name or a file, of which the case keeps a copy."""
-        text = _machine_text(machine)
-        name = self._free(f"machines/{Path(machine).stem}.toml")
-        self._write({name: text})
+        text = machine_bytes(machine)
+        name = free_name(self.folder, f"machines/{Path(machine).stem}.toml")
+        write_files(self.folder, {name: text})
         try:
             Machine.load(self.path(name), effects=[self.path(one) for one in self.state.effects])
         except TpsError:
@@ -167,21 +151,37 @@ class Case:
 
     def add_effects(self, file: str | Path) -> None:
         """Use a Python file with effects of one's own. Its code is run."""
-        name = self._copied(file, "effects")
-        Machine.load(self.path(self.state.machine), effects=[self.path(name)])
-        change = {"effects": (*self.state.effects, name)}
-        self.record(
-            "effects",
-            f"own effects of {Path(file).name}",
-            change=change,
-            files=[name],
-            command=command_line("effects", "check", name),
-            python=f"case.add_effects({str(file)!r})",
-        )
+        name = copied(self.folder, file, "effects")
+        self._take_effects(name, "", f"own effects of {Path(file).name}", f"case.add_effects({str(file)!r})")
+
+    def change_effects(self, name: str, file: str | Path) -> None:
+        """Use an edited file in place of a file of own effects of the case (its name there). Its code is run."""
+        if name not in self.state.effects:
+            raise InputError(f"{name} is no file of own effects of this case", expected=", ".join(self.state.effects))
+        plain = re.sub(r"-\d+(?=\.py$)", "", Path(name).name)  # drag-2.py is followed by drag-3.py
+        new = copied(self.folder, plain, "effects", read_bytes(file, "the file"))
+        text = f"own effects of {Path(name).name}, edited"
+        self._take_effects(new, name, text, f"case.change_effects({name!r}, {str(file)!r})")
+
+    def _take_effects(self, new: str, old: str, text: str, python: str) -> None:
+        """Put a file of the case among the effects, in place of `old` if there is one; drop it where it is at fault."""
+        others = tuple(one for one in self.state.effects if one != old)
+        try:
+            Machine.load(self.path(self.state.machine), effects=[self.path(one) for one in (*others, new)])
+        except TpsError:
+            (self.folder / new).unlink()
+            raise
+        names = {effect.name for effect in effects([self.path(one) for one in (*others, new)]).effects}
+        change = {
+            "effects": (*others, new),
+            "on": {name: keys for name, keys in self.state.on.items() if name in names} if old else self.state.on,
+        }
+        command = command_line("effects", "check", new)
+        self.record("effects", text, change=change, files=[new], command=command, python=python)
 
     def add_data(self, *files: str | Path) -> None:
         """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used."""
-        names = [self._copied(file, "data", self._as_csv(file)) for file in files]
+        names = [copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files]
         after = (*self.state.data, *names)
         try:
             count = len(Measurements([self.path(name) for name in after]).on(self.machine))
@@ -205,15 +205,15 @@ class Case:
         if file not in state.data or (entry in state.aside) is not back:
             raise InputError(f"{entry} is no reading that is {'set aside' if back else 'in use'}")
         aside = tuple(one for one in state.aside if one != entry) if back else (*state.aside, entry)
-        touched = _without(
+        touched = without_lines(
             self.folder / file, [int(one.rpartition(":")[2]) for one in aside if one.startswith(file + ":")]
         )
-        self._write({_used(file): touched})
+        write_files(self.folder, {used_name(file): touched})
         if not back:
             self._check_aside(file, line)
         text = f"{file} line {line} {'used again' if back else 'set aside'}"
         words = [f"-e '{one.rpartition(':')[2]}s/^/# /'" for one in aside if one.startswith(file + ":")]
-        sed = f"sed {' '.join(words)} {file} > {_used(file)}" if words else ""
+        sed = f"sed {' '.join(words)} {file} > {used_name(file)}" if words else ""
         self.record(
             "aside",
             text,
@@ -241,8 +241,8 @@ class Case:
 
     def accept(self, file: str | Path) -> None:
         """Go on with the machine file that an update of this case wrote."""
-        name = self._free(f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
-        self._write({name: Path(file).read_bytes()})
+        name = free_name(self.folder, f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
+        write_files(self.folder, {name: Path(file).read_bytes()})
         command = next((step.command for step in reversed(self.history) if step.kind == "update"), "")
         self.record(
             "accept",
@@ -255,7 +255,7 @@ class Case:
 
     def add_program(self, file: str | Path) -> None:
         """Use an NC program or cutter-location file."""
-        name = self._copied(file, "programs")
+        name = copied(self.folder, file, "programs")
         try:
             Program.read(self.path(name)).moves()
         except TpsError:
@@ -343,6 +343,40 @@ class Case:
         words = ", ".join(f"{name}={value!r}" for name, value in bounds.items())
         return self._kept("place", found, words, program=self.state.program)
 
+    def set_up(self, progress: Progress | None = None) -> Placement:
+        """The program where it sits now, for the shop floor: offsets, set-up sheet and the program written for it.
+
+        As `tps.place` with every bound fixed there; figures and warnings are against where the program sat at first.
+        Kept in results/ with its pictures. A program that cannot be written for the place is not; not_written.txt says
+        why.
+        """
+        result = self.next_result("set_up")
+        found, command = self.set_up_in(result, progress)
+        self.record("set_up", found._short(), command=command, python="case.set_up()", result=result)
+        return found
+
+    def set_up_in(self, result: str, progress: Progress | None = None) -> tuple[Placement, str]:
+        """What `set_up` finds, kept in a folder of the case without a step; and its command."""
+        from toolpath_stiff.api.placements import place
+
+        state = self.state
+        if len(state.origin) < 3:
+            raise InputError("the program sits where it always did", hint="put it somewhere with place_at first")
+        names = ("x_mm", "y_mm", "z_mm", "tilt_a_deg", "tilt_b_deg", "rotate_deg")
+        at: dict[str, Any] = dict(zip(names, (*state.origin, 0.0, 0.0, 0.0), strict=False))
+        name, reason = Path(state.program).name, ""
+        try:
+            found = place(self.machine, self.program, write=name, progress=progress, **at)
+        except InputError as error:
+            found, reason = place(self.machine, self.program, progress=progress, **at), str(error)
+        found.save(self.folder / result)
+        beside = {"not_written.txt": f"{reason}\n"} if reason else {name: found.program_bytes}
+        write_files(self.folder / result, beside)
+        bounds = {key.rpartition("_")[0].replace("_", "-"): f"{value:.10g}" for key, value in at.items()}
+        written = None if reason else f"{result}/{name}"
+        asked = options(machine=state.machine, effects=list(state.effects), **bounds, out=result, write=written)
+        return found, command_line("place", state.program, *asked)
+
     # -- a blind exercise ---------------------------------------------------------------------------------------------
 
     def start_exercise(self, seed: int, hidden: str | None = None, layout: str = "tilted") -> None:
@@ -352,14 +386,15 @@ class Case:
         """
         from toolpath_stiff.rig import new_exercise
 
-        folder = self._free("exercise")
+        folder = free_name(self.folder, "exercise")
         new_exercise(self.folder / folder, seed, layout, hidden)
-        machine, data = self._free("machines/machine.toml"), self._free("data/measurements.csv")
-        self._write(
+        machine, data = free_name(self.folder, "machines/machine.toml"), free_name(self.folder, "data/measurements.csv")
+        write_files(
+            self.folder,
             {
                 machine: (self.folder / folder / "machine.toml").read_bytes(),
                 data: (self.folder / folder / "measurements.csv").read_bytes(),
-            }
+            },
         )
         change = {"machine": machine, "data": (data,), "aside": (), "on": {}, "exercise": folder}
         other = {"hidden": hidden, "layout": layout if layout != "tilted" else None}
@@ -377,7 +412,7 @@ class Case:
         """Measure the exercise's machine at the poses of a plan; the readings are added."""
         from toolpath_stiff.rig import measure_again
 
-        name = self._free("data/measured.csv")
+        name = free_name(self.folder, "data/measured.csv")
         visit = 1 + sum(step.kind == "measure" for step in self.history)
         (self.folder / "data").mkdir(exist_ok=True)
         count = measure_again(self.folder / self._exercise(), str(plan_file), str(self.folder / name), visit)
@@ -398,7 +433,7 @@ class Case:
 
         found = reveal(self.folder / self._exercise(), effects)
         result = self.next_result("reveal")
-        self._write({f"{result}/reveal.json": json_text(found)})
+        write_files(self.folder, {f"{result}/reveal.json": json_text(found)})
         self.record(
             "reveal",
             f"claimed {effects}: {found['verdict']}",
@@ -413,67 +448,9 @@ class Case:
             raise InputError("no exercise was started in this case", hint="start one with start_exercise(seed)")
         return self.state.exercise
 
-    # -- steps --------------------------------------------------------------------------------------------------------
-
-    def undo(self) -> Step | None:
-        """Take back the last step that changed something, and what was found since; None where there is none."""
-        at = next((n for n in range(self._done - 1, 0, -1) if self._steps[n].change), None)
-        if at is None:
-            return None
-        self._done = at
-        self._save()
-        return self._steps[at]
-
-    def redo(self) -> Step | None:
-        """Do again the next step that was undone, and what was found after it; None where nothing was."""
-        found = next((step for step in self.undone if step.change), None)
-        if found is None:
-            return None
-        first = self._steps.index(found, self._done)
-        later = (n for n in range(first + 1, len(self._steps)) if self._steps[n].change)
-        self._done = next(later, len(self._steps))
-        self._save()
-        return found
-
-    def record(
-        self,
-        kind: str,
-        text: str,
-        *,
-        change: Mapping[str, Any] | None = None,
-        files: Sequence[str] = (),
-        command: str = "",
-        python: str = "",
-        result: str = "",
-    ) -> None:
-        """Add a step and write the case. `files`: those that the step wrote.
-
-        A step that changes something forgets what was undone; one that only finds something out does not.
-        """
-        sums = {name: _sha256((self.folder / name).read_bytes()) for name in files}
-        step = Step(kind, text, command, python, dict(change or {}), sums, result)
-        self._steps = [*self.history, step, *(() if change else self.undone)]
-        self._done += 1
-        self._rewrite_used()
-        self._save()
-
-    def next_result(self, kind: str) -> str:
-        """A free folder for a result."""
-        return self._free(f"results/{len(self.history) + 1:03d}-{kind}")
-
     def question(self, name: str, **own: Any) -> str:
         """The command line that asks this of the readings in use."""
         return self._ask(name, self.data_files, **own)
-
-    def check_files(self) -> None:
-        """Raise `InputError` for a file of the case that is gone, or is not what its step wrote."""
-        state = self.state
-        needed = {state.machine, state.program, *state.effects, *state.data} - {""}
-        for name, known in {n: s for step in self.history for n, s in step.files.items()}.items():
-            file = self.folder / name
-            if name in needed and (not file.is_file() or _sha256(file.read_bytes()) != known):
-                what = "is not what was put into the case" if file.is_file() else "is gone"
-                raise InputError(f"{name} {what}", hint="bring the file back, or begin another case", file=str(file))
 
     def _kept(self, kind: str, found: Found, words: str = "", **own: Any) -> Found:
         result = self.next_result(kind)
@@ -509,97 +486,13 @@ class Case:
         machine = self.machine
         try:
             before = Measurements([self.path(file)]).on(machine)
-            after = Measurements([self.path(_used(file))]).on(machine)
+            after = Measurements([self.path(used_name(file))]).on(machine)
             good = len(before) - len(after) >= 1 and line not in set(after.line.tolist())
         except TpsError:
             good = False
         if not good:
             self._rewrite_used()
             raise InputError(f"{file} line {line} cannot be left out by itself")
-
-    def _rewrite_used(self) -> None:
-        """Files in used/ as the state has them: after undo and redo too."""
-        aside = self.state.aside
-        for file in {entry.rpartition(":")[0] for entry in aside}:
-            lines = [int(entry.rpartition(":")[2]) for entry in aside if entry.startswith(file + ":")]
-            self._write({_used(file): _without(self.folder / file, lines)})
-
-    def _as_csv(self, file: str | Path) -> bytes:
-        """A measurement file as CSV: a CSV file as it stands, a workbook or packaged data as a table."""
-        from toolpath_stiff.column_files import csv_text
-        from toolpath_stiff.files import read_bytes
-        from toolpath_stiff.updating.measurements import NIST_TABLE_1
-
-        name = str(file)
-        if name != NIST_TABLE_1 and ".xlsx" not in name.lower():
-            return read_bytes(name, "measurements")
-        frame = Measurements([name]).to_frame(self.machine).drop(columns=["file", "line"])
-        return csv_text(list(frame.columns), frame.astype(str).replace("nan", "").to_numpy().tolist()).encode()
-
-    def _copied(self, file: str | Path, folder: str, content: bytes | None = None) -> str:
-        """Copy a file into a folder of the case under a name that is free; the name."""
-        from toolpath_stiff.files import read_bytes
-
-        content = read_bytes(file, "the file") if content is None else content
-        source = Path(str(file).partition("#")[0])
-        suffix = ".csv" if folder == "data" else UNSAFE.sub("_", source.suffix)
-        name = self._free(f"{folder}/{UNSAFE.sub('_', source.stem)[:LONGEST_NAME].lstrip('.') or 'file'}{suffix}")
-        self._write({name: content})
-        return name
-
-    def _free(self, name: str) -> str:
-        path, number = Path(name), 1
-        while (self.folder / name).exists():
-            number += 1
-            name = str(path.with_name(f"{path.stem}-{number}{path.suffix}"))
-        return name
-
-    def _write(self, contents: Mapping[str, str | bytes]) -> None:
-        from toolpath_stiff.files import write_atomically
-
-        for name, content in contents.items():
-            write_atomically(self.folder / name, content)
-
-    def _save(self) -> None:
-        from toolpath_stiff.files import write_atomically
-
-        file = self.folder / CASE_FILE
-        if file.is_file() and file.read_text("utf-8") != self._written:
-            raise InputError(
-                f"{CASE_FILE} was changed by another program since it was opened", hint="open the case again"
-            )
-        self._rewrite_used()
-        self._written = case_text(self._steps, self._done)
-        write_atomically(file, self._written)
-
-
-def _used(name: str) -> str:
-    return f"used/{Path(name).name}"
-
-
-def _without(file: Path, lines: Sequence[int]) -> bytes:
-    """A file with these lines commented out."""
-    rows = file.read_bytes().split(b"\n")
-    for line in lines:
-        if not 1 <= line <= len(rows):
-            raise InputError(f"{file.name} has no line {line}")
-        rows[line - 1] = b"# " + rows[line - 1]
-    return b"\n".join(rows)
-
-
-def _machine_text(machine: str | Path) -> bytes:
-    from importlib import resources
-
-    from toolpath_stiff.files import read_bytes
-
-    if str(machine) in Machine.names():
-        packaged = resources.files("toolpath_stiff") / "data" / "machines" / f"{machine}.toml"
-        return packaged.read_bytes()
-    return read_bytes(machine, "machine file")
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
 
 
 def _short(value: Any) -> str:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from toolpath_stiff.api.case_files import free_name, sha256, used_name, without_lines, write_files
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 
+CASE_FILE = "case.toml"
 FORMAT = 1
 HEADING = "# A case of toolpath_stiff: the steps in their order; `done` of them hold, the others were undone.\n"
 
@@ -123,3 +125,113 @@ def _check_names(change: Mapping[str, Any], entry: Mapping[str, Any], file: str,
     for name in filter(None, names):
         if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts or "\\" in name:
             raise InputError(f"step {number} names {name!r}", expected="a file within the case's folder", file=file)
+
+
+class History:
+    """The steps of a case and the files that they wrote.
+
+    Attributes
+    ----------
+    folder
+        Where the case is.
+    """
+
+    def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
+        self.folder, self._steps, self._done, self._written = folder, list(steps), done, text
+
+    @property
+    def history(self) -> list[Step]:
+        """The steps that hold."""
+        return self._steps[: self._done]
+
+    @property
+    def undone(self) -> list[Step]:
+        """The steps that redo would bring back, the next one first."""
+        return self._steps[self._done :]
+
+    @property
+    def state(self) -> CaseState:
+        """What holds now."""
+        found = CaseState()
+        for step in self.history:
+            found = replace(found, **step.change)
+        return found
+
+    def path(self, name: str) -> str:
+        """A file of the case, as functions and commands take it."""
+        return str(self.folder / name)
+
+    def undo(self) -> Step | None:
+        """Take back the last step that changed something, and what was found since; None where there is none."""
+        at = next((n for n in range(self._done - 1, 0, -1) if self._steps[n].change), None)
+        if at is None:
+            return None
+        self._done = at
+        self._save()
+        return self._steps[at]
+
+    def redo(self) -> Step | None:
+        """Do again the next step that was undone, and what was found after it; None where nothing was."""
+        found = next((step for step in self.undone if step.change), None)
+        if found is None:
+            return None
+        first = self._steps.index(found, self._done)
+        later = (n for n in range(first + 1, len(self._steps)) if self._steps[n].change)
+        self._done = next(later, len(self._steps))
+        self._save()
+        return found
+
+    def record(
+        self,
+        kind: str,
+        text: str,
+        *,
+        change: Mapping[str, Any] | None = None,
+        files: Sequence[str] = (),
+        command: str = "",
+        python: str = "",
+        result: str = "",
+    ) -> None:
+        """Add a step and write the case. `files`: those that the step wrote.
+
+        A step that changes something forgets what was undone; one that only finds something out does not.
+        """
+        sums = {name: sha256((self.folder / name).read_bytes()) for name in files}
+        step = Step(kind, text, command, python, dict(change or {}), sums, result)
+        self._steps = [*self.history, step, *(() if change else self.undone)]
+        self._done += 1
+        self._rewrite_used()
+        self._save()
+
+    def next_result(self, kind: str) -> str:
+        """A free folder for a result."""
+        return free_name(self.folder, f"results/{len(self.history) + 1:03d}-{kind}")
+
+    def check_files(self) -> None:
+        """Raise `InputError` for a file of the case that is gone, or is not what its step wrote."""
+        state = self.state
+        needed = {state.machine, state.program, *state.effects, *state.data} - {""}
+        for name, known in {n: s for step in self.history for n, s in step.files.items()}.items():
+            file = self.folder / name
+            if name in needed and (not file.is_file() or sha256(file.read_bytes()) != known):
+                what = "is not what was put into the case" if file.is_file() else "is gone"
+                raise InputError(f"{name} {what}", hint="bring the file back, or begin another case", file=str(file))
+
+    def _rewrite_used(self) -> None:
+        """Files in used/ as the state has them: after undo and redo too."""
+        aside = self.state.aside
+        for file in {entry.rpartition(":")[0] for entry in aside}:
+            lines = [int(entry.rpartition(":")[2]) for entry in aside if entry.startswith(file + ":")]
+            write_files(self.folder, {used_name(file): without_lines(self.folder / file, lines)})
+
+    def _save(self) -> None:
+        from toolpath_stiff.files import write_atomically
+
+        file = self.folder / CASE_FILE
+        if file.is_file() and file.read_text("utf-8") != self._written:
+            raise InputError(
+                f"{CASE_FILE} was changed by another program since it was opened", hint="open the case again"
+            )
+        self._rewrite_used()
+        self._written = case_text(self._steps, self._done)
+        write_atomically(file, self._written)

@@ -33,6 +33,7 @@ def _document(session: Session) -> dict[str, Any]:
         "gauge": gauge(session, now) if now else None,
         "verdict": verdict(session),
         "effects": effects(session),
+        "own_effects": session.editing.state(),
         "fit": fit(session),
         "plan": plan(session),
         "compare": compare(session),
@@ -302,6 +303,7 @@ def program(session: Session) -> dict[str, Any] | None:
         "lines": lines[:MOST_LINES],
         "origin": origin(session),
         "require": state.require,
+        "placed": bool(state.origin),
     }
     if not found:
         return {**shown, "path": None, "error": error}
@@ -349,9 +351,22 @@ def placement(session: Session) -> dict[str, Any] | None:
         )
     except TpsError:
         now = None
-    entry = session.found("place")
+    entry, sheet = session.found("place"), set_up(session)
     if not entry:
-        return {"now": now, "front": None}
+        return {"now": now, "front": None, "set_up": sheet}
     said = entry["document"]
     names = ("front", "chosen", "before", "worse", "warnings", "offset_blocks")
-    return {"now": now, "result": entry["result"], **{name: said.get(name) for name in names}}
+    return {"now": now, "set_up": sheet, "result": entry["result"], **{name: said.get(name) for name in names}}
+
+
+def set_up(session: Session) -> dict[str, Any] | None:
+    """Offsets, files and warnings for the shop floor, where they were made for the present placement."""
+    entry = session.found("set_up")
+    if not entry:
+        return None
+    said = entry["document"]
+    files = {"sheet": "setup.pdf", "written": entry["written"], "page": "report.html"}
+    return {
+        **{name: said.get(name) for name in ("warnings", "offset_blocks", "chosen", "before", "worse")},
+        **{name: f"{entry['result']}/{file}" for name, file in files.items()},
+    }

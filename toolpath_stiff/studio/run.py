@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from toolpath_stiff.api.case import CASE_FILE, Case
+from toolpath_stiff.api.case import Case
+from toolpath_stiff.api.steps import CASE_FILE
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 

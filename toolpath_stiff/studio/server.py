@@ -31,6 +31,8 @@ PLAIN = {
     ".png": "image/png",
     ".html": "text/html",
     ".toml": "text/plain",
+    ".pdf": "application/pdf",
+    ".py": "text/plain",
     ".nc": "text/plain",
     ".txt": "text/plain",
     ".svg": "image/svg+xml",
@@ -193,15 +195,13 @@ class Handler(BaseHTTPRequestHandler):
     def _file(self, name: str) -> None:
         folder = self.server.session.case.folder.resolve()
         file = (folder / name).resolve()
-        inside = (
-            file.is_relative_to(folder) and file.suffix in PLAIN and "exercise" not in file.relative_to(folder).parts[0]
-        )
-        if not inside or not file.is_file():
+        room = file.relative_to(folder).parts[0] if file.is_relative_to(folder) and file != folder else "exercise"
+        # Programs have any suffix; among the results there is nothing that the tool has not written.
+        known = PLAIN.get(file.suffix, "text/plain" if room == "results" else "")
+        if not known or "exercise" in room or not file.is_file():
             return self._send(HTTPStatus.NOT_FOUND, "there is no such file in the case", "text/plain")
         saved = "" if file.suffix in (".html", ".png", ".svg") else file.name
-        return self._send(
-            HTTPStatus.OK, file.read_bytes(), PLAIN[file.suffix], saved, {"Content-Security-Policy": SANDBOX}
-        )
+        return self._send(HTTPStatus.OK, file.read_bytes(), known, saved, {"Content-Security-Policy": SANDBOX})
 
     def _json(self, document: Any, status: HTTPStatus = HTTPStatus.OK) -> None:
         self._send(status, json.dumps(document, ensure_ascii=False, allow_nan=False), "application/json")
@@ -212,7 +212,7 @@ class Handler(BaseHTTPRequestHandler):
         body = content.encode() if isinstance(content, str) else content
         self.send_response(status)
         headers = {
-            "Content-Type": f"{kind}; charset=utf-8" if not kind.startswith("image/png") else kind,
+            "Content-Type": kind if kind in ("image/png", "application/pdf") else f"{kind}; charset=utf-8",
             "Content-Length": str(len(body)),
             "Cache-Control": "no-store",
             "X-Content-Type-Options": "nosniff",

@@ -13,6 +13,7 @@ from toolpath_stiff.api.results import one_of
 from toolpath_stiff.api.steps import Step
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.studio.editing import Editing
 from toolpath_stiff.studio.work import Job
 
 MOST_POSES, MOST_SEED = 60, 2**31 - 1
@@ -41,8 +42,10 @@ class Session:
         self._message = ""
         self._revealed: dict[str, Any] | None = None
         self._kept: dict[str, tuple[Any, Any]] = {}  # name -> key, value: what is worked out once for a state
+        self.editing = Editing(case)
         self._resume()
         self._follow_up()
+        self.editing.follow(self._look)
 
     # -- for the server ------------------------------------------------------------------------------------------------
 
@@ -58,6 +61,7 @@ class Session:
 
     def close(self) -> None:
         """End the work under way."""
+        self.editing.close()
         with self.lock:
             self._jobs = []
             if self._running:
@@ -188,6 +192,18 @@ class Session:
             raise InputError(f"bounds {', '.join(bounds)}", expected=", ".join(allowed))
         self._queue("place", **bounds)
 
+    def _save_effect(self, file: str, text: str) -> None:
+        self.editing.save(str(file), str(text))
+        self.editing.look()
+
+    def _look(self) -> None:
+        """Load own effects that were saved in an editor."""
+        with self.lock:
+            if not self.editing.look():
+                return
+            self._follow_up()
+        self._tell()
+
     def _cancel(self) -> None:
         self._jobs = []
         if self._running:
@@ -250,6 +266,8 @@ class Session:
         state = self.case.state
         if kind == "place":
             return (state.machine, state.effects, state.program)
+        if kind == "set_up":
+            return (state.machine, state.effects, state.program, state.origin)
         return self.path_key if kind == "analyze" else self.data_key
 
     def _start(self) -> None:
@@ -271,7 +289,7 @@ class Session:
             if answer is not None and job.key == self.key(job.kind):
                 result = job.options["result"]
                 self._found[job.kind, job.key] = {**answer, "result": result}
-                command = self._command(job)
+                command = answer.get("command") or self._command(job)
                 if not self._said_already(job.kind, command):
                     line, text = f"case.{job.kind}({_python(job)})", answer["text"].strip("<>")
                     self.case.record(job.kind, text, command=command, python=line, result=result)
@@ -444,6 +462,9 @@ ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
     "accept": Session._accept,
     "plan": lambda self, n=6: self._queue("plan", n=max(1, min(MOST_POSES, int(n)))),
     "compare": lambda self: self._queue("compare"),
+    "edit": lambda self, file: self.editing.open(str(file)),
+    "save_effect": Session._save_effect,
+    "set_up": lambda self: self._queue("set_up"),
     "measure": Session._measure,
     "exercise": Session._exercise,
     "claim": Session._claim,

@@ -215,6 +215,13 @@ def place(case: Any, tell: Tell, result: str, **bounds: Any) -> dict[str, Any]:
     return {"text": repr(found), "document": found.to_dict()}
 
 
+def set_up(case: Any, tell: Tell, result: str) -> dict[str, Any]:
+    """Offsets, set-up sheet and program of the present placement."""
+    found, command = case.set_up_in(result, tell)
+    written = [name for name in (case.program.name, "not_written.txt") if (case.folder / result / name).is_file()]
+    return {"text": repr(found), "document": found.to_dict(), "command": command, "written": written[0]}
+
+
 TASKS: dict[str, Callable[..., dict[str, Any]]] = {
-    task.__name__: task for task in (diagnose, compare, update, plan, analyze, place)
+    task.__name__: task for task in (diagnose, compare, update, plan, analyze, place, set_up)
 }

@@ -55,8 +55,25 @@ function effectsPanel(state, act) {
     (fit?.support ?? []).flatMap((one) => one.reasons).map((reason) => h("p", { class: "muted" }, reason)),
     state.verdict ? null : h("p", { class: "muted" }, state.readings ? "The ranking comes with the diagnosis." : "Without readings nothing is ranked."),
     rows,
+    ownEffects(state, act),
   ];
 }
+// Effects of one's own: the working copy is edited here or in an editor; each save is loaded, a fault stands below.
+function ownEffects(state, act) {
+  if (!state.own_effects.length) return h("p", { class: "muted live" }, "Drop a Python file with an effect of your own on the page: it joins these.");
+  return [h("h3", {}, "Effects of your own"), state.own_effects.map((own, k) => {
+    const area = h("textarea", { id: `own-${k}`, rows: 16, spellcheck: "false", "aria-label": `Text of ${own.file}`, "aria-describedby": `own-fault-${k}` });
+    area.value = drafts.get(own.file) ?? own.text;
+    area.addEventListener("input", () => drafts.set(own.file, area.value));
+    const save = () => { drafts.delete(own.file); act({ do: "save_effect", file: own.file, text: area.value }); };
+    return h("div", { class: "own" }, h("code", {}, own.file), own.copy
+      ? [h("p", { class: "muted" }, "Edit it here, or in an editor: ", h("code", {}, own.copy), ". Its code is run each time it is saved."), area,
+        h("div", { class: "actions" }, button("Save and load", save, { id: `own-save-${k}`, class: "main live" }))]
+      : h("div", { class: "actions" }, button("Edit", () => act({ do: "edit", file: own.file }), { id: `own-edit-${k}` })),
+      own.fault ? h("p", { class: "warning", id: `own-fault-${k}`, role: "alert" }, own.fault) : null);
+  })];
+}
+const drafts = new Map(); // what was typed and not saved yet
 function effectRow(effect, act) {
   const id = `sw-${effect.name}`, on = effect.on !== null;
   const toggle = (e) => act({ do: "switch", effect: effect.name, values: e.target.checked ? Object.fromEntries(effect.sliders.map((s) => [s.key, s.start])) : null });
@@ -163,10 +180,22 @@ function placementPanel(state, act) {
       return [h("label", { for: `o-${name}` }, name), h("input", { type: "range", id: `o-${name}`, min: low, max: high, step: 1, value: at[axis], oninput: (e) => { number.value = e.target.value; act.move(axis, Number(e.target.value), false); }, onchange: (e) => act.move(axis, Number(e.target.value), true) }), number];
     })),
     h("div", { class: "actions live" }, button("Best", () => act({ do: "place" }), { id: "best", class: "main live" }), h("span", { class: "muted" }, "searches the whole workspace; none of mean, range and weakest gets worse where that can be avoided")),
+    setUp(p, state, act),
     p.front ? [(p.warnings ?? []).map((text) => h("p", { class: "warning" }, text)), h("h3", {}, "Front"),
       Object.entries(p.offset_blocks ?? {}).filter(([name]) => !name.endsWith("_reason")).map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" }, p.offset_blocks[`${name}_reason`] ?? "no block can say it"))),
       table(["", "mean", "range", "weakest N/mm", "X", "Y", "Z mm", "C deg", ""], p.front.map((row) => [`${row.number}${row.number === p.chosen?.number ? " recommended" : ""}`, group(row.mean_N_per_mm), group(row.range_N_per_mm), group(row.min_N_per_mm), ...["x_mm", "y_mm", "z_mm", "rotation_deg"].map((k) => row[k].toFixed(1)),
         button("use", () => act({ do: "place_at", origin: [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg] }), { id: `use-${row.number}`, "aria-label": `use point ${row.number}` })]))] : null,
+  ];
+}
+// For the shop floor, of the placement as it stands: offsets, set-up sheet, the program written for it, every warning.
+function setUp(p, state, act) {
+  const made = p.set_up, moved = state.program.placed;
+  const offsets = (blocks) => Object.entries(blocks ?? {}).filter(([name]) => !name.endsWith("_reason")).map(([name, text]) => h("p", {}, `${name}: `, text ? h("code", {}, text) : h("span", { class: "muted" }, blocks[`${name}_reason`] ?? "no block can say it")));
+  return [
+    h("div", { class: "actions live" }, button("Offsets, set-up sheet, program", () => act({ do: "set_up" }), { id: "set-up", disabled: !moved }), h("span", { class: "muted" }, moved ? "for this placement, as files" : "move the work first")),
+    made ? h("div", { id: "set-up-files" }, made.warnings.map((text) => h("p", { class: "warning" }, text)), offsets(made.offset_blocks),
+      h("p", { class: "actions live" }, [["sheet", "Set-up sheet"], ["written", made.written.endsWith("not_written.txt") ? "Why the program was not written" : "Program for this placement"], ["page", "Report"]]
+        .map(([key, label]) => h("a", { class: "button", id: `set-up-${key}`, href: `/case/${made[key]}`, target: key === "page" ? "_blank" : null, rel: "noreferrer" }, label)))) : null,
   ];
 }
 function placementFigures(now, state, id) {
