@@ -227,7 +227,7 @@ def make_case(
     noise: float = 0.02,
     machine: str | Nominal = defaults.MACHINE,
     plan: Mapping[str, Any] | None = None,
-    size: float | None = None,
+    size: float | Sequence[float] | None = None,
     nuisances: Nuisances | None = None,
 ) -> tuple[Table, dict[str, Any]]:
     """Rows of a blind campaign and their truth; the same arguments give the same rows.
@@ -239,7 +239,7 @@ def make_case(
     layout
         `paper` (42 rows), `tilted` (288 rows) or `campaign` (the rows of `plan`).
     hidden
-        None: drawn blindly; `none`, `one`, `two`, `outside`; or names of effects (oddities included).
+        None: drawn blindly; `none`, `one`, `two`, `three`, `outside`; or names of effects (oddities included).
     noise
         Relative repeat noise of one reading.
     machine
@@ -247,7 +247,8 @@ def make_case(
     plan
         Table of poses in shop units without stiffness.
     size
-        Rms change of ln stiffness that each effect makes, instead of a draw; less where its bound is reached.
+        Rms change of ln stiffness that each effect makes, instead of a draw; less where its bound is reached. Several:
+        one for each effect, in the order of `truth["hidden"]`.
     nuisances
         Instead of the standard ones; `noise` is then not used.
 
@@ -267,7 +268,7 @@ def draw_case(
     noise: float = 0.02,
     machine: str | Nominal = defaults.MACHINE,
     plan: Mapping[str, Any] | None = None,
-    size: float | None = None,
+    size: float | Sequence[float] | None = None,
     nuisances: Nuisances | None = None,
 ) -> Case:
     """As `make_case`, with the machine itself."""
@@ -285,10 +286,10 @@ def draw_case(
     true, effects = HiddenMachine(), []
     if names:
         scale = scale_of(nominal, rows, clamp_of(table), nuisances)
-        for name in names:
+        for name, wanted in zip(names, _sizes(size, len(names)), strict=True):
             # A stream of its own for each effect: sizes of different effects of one seed have nothing in common.
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
-            parameters, found = scale.draw(name, size, rng)
+            parameters, found = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
             effects.append({"effect": name, "parameters": parameters, **found})
     true = disturb_machine(true, nuisances, streams["machine"])
@@ -296,7 +297,7 @@ def draw_case(
     outside = any(name in OUTSIDE for name in names)
     truth = {
         "hidden": list(names),
-        "kind": "outside" if outside else ("none", "one", "two")[min(len(names), 2)],
+        "kind": "outside" if outside else ("none", "one", "two", "three")[min(len(names), 3)],
         "effects": effects,
     }
     return Case(measured, truth, nominal, true, nuisances)
@@ -360,6 +361,15 @@ def _campaign(layout: str, nominal: Nominal, plan: Mapping[str, Any] | None, rng
         ) from None
 
 
+def _sizes(size: float | Sequence[float] | None, count: int) -> tuple[float | None, ...]:
+    """The size wanted of each of `count` effects."""
+    if size is None or isinstance(size, (int, float)):
+        return (size,) * count
+    if len(size) != count:
+        raise InputError(f"{len(size)} sizes for {count} hidden effects", expected="one size, or one for each effect")
+    return tuple(size)
+
+
 def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator) -> tuple[str, ...]:
     """Names of what is hidden."""
     if hidden is None:
@@ -369,9 +379,8 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
         return ()
     if hidden == "one":
         return (str(rng.choice(known)),)
-    if hidden == "two":
-        first, second = rng.choice(len(known), size=2, replace=False)
-        return (known[first], known[second])
+    if hidden in ("two", "three"):
+        return tuple(known[i] for i in rng.choice(len(known), size=2 if hidden == "two" else 3, replace=False))
     if hidden == "outside":
         return (str(rng.choice(list(ODDITIES) if layout == "paper" else list(OUTSIDE))),)
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
@@ -379,7 +388,7 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
         if name not in (*CATALOGUE, *OUTSIDE):
             raise InputError(
                 f"nothing called {name!r} to hide",
-                expected=f"none, one, two, outside, or of {', '.join((*CATALOGUE, *OUTSIDE))}",
+                expected=f"none, one, two, three, outside, or of {', '.join((*CATALOGUE, *OUTSIDE))}",
             )
     if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
         raise InputError(
