@@ -107,6 +107,7 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     try:
         record, document = judged(rows, truth, folder, **stated)
     except (InputError, InputErrors) as refusal:
+        message = str(refusal).replace(f"{folder}/", "")
         return more | {"truth": truth["hidden"], "effects": truth["effects"], "verdict": "refused", "plausible": [],
                        "refused": message, "suspects": suspects_of_refusal(message)}  # fmt: skip
     return more | record | {
