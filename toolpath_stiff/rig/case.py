@@ -26,13 +26,14 @@ from toolpath_stiff.rig.hidden import (
     OUTSIDE,
     HiddenMachine,
     Nuisances,
-    Rows,
     disturb_machine,
     disturb_readings,
     reading_sd,
     readings,
 )
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, reachable
+from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 Table = dict[str, Any]
@@ -177,6 +178,7 @@ def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows
         time=s_from_min(column("time_min", 0.0)),
         elapsed=np.linspace(0.0, 1.0, n) if elapsed is None else elapsed,
         setup=np.array(table["setup"] if "setup" in table else [DEFAULT_SETUP] * n, dtype=np.str_),
+        temperature=column("temperature_C", ROOM_TEMPERATURE),
     )
 
 
@@ -202,7 +204,8 @@ class Case:
         Measurement table in shop units, in measuring order.
     truth
         What was hidden: `hidden` (names; empty if nothing), `kind`, `effects` with parameters in shop units,
-        their `size` (rms change of ln stiffness) and `detectability` (see `effects.DETECTABLE`).
+        their `size` (rms change of ln stiffness) and `detectability` (see `effects.DETECTABLE`); of an unknown also
+        `links` and `variables`, what a description may name.
     nominal, machine, nuisances
         To measure the same machine again.
     """
@@ -239,7 +242,8 @@ def make_case(
     layout
         `paper` (42 rows), `tilted` (288 rows) or `campaign` (the rows of `plan`).
     hidden
-        None: drawn blindly; `none`, `one`, `two`, `three`, `outside`; or names of effects (oddities included).
+        None: drawn blindly; `none`, `one`, `two`, `three`, `outside`, `unknown`; or names of effects (oddities and
+        unknowns included). An unknown is never drawn where nothing is said.
     noise
         Relative repeat noise of one reading.
     machine
@@ -291,10 +295,10 @@ def draw_case(
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
             parameters, found = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
-            effects.append({"effect": name, "parameters": parameters, **found})
+            effects.append({"effect": name, "parameters": parameters, **found, **_looks(name)})
     true = disturb_machine(true, nuisances, streams["machine"])
     measured = measure(nominal, true, table, rows, nuisances, streams["noise"], stated_sd=layout == "paper")
-    outside = any(name in OUTSIDE for name in names)
+    outside = any(name in (*OUTSIDE, *UNKNOWNS) for name in names)
     truth = {
         "hidden": list(names),
         "kind": "outside" if outside else ("none", "one", "two", "three")[min(len(names), 3)],
@@ -381,16 +385,19 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
         return (str(rng.choice(known)),)
     if hidden in ("two", "three"):
         return tuple(known[i] for i in rng.choice(len(known), size=2 if hidden == "two" else 3, replace=False))
+    if hidden == "unknown":
+        return (str(rng.choice([name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)])),)
     if hidden == "outside":
         return (str(rng.choice(list(ODDITIES) if layout == "paper" else list(OUTSIDE))),)
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
+    all_names = (*CATALOGUE, *OUTSIDE, *UNKNOWNS)
     for name in names:
-        if name not in (*CATALOGUE, *OUTSIDE):
+        if name not in all_names:
             raise InputError(
                 f"nothing called {name!r} to hide",
-                expected=f"none, one, two, three, outside, or of {', '.join((*CATALOGUE, *OUTSIDE))}",
+                expected=f"none, one, two, three, outside, unknown, or of {', '.join(all_names)}",
             )
-    if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
+    if len(set(names)) < len(names) or sum(name in (*OUTSIDE, *UNKNOWNS) for name in names) > 1:
         raise InputError(
             f"hidden effects {', '.join(names)}", expected="each once, and at most one outside the catalogue"
         )
@@ -398,4 +405,16 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
         raise InputError(
             "thermal_drift needs the column time_min", expected="layout tilted, or a plan with that column"
         )
+    for name in names:
+        if lacking := [c for c in (UNKNOWNS[name].columns if name in UNKNOWNS else ()) if c not in table]:
+            raise InputError(
+                f"{name} needs the column {', '.join(lacking)}", expected="layout tilted, or a plan with that column"
+            )
     return names
+
+
+def _looks(name: str) -> dict[str, Any]:
+    """What an unknown looks like from outside: the links that could do it and what it varies with."""
+    if name not in UNKNOWNS:
+        return {}
+    return {"links": sorted(UNKNOWNS[name].links), "variables": sorted(UNKNOWNS[name].variables)}
