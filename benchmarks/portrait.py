@@ -64,8 +64,8 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
 _WHAT = (
     "Each case is a machine of [the rig](../docs/rig.md) with one of its unknowns, or sound: 2 % repeat noise, 1 % "
     "clamping, 1 % strut spread, joints off by 0.5 mm, 2 % wild readings. Which links and variables are right is "
-    "settled by the physics of each kind. A set is right if it holds one of them and is short: at most four links, three "
-    "variables. Intervals of shares are Wilson's; a bar is cleared by the figure."
+    "settled by the physics of each kind. A set is right if it holds one of them and is short: four links, three "
+    "variables at most. Intervals of shares are Wilson's; a bar is cleared by the figure."
 )
 _PROBABILITIES = (
     "Tilted layout. Several words may be right for one unknown, so that honest probabilities may lie below the share."
