@@ -129,11 +129,7 @@ _WRONG = re.compile(r"\btoo (small|large|low|high)|\b(smaller|larger|lower|highe
 
 def noise_remarks(document: Mapping[str, Any]) -> list[str]:
     """Sentences that say a stated noise is wrong, where a reader looks: text, reasons, warnings, notes, its origin."""
-    sentences = [
-        document["text"],
-        *document["why"],
-        *document["warnings"],
-        *document["notes"],
-        document["noise"]["origin"],
-    ]
+    noise = document["noise"]
+    sentences = [document["text"], *document["why"], *document["warnings"], *document["notes"], noise["origin"]]
+    sentences.append(str(noise.get("remark", "")))
     return [one for one in sentences if _STATED.search(one) and _WRONG.search(one)]

@@ -15,7 +15,8 @@ from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import REACH, SOFT, Kind, State, Unknown, beyond, kind, opened, signed
 
 HALF_SPAN = 0.4  # m, half the distance of a bed's feet (assumed)
-FLOOR = -0.8  # m, height about which a machine rocks that stands on a weak floor (assumed)
+FLOOR = -0.3  # m, height about which a bed rocks that stands on a weak floor (assumed)
+KNEE = 1.6  # m, height of a portal's knee, above all poses (assumed)
 SUPPORTS = 0.35  # m, radius of the circle of a table's three bearings (assumed)
 SOFTENING = 1.5  # K over which a damping plate takes up its softness (assumed; the rig's shop warms by as much)
 HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
@@ -41,7 +42,7 @@ def _tip(at: State) -> FloatArray:
 
 def bed_sag(links: Links, at: State, u: Unknown) -> Links:
     """A bed on two feet sags under the work: c = c0 (1 - (x / a)^2)^2 (simply supported beam, load at x: a^2 b^2)."""
-    across = np.clip(_tip(at)[:, u.shape["axis"]] / HALF_SPAN, -1.0, 1.0)
+    across = np.clip(_tip(at)[:, 0] / HALF_SPAN, -1.0, 1.0)
     return _with(links, (_fixed(Z, at), u.size * (1.0 - across**2) ** 2))
 
 
@@ -89,9 +90,8 @@ def clamp_loosened(links: Links, at: State, u: Unknown) -> Links:
 
 
 def portal_bending(links: Links, at: State, u: Unknown) -> Links:
-    """The portal that carries the frame bends about a horizontal axis through its top: the lower the tip, the more."""
-    top = at.place.frame_joints[:, :, 2].mean(axis=1)
-    arm = _tip(at) - top[:, None] * Z
+    """The portal that carries the frame bends about a horizontal axis at its knee: the lower the tip, the more."""
+    arm = _tip(at) - KNEE * Z
     return _with(links, (np.cross(np.eye(3)[u.shape["axis"]], arm), _constant(u.size, at)))
 
 
@@ -174,7 +174,7 @@ def _horizontal(rng: Generator) -> dict[str, Any]:
 # axis is described by x and y as well as by the radius.
 BASE = "table,frame"
 END_KINDS: dict[str, Kind] = {
-    "bed_sag": kind("the bed sags between its feet", BASE, "x,y", SOFT, act=bed_sag, shape=_horizontal),
+    "bed_sag": kind("the bed sags between its feet", BASE, "x", SOFT, act=bed_sag),
     "pallet_overhang": kind("the work gives vertically, far out", BASE, "radius", SOFT, act=pallet_overhang),
     "floor_rocking": kind(
         "the bed rocks about an axis in the floor", BASE, "z,constant", SOFT, act=floor_rocking, shape=_azimuth
@@ -196,7 +196,7 @@ END_KINDS: dict[str, Kind] = {
         shape=lambda rng: {"after": float(rng.uniform(0.3, 0.7))}, varies=("elapsed",),
     ),
     "portal_bending": kind(
-        "the portal bends about an axis at its top", BASE, "z", SOFT, act=portal_bending, shape=_horizontal
+        "the portal bends about an axis at its knee", BASE, "z", 4 * SOFT, act=portal_bending, shape=_horizontal
     ),
     "frame_twist": kind("the frame twists about the machine's axis", BASE, "radius,x,y", 30 * SOFT, act=frame_twist),
     "spindle_thrust": kind(

@@ -191,7 +191,7 @@ def _wave(rng: Generator) -> dict[str, Any]:
 # What can be told at the tip: joints and struts are in series, so an effect of all joints may be called either; so is
 # that of one strut, its joints and its drive. A strut's length follows height, radius and tilt of the pose, so what
 # varies with a swing may be called by any pose variable that swings the joints.
-ONE, ALL = "one strut,joints,struts", "joints,struts"
+ONE, ALL = "one strut,joints", "joints,struts"
 STRUT_KINDS: dict[str, Kind] = {
     "joint_swing": kind(
         "joints softer the further they swing", ALL, "tilt,radius,strut length,z", SOFT, act=joint_swing
