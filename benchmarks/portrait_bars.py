@@ -58,6 +58,8 @@ def _of_unknowns(layout: str, records: Sequence[Record]) -> list[Figure]:
     found = [
         share(layout, "unknown: `unexplained` or `described`", [r["verdict"] in SEEN for r in records],
               at_least=0.92 if barred else 0.70),
+        share(layout, "the same, or a portrait of what a name of the catalogue leaves",
+              [r["verdict"] in SEEN or bool(r["portrait"]) for r in records]),
         share(layout, "unknown: `identified`, a name of the catalogue", [named_by_catalogue(r) for r in records]),
         share(layout, "unknown: has a portrait", [bool(r["portrait"]) for r in records]),
     ]  # fmt: skip

@@ -33,14 +33,12 @@ def rows_of_suspect(suspect: Any) -> set[int]:
     """Rows (from 1) that an entry of `suspect_rows` names: a number, or `row`, `rows`, `line` or `lines` (row + 1)."""
     if isinstance(suspect, int):
         return {suspect}
-    found: set[int] = set()
-    for key, offset in (("row", 0), ("rows", 0), ("line", -1), ("lines", -1)):
-        value = suspect.get(key)
-        values = value if isinstance(value, list) else [] if value is None else [value]
-        found |= {int(one) + offset for one in values}
-        if values and key in ("row", "rows"):
-            break  # lines then say the same in the file's own count
-    return found
+    found = _numbers(suspect.get("row")) | _numbers(suspect.get("rows"))
+    return found or {line - 1 for line in _numbers(suspect.get("line")) | _numbers(suspect.get("lines"))}
+
+
+def _numbers(value: Any) -> set[int]:
+    return {int(one) for one in (value if isinstance(value, list) else [] if value is None else [value])}
 
 
 def named_rows(record: Record) -> set[int]:

@@ -40,7 +40,7 @@ def test_the_strongest_two_are_those_with_the_largest_sizes() -> None:
 
 def test_rows_are_read_however_they_are_named() -> None:
     assert rows_of_suspect({"row": 7, "line": 8, "words": ""}) == {7}
-    assert rows_of_suspect({"rows": [7, 9]}) == {7, 9}
+    assert rows_of_suspect({"rows": [7, 9]}) == rows_of_suspect({"row": 7, "rows": [7, 9], "lines": [8, 10]}) == {7, 9}
     assert rows_of_suspect({"line": 8}) == rows_of_suspect({"lines": [8]}) == rows_of_suspect(7) == {7}
     assert suspects_of_refusal("measurements.csv:152: stiffness ...")[0]["row"] == 151
 

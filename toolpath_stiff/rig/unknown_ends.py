@@ -113,6 +113,14 @@ def spindle_thrust(links: Links, at: State, u: Unknown) -> Links:
     )
 
 
+def spindle_flange(links: Links, at: State, u: Unknown) -> Links:
+    """A screw of the spindle's flange is loose: the spindle rocks in the platform about one oblique axis of it."""
+    across = np.cos(u.shape["azimuth"]) * at.place.rotation[:, :, 0]
+    across = across + np.sin(u.shape["azimuth"]) * at.place.rotation[:, :, 1]
+    longer = 1.0 + at.rows.extension / max(at.nominal.tool_length, 1e-3)
+    return _with(links, (longer[:, None] * across, _constant(u.size, at)))
+
+
 def taper_opening(links: Links, at: State, u: Unknown) -> Links:
     """The tool holder's taper opens beyond a bending moment, with a longer tool sooner; then the tool tilts in it."""
     tool = at.place.rotation[:, :, 2]
@@ -165,13 +173,20 @@ def _azimuth(rng: Generator) -> dict[str, Any]:
     return {"azimuth": float(rng.uniform(0.0, 2.0 * np.pi))}
 
 
+def _oblique(rng: Generator) -> dict[str, Any]:
+    """Within 25 degrees of a diagonal of X and Y, in any quadrant."""
+    quadrant = 0.5 * np.pi * float(rng.integers(4))
+    return {"azimuth": quadrant + float(rng.uniform(np.radians(20.0), np.radians(70.0)))}
+
+
 def _horizontal(rng: Generator) -> dict[str, Any]:
     return {"axis": int(rng.integers(2))}
 
 
 # A spring between tool and work in base axes may sit in the frame as well as under the table: `BASE`. Temperature
-# follows the clock of the campaign, so order and time may stand for it. A load along the tangent of a circle about the
-# axis is described by x and y as well as by the radius.
+# follows the clock of the campaign, so order and time may stand for it. What turns about an axis has one constant
+# rotational compliance, and shows as a translation that grows with the arm: both are right. A load along the
+# tangent of a circle about the axis is described by x and y as well as by the radius.
 BASE = "table,frame"
 END_KINDS: dict[str, Kind] = {
     "bed_sag": kind("the bed sags between its feet", BASE, "x", SOFT, act=bed_sag),
@@ -180,7 +195,8 @@ END_KINDS: dict[str, Kind] = {
         "the bed rocks about an axis in the floor", BASE, "z,constant", SOFT, act=floor_rocking, shape=_azimuth
     ),
     "worn_table_bearing": kind(
-        "one of three bearings under the table is worn", BASE, "x,y,z", SOFT, act=worn_table_bearing, shape=_azimuth
+        "one of three bearings under the table is worn", BASE, "x,y,z,constant", SOFT,
+        act=worn_table_bearing, shape=_azimuth,
     ),
     "fixture_slip": kind(
         "the fixture on the riser slips under large loads", "table", "setup,load", SOFT, act=fixture_slip,
@@ -196,12 +212,19 @@ END_KINDS: dict[str, Kind] = {
         shape=lambda rng: {"after": float(rng.uniform(0.3, 0.7))}, varies=("elapsed",),
     ),
     "portal_bending": kind(
-        "the portal bends about an axis at its knee", BASE, "z", 4 * SOFT, act=portal_bending, shape=_horizontal
+        "the portal bends about an axis at its knee", BASE, "z,constant", 4 * SOFT, act=portal_bending,
+        shape=_horizontal,
     ),
-    "frame_twist": kind("the frame twists about the machine's axis", BASE, "radius,x,y", 30 * SOFT, act=frame_twist),
+    "frame_twist": kind(
+        "the frame twists about the machine's axis", BASE, "radius,x,y,constant", 30 * SOFT, act=frame_twist
+    ),
     "spindle_thrust": kind(
         "the spindle loses its preload under thrust of one sign", "tool", "force sign,direction,tilt", SOFT,
         act=spindle_thrust, shape=lambda rng: {"side": float(rng.choice([-1.0, 1.0]))}, varies=("force",),
+    ),
+    "spindle_flange": kind(
+        "the spindle rocks in the platform about one oblique axis", "platform,tool", "constant", SOFT,
+        act=spindle_flange, shape=_oblique,
     ),
     "taper_opening": kind(
         "the tool holder's taper opens beyond a load", "tool", "load", SOFT, act=taper_opening,
