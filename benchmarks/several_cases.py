@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tempfile
 import traceback
@@ -113,7 +114,8 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     return more | record | {
         "noise_found": document["noise"],
         "noise_remarks": noise_remarks(document),
-        "suspects": list(document.get("suspect_rows", [])),
+        # The folder is another one in every run.
+        "suspects": json.loads(json.dumps(document.get("suspect_rows", [])).replace(f"{folder}/", "")),
     }  # fmt: skip
 
 
