@@ -18,6 +18,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 
+BARS = 19  # of the platform truss (the paper's Figure 2b)
 HUB, TIP = 6, 7  # nodes of the platform truss after its six joints
 SECANT_STEPS = 60
 SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two steps
@@ -59,7 +60,7 @@ class Links:
     moment
         N m/rad, rotational spring at both ends of every strut; (n, 6) where struts and rows differ.
     bars
-        N/m, bars of the platform truss; inf is rigid.
+        N/m, bars of the platform truss; inf is rigid; (19,) where they differ, in the order of `truss_bars`.
     spindle
         (n, 3) m/N in platform axes.
     vertices
@@ -81,7 +82,7 @@ class Links:
     struts: FloatArray
     joints: Callable[[FloatArray], FloatArray]
     moment: float | FloatArray
-    bars: float
+    bars: float | FloatArray
     spindle: FloatArray
     vertices: FloatArray
     table: FloatArray
@@ -130,7 +131,7 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
     unit = strut / length[:, :, None]
     nodes = _nodes(place)
     rigid = _rigid_motions(nodes - place.work_point[:, None, :])  # (n, 24, 6)
-    flexible = np.isfinite(links.bars)
+    flexible = bool(np.isfinite(links.bars).all())
     motion = np.broadcast_to(np.eye(24), (n, 24, 24)) if flexible else rigid
     dofs = motion.shape[2]
     vertex_count = len(links.vertices)
@@ -146,7 +147,7 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
     stretch[:, range(6), range(dofs, dofs + 6)] = -1.0  # what the joints take is not left for the strut
     springs = np.zeros((n, size, size))
     if flexible:
-        springs[:, :dofs, :dofs] = links.bars * _truss(nodes)
+        springs[:, :dofs, :dofs] = _truss(nodes, np.broadcast_to(links.bars, (BARS,)))
     if np.any(np.asarray(links.moment) > 0.0):
         # Rotation of the platform: the rigid motion that follows its joints best; exact when it is rigid.
         follow = np.linalg.pinv(rigid[:, :18])[:, 3:]  # (n, 3, 18)
@@ -181,22 +182,26 @@ def _nodes(place: Geometry) -> FloatArray:
     return np.concatenate([place.platform_joints, hub[:, None], place.work_point[:, None]], axis=1)
 
 
-def _truss(nodes: FloatArray) -> FloatArray:
-    """(n, 24, 24) stiffness of the platform's 19 bars of 1 N/m: rim, spokes, joints to tip, hub to tip."""
+def truss_bars(nodes: FloatArray) -> list[tuple[int, int]]:
+    """Nodes (0 to 5: joints) that each of the platform's 19 bars joins: rim, spokes, joints to tip, hub to tip."""
     spread = nodes[0, :6] - nodes[0, HUB]
     axis = nodes[0, TIP] - nodes[0, HUB]
     axis = axis / np.linalg.norm(axis)
     first = spread[0] - (spread[0] @ axis) * axis
     around = np.argsort(np.arctan2(spread @ np.cross(axis, first), spread @ first * np.linalg.norm(axis)))
-    rim = [(around[i], around[(i + 1) % 6]) for i in range(6)]
-    bars = [*rim, *((i, HUB) for i in range(6)), *((i, TIP) for i in range(6)), (HUB, TIP)]
+    rim = [(int(around[i]), int(around[(i + 1) % 6])) for i in range(6)]
+    return [*rim, *((i, HUB) for i in range(6)), *((i, TIP) for i in range(6)), (HUB, TIP)]
+
+
+def _truss(nodes: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """(n, 24, 24) stiffness of the platform's bars, `stiffness` (19,) N/m."""
     total = np.zeros((len(nodes), 24, 24))
-    for i, j in bars:
+    for (i, j), spring in zip(truss_bars(nodes), stiffness, strict=True):
         bar = nodes[:, j] - nodes[:, i]
         unit = bar / np.linalg.norm(bar, axis=1, keepdims=True)
         row = np.zeros((len(nodes), 24))
         row[:, 3 * i : 3 * i + 3], row[:, 3 * j : 3 * j + 3] = -unit, unit
-        total += row[:, :, None] * row[:, None, :]
+        total += spring * row[:, :, None] * row[:, None, :]
     return total
 
 

@@ -1,4 +1,4 @@
-"""Unknowns of struts, joints and frame: they act on what carries the platform."""
+"""Unknowns of struts, joints, platform and frame: they act on what carries the platform."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.nominal import rotations, strut_directions
-from toolpath_stiff.rig.structure import Links
+from toolpath_stiff.rig.structure import BARS, Links
 from toolpath_stiff.rig.unknown import SOFT, Kind, State, Unknown, beyond, kind, one_strut, opened, signed
 
 SWING = np.sin(np.radians(20.0)) ** 2  # squared sine of the swing at which compliances are quoted
 LEAST_FORCE = 0.1  # N, below which a secant compliance is held
+SOUND_BAR = 3e9  # N/m, the bars of a platform one of which is cracked: 1.4 % at the tip (assumed)
 SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it does at rest (assumed)
 PRELOAD_GROWS = 0.3  # of the campaign, time constant of a machine that warms up (assumed)
 
@@ -135,6 +136,13 @@ def warm_up_preload(links: Links, at: State, u: Unknown) -> Links:
     return _with(links, lambda forces: compliance)
 
 
+def cracked_bar(links: Links, at: State, u: Unknown) -> Links:
+    """The bar from one joint of the platform to the spindle nose is cracked; the others are stiff, but not rigid."""
+    stiffness = np.minimum(np.full(BARS, SOUND_BAR), links.bars)
+    stiffness[12 + u.shape["strut"]] *= 1.0 - u.size  # after the rim and the spokes, six each
+    return dataclasses.replace(links, bars=stiffness)
+
+
 def frame_oval(links: Links, at: State, u: Unknown) -> Links:
     """The frame's ring goes oval: the radial loads of two posts act against each other, c (R1 - R2)^2."""
     vertices = at.nominal.vertices
@@ -237,6 +245,10 @@ STRUT_KINDS: dict[str, Kind] = {
     "warm_up_preload": kind(
         "joints stiffen in the course of the campaign", ALL, "order,time,temperature", SOFT, act=warm_up_preload,
         varies=("elapsed",),
+    ),
+    "cracked_bar": kind(
+        "one bar of the platform is cracked", "platform,joints,one strut", "constant", 0.9995, act=cracked_bar,
+        shape=one_strut,
     ),
     "frame_oval": kind(
         "the frame's ring goes oval between two posts", "frame", "constant", SOFT, act=frame_oval, shape=_vertex
