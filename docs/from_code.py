@@ -20,6 +20,7 @@ if __name__ == "__main__":
 import toolpath_stiff
 from toolpath_stiff.nc.codes.registry import codes_table
 from toolpath_stiff.nc.cutter_location.vocabulary import words_table
+from toolpath_stiff.rig import UNKNOWNS
 from toolpath_stiff.stiffness.effects import LINKS, Effect, Parameter, packaged_effects
 
 DOCS = Path(__file__).parent
@@ -98,6 +99,17 @@ def _effect(effect: Effect) -> str:
 
 def _typical(p: Parameter) -> str:
     return f"{_number(p.typical[0])} to {_number(p.typical[1])} {p.unit}".rstrip()
+
+
+def unknowns_table() -> str:
+    """One row for each unknown of the rig: its physics, what a description may name, what its readings must carry."""
+    found = []
+    for name, kind in UNKNOWNS.items():
+        physics = kind.act or kind.read or kind.move
+        about = " ".join((inspect.getdoc(physics) or "").split("\n\n")[0].split())
+        columns = ", ".join(f"`{column}`" for column in kind.columns)
+        found.append((f"`{name}`", about, ", ".join(sorted(kind.links)), ", ".join(sorted(kind.variables)), columns))
+    return "\n".join(rows(("unknown", "physics", "links", "varies with", "needs"), *found))
 
 
 # Commands
@@ -220,6 +232,7 @@ COMMITTED: dict[str, Callable[[], str]] = {
     "words": words_table,
     "table of effects": effects_table,
     "effects": effects_in_full,
+    "unknowns": unknowns_table,
 }
 MADE = {**COMMITTED, "commands": commands, "api": api}
 

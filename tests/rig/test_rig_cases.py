@@ -186,3 +186,13 @@ def test_other_machines_are_measured_at_poses_of_ones_own():
         for machine in (NIST, turned)
     )
     assert doubled["stiffness_N_per_mm"] == pytest.approx(2.0 * rows["stiffness_N_per_mm"])
+
+
+def test_sizes_of_several_effects_are_set_one_by_one():
+    names = ("spindle_compliance", "weak_strut", "gauge_scale")
+    truth = make_case(4, "paper", names, size=(0.10, 0.07, 0.05))[1]
+    assert truth["kind"] == "three"
+    assert [effect["size"] for effect in truth["effects"]] == pytest.approx([0.10, 0.07, 0.05], rel=0.03)
+    with pytest.raises(InputError, match="2 sizes for 3"):
+        make_case(4, "paper", names, size=(0.1, 0.05))
+    assert len(set(make_case(11, "paper", "three")[1]["hidden"])) == 3

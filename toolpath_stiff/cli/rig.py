@@ -42,7 +42,10 @@ def rig_arguments(parser: argparse.ArgumentParser) -> None:
     )
     new.add_argument("--at", metavar="PLAN.csv", help="poses of layout campaign: measurement file without stiffness")
     new.add_argument(
-        "--hidden", metavar="WHAT", help="none, one, two, outside, or NAME[,NAME]; default: drawn blindly from the seed"
+        "--hidden",
+        metavar="WHAT",
+        help="none, one, two, three, outside, unknown, or NAME[,NAME]; default: drawn "
+        "blindly from the seed, unknowns left out",
     )
     new.add_argument("--noise", type=float, default=2.0, metavar="PERCENT", help="repeat noise of a reading; default 2")
     add_replace_option(new)
@@ -107,6 +110,8 @@ def _wording(found: dict[str, Any]) -> str:
         lines.append(
             f"hidden: {effect['effect']} ({values}); changes the readings by {100 * effect['size']:.1f} % (rms)"
         )
+        if "links" in effect:
+            lines.append(f"it is in: {' or '.join(effect['links'])}; varies with: {' or '.join(effect['variables'])}")
     return "\n".join(lines)
 
 
