@@ -34,9 +34,10 @@ UPRIGHT_BOUNDS = Bounds(np.array([0, 0, 0.4, 0, 0, 0]), np.array([0, 0, 1.25, 0,
 README_BOUNDS = Bounds(np.array([-0.3, -0.3, 0.4, 0, 0, 0]), np.array([0.3, 0.3, 1.25, 0, 0, 2 * np.pi]))
 PRESENT = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
 NIST = load_machine("nist")
+STEP = 8e-3  # m
 
 
-def searched(program, bounds=README_BOUNDS, present=PRESENT, step=4e-3, read=None, **asked):
+def searched(program, bounds=README_BOUNDS, present=PRESENT, step=STEP, read=None, **asked):
     path = work_path(program, step, TANGENTIAL, present, read)
     return search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(**asked), present=np.array(present))
 
@@ -52,8 +53,8 @@ def test_never_worse_than_the_present_placement(name, objective):
     """
     program = program_of(name)
     found = searched(program, objective=objective)
-    best = analyze(NIST, program, origin=tuple(found.front[found.best]), step=4e-3)
-    before = analyze(NIST, program, origin=PRESENT, step=4e-3)
+    best = analyze(NIST, program, origin=tuple(found.front[found.best]), step=STEP)
+    before = analyze(NIST, program, origin=PRESENT, step=STEP)
     now, then = headline_figures(best), headline_figures(before)
     assert now["mean_N_per_mm"] >= then["mean_N_per_mm"]
     assert now["range_N_per_mm"] <= then["range_N_per_mm"]
@@ -105,7 +106,7 @@ def test_least_worse_is_found_where_all_are_worse():
     bounds = Bounds(np.array([0.1, -0.3, 0.4, 0, 0, 0]), np.array([0.3, 0.3, 0.7, 0, 0, 0]))
     program = program_of("pocket")
     found = searched(program, bounds)
-    evaluator = Evaluator(MODEL, work_path(program, 4e-3), TANGENTIAL, 1000.0)
+    evaluator = Evaluator(MODEL, work_path(program, STEP), TANGENTIAL, 1000.0)
     unit = np.random.default_rng(11).uniform(size=(3000, len(bounds.free)))
     others = evaluator.figures(bounds.placements(unit)).objectives
     loss = np.nanmin((found.present.objectives - others).max(axis=1))
@@ -119,7 +120,7 @@ def test_a_rapid_is_a_constraint_like_a_cut():
     found = searched(program, UPRIGHT_BOUNDS, objective="mean")
     assert (found.figures.rapid_margin >= 0.01).all()
     for placement in (found.front[found.best], found.front[0], found.front[-1]):
-        assert analyze(NIST, program, origin=tuple(placement), step=4e-3).at.reachable.all()
+        assert analyze(NIST, program, origin=tuple(placement), step=STEP).at.reachable.all()
     # It does bind: without the rapids the search goes higher.
     low = parse_program(text.replace("Z700", "Z6"), "low.nc")
     assert searched(low, UPRIGHT_BOUNDS, objective="mean").front[:, 2].max() > found.front[:, 2].max() + 0.05
@@ -127,7 +128,7 @@ def test_a_rapid_is_a_constraint_like_a_cut():
 
 def test_the_first_rapid_starts_where_the_control_stands_now():
     program = program_of("pocket")
-    path = work_path(program, 4e-3, TANGENTIAL, PRESENT)
+    path = work_path(program, STEP, TANGENTIAL, PRESENT)
     anchored = path.anchored
     turn = np.eye(3)[None]
     here = anchored.placed(turn, np.array([PRESENT[:3]]))[0]
@@ -153,7 +154,7 @@ def test_axes_in_machine_coordinates_stay_where_they_are():
     """Held against the program read anew for the placement: every anchored sample lies on the control's own line."""
     read = homing("")
     program = read(PRESENT)
-    anchored = work_path(program, 4e-3, TANGENTIAL, PRESENT, read).anchored
+    anchored = work_path(program, STEP, TANGENTIAL, PRESENT, read).anchored
     there = (0.1, -0.05, 0.9, 0.0, 0.0, 0.5)
     c, s = np.cos(0.5), np.sin(0.5)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])[None]
@@ -412,8 +413,8 @@ def test_effects_are_placed_by_the_plain_analysis(tmp_path):
     model = build_model(machine)
     program = program_of("inch_bracket")
     placement = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7]])
-    found = Evaluator(model, work_path(program, 4e-3), TANGENTIAL, 1000.0).figures(placement)
-    wanted = headline_figures(analyze(model, program, origin=tuple(placement[0]), step=4e-3))
+    found = Evaluator(model, work_path(program, STEP), TANGENTIAL, 1000.0).figures(placement)
+    wanted = headline_figures(analyze(model, program, origin=tuple(placement[0]), step=STEP))
     assert found.mean[0] / 1e3 == pytest.approx(wanted["mean_N_per_mm"], rel=1e-9)
     assert found.spread[0] / 1e3 == pytest.approx(wanted["range_N_per_mm"], rel=1e-9)
 
@@ -424,9 +425,9 @@ def test_other_loads_are_those_of_the_plain_analysis(load):
 
     program, direction = program_of("tilted_five_axis"), parse_load(load)
     placements = np.array([[0.05, -0.1, 0.8, 0, 0, 0.7], [0.0, 0.05, 0.8, 0.05, -0.03, 0.2]])
-    found = Evaluator(MODEL, work_path(program, 4e-3, direction), direction, 1000.0).figures(placements)
+    found = Evaluator(MODEL, work_path(program, STEP, direction), direction, 1000.0).figures(placements)
     for i, placement in enumerate(placements):
-        analysis = analyze(MODEL, program, origin=tuple(placement), step=4e-3, load=direction)
+        analysis = analyze(MODEL, program, origin=tuple(placement), step=STEP, load=direction)
         k = analysis.at.stiffness[analysis.counted]
         assert found.lowest[i] == pytest.approx(k.min(), rel=1e-9)
         assert found.mean[i] == pytest.approx(
