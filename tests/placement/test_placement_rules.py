@@ -24,7 +24,7 @@ from toolpath_stiff.nc import parse_program
 from toolpath_stiff.path import place
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, least_cost
 from toolpath_stiff.placement.evaluator import Evaluator
-from toolpath_stiff.placement.paths import telling_path, work_path
+from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
 from toolpath_stiff.stiffness.model import build_model
 
@@ -245,7 +245,7 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
     """6,000 placements at random, of which the best in several places are polished by scipy's simplex search."""
     from scipy.optimize import minimize
 
-    path = telling_path(work_path(program_of(name), 5e-3, TANGENTIAL, PRESENT), 60)
+    path = representative_path(work_path(program_of(name), 5e-3, TANGENTIAL, PRESENT), 60)
     lean = np.radians(tilt)
     bounds = Bounds(np.array([-0.3, -0.3, 0.4, -lean, -lean, 0]), np.array([0.3, 0.3, 1.25, lean, lean, 2 * np.pi]))
     evaluator, rules, goal = (
@@ -308,7 +308,7 @@ def test_a_climb_ends_no_lower_than_nelder_mead():
     """An independent way up, scipy's simplex search from the same place: each may end on another kink, within 1 %."""
     from scipy.optimize import minimize
 
-    path = telling_path(work_path(program_of("pocket"), 5e-3, TANGENTIAL, PRESENT), 150)
+    path = representative_path(work_path(program_of("pocket"), 5e-3, TANGENTIAL, PRESENT), 150)
     evaluator = Evaluator(MODEL, path, TANGENTIAL, 1000.0)
     climber = Climber(evaluator, README_BOUNDS, Rules(0.01))
     goal = Goal(OBJECTIVES["balanced"], NO_FLOORS)

@@ -195,7 +195,7 @@ def test_forces_that_do_not_settle_are_an_error_that_names_effect_and_pose():
 def test_no_direction_is_softer_than_the_softest_or_stiffer_than_the_stiffest(kappa):
     model = model_of(kappa, 4e-6, 10e-9)
     rng = np.random.default_rng(8)
-    count = 800
+    count = 300
     found = evaluate_poses(model, POSITION[:3], roll_pitch_yaw(ROTATION[:3]), force=500.0)
     linear = evaluate_poses(model_of(kappa), POSITION[:3], roll_pitch_yaw(ROTATION[:3]), force=500.0)
     beyond = []
