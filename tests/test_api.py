@@ -58,7 +58,7 @@ PAIRS = {
     "plan --between spindle_compliance,none --n 2 --cost pose=20": lambda: tps.plan(
         "nist", between=("spindle_compliance", "none"), n=2, minutes={"pose": 20}
     ),
-    "machine recover --starts 1": lambda: tps.recover_geometry(starts=1),
+    "machine recover --starts 2": lambda: tps.recover_geometry(starts=2),
     "effects list": tps.effects,
 }
 NO_PICTURES = ("analyze", "map", "place", "case-study", "compare", "diagnose", "update", "plan")
