@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 # No result depends on the clock: on a busy machine examples are drawn and run slowly. The `timeout` in pyproject.toml
 # ends a test that does not end by itself.
-settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# 50 examples unless a test asks for more.
+settings.register_profile("suite", deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("suite")
 
 # Whatever the environment says, compiled modules are kept: without them each process that a test starts compiles the
