@@ -25,7 +25,7 @@ from toolpath_stiff.nc.controller import read_controller
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.climb import Bounds, Rules
 from toolpath_stiff.placement.evaluator import Evaluator
-from toolpath_stiff.placement.paths import telling_path, work_path
+from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.placing import Placed, Task, place_program
 from toolpath_stiff.placement.search import SearchRules
 from toolpath_stiff.rotations import rotation_matrices
@@ -133,7 +133,7 @@ def against_grid(name: str) -> tuple[str, bool]:
     found = placed(program, 1e-3)
     cpu = time.process_time() - start
     path = work_path(program, 1e-3, LOAD, program.origin)
-    whole, few = (Evaluator(MODEL, part, LOAD, 1000.0) for part in (path, telling_path(path, GRID_SAMPLES)))
+    whole, few = (Evaluator(MODEL, part, LOAD, 1000.0) for part in (path, representative_path(path, GRID_SAMPLES)))
     best = np.array(found.best.origin)
     now = whole.figures(np.array([program.origin]))
     rules = Rules(0.01, float(now.extrapolated[0]))

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+if TYPE_CHECKING:
+    from toolpath_stiff.machine import Machine
+    from toolpath_stiff.updating.inference.prediction import Predictor
+    from toolpath_stiff.updating.measurements import Measurements
+
 # No result depends on the clock: on a busy machine examples are drawn and run slowly. The `timeout` in pyproject.toml
 # ends a test that does not end by itself.
-settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# 50 examples unless a test asks for more.
+settings.register_profile("suite", deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("suite")
 
 # Whatever the environment says, compiled modules are kept: without them each process that a test starts compiles the
@@ -30,4 +39,27 @@ def no_flushing():
     """No test outlives a power cut: a flush to the disk would only cost time, some 7 ms each."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("os.fsync", lambda handle: None)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def predictors_are_shared() -> Iterator[None]:
+    """The nist machine's answers to campaigns of one design are worked out once a process."""
+    from tests.stiffness.cases import nist
+    from tests.updating.cases import predictor_for
+    from toolpath_stiff.machine import machine_toml
+    from toolpath_stiff.updating import comparison, diagnosis
+    from toolpath_stiff.updating.correction import ladder
+    from toolpath_stiff.updating.inference.prediction import Predictor
+
+    plain = machine_toml(nist())
+
+    def shared(machine: Machine, data: Measurements, effect_files: Sequence[str | Path] = ()) -> Predictor:
+        """`Predictor(...)`; of the nist machine without effects of a user's own, that of the design."""
+        known = not effect_files and machine_toml(machine) == plain
+        return predictor_for(data) if known else Predictor(machine, data, effect_files)
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (comparison, diagnosis, ladder):
+            patch.setattr(module, "Predictor", shared)
         yield

@@ -260,9 +260,9 @@ def test_a_diagnosis_is_not_made_again_for_the_plan(monkeypatch):
 
     data = tps.Measurements.read("nist-table1")
     found = tps.diagnose("nist", data, noise_percent=10)
-    plain = tps.plan("nist", data, noise_percent=10)
+    plain = tps.plan("nist", data, noise_percent=10, n=2)
     monkeypatch.setattr(planning, "judge", None, raising=True)
-    assert tps.plan("nist", data, noise_percent=10, diagnosis=found).to_dict() == plain.to_dict()
+    assert tps.plan("nist", data, noise_percent=10, n=2, diagnosis=found).to_dict() == plain.to_dict()
 
 
 def test_place_names_the_program_that_it_wrote_among_the_files(here, capsys):

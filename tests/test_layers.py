@@ -6,6 +6,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -58,8 +59,13 @@ RIG_SHOWN_BY = ("api", "cli")  # a case starts, measures and reveals exercises, 
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
 
 
-def imports(source: str, package: str) -> Iterator[str]:
+@cache
+def imports(source: str, package: str) -> tuple[str, ...]:
     """Every absolute module name that the source imports, inside functions too; relative ones are resolved."""
+    return tuple(_imports(source, package))
+
+
+def _imports(source: str, package: str) -> Iterator[str]:
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -146,32 +152,22 @@ def test_every_room_is_in_the_architecture_page_or_beside_it():
     assert ranks == sorted(ranks)
 
 
-@pytest.mark.parametrize("words", [["--help"], ["--version"], []])
-def test_the_help_imports_nothing_heavy(words):
-    """In a fresh interpreter: this one has numpy already."""
+def test_the_help_imports_nothing_heavy():
+    """Of the tool and of every command; in a fresh interpreter, as this one has numpy already.
+
+    Commands import numpy and its like in `run`, so that a slip in an option is answered at once.
+    """
+    asked = [["--help"], ["--version"], [], *([command.name, "--help"] for command in COMMANDS)]
     code = (
         "import sys, io, contextlib\n"
         "from toolpath_stiff.cli.main import main\n"
-        "with contextlib.redirect_stdout(io.StringIO()):\n"
-        f"    main({words!r})\n"
-        f"print([name for name in {HEAVY!r} if name in sys.modules])\n"
+        f"for words in {asked!r}:\n"
+        "    with contextlib.redirect_stdout(io.StringIO()):\n"
+        "        main(words)\n"
+        f"    print(words, [name for name in {HEAVY!r} if name in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
-@pytest.mark.parametrize("command", [command.name for command in COMMANDS])
-def test_the_help_of_a_command_imports_nothing_heavy(command):
-    """Commands import numpy and its like in `run`, so that a slip in an option is answered at once."""
-    code = (
-        "import sys, io, contextlib\n"
-        "from toolpath_stiff.cli.main import main\n"
-        "with contextlib.redirect_stdout(io.StringIO()):\n"
-        f"    main([{command!r}, '--help'])\n"
-        f"print([name for name in {HEAVY!r} if name in sys.modules])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.splitlines() == [f"{words} []" for words in asked]
 
 
 def test_single_poses_load_no_nc_program():

@@ -50,6 +50,7 @@ def test_committed_reports_are_what_the_commands_write(command, folder, tmp_path
 def test_the_paper_s_readings_give_no_confident_name():
     """The negative control of the whole method."""
     document = json.loads((ROOT / "reports/nist_table1/diagnose/diagnose.json").read_text())
-    assert document["verdict"] != "identified"
+    assert set(document["by_noise"]) == {"low", "high"} and document["verdict"] != "identified"
+    assert len(document["plausible"]) > 1
     assert "none" in document["plausible"]
     assert not json.loads((ROOT / "reports/nist_table1/update/update.json").read_text())["support"]

@@ -70,7 +70,7 @@ def assert_same(lines, dialect="generic"):
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.name)
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_programs(program, dialect):
-    lines = read_lines(program)[: None if dialect == "generic" else 2000]
+    lines = read_lines(program)[: 8000 if dialect == "generic" else 2000]  # longer runs: across chunks, below
     assert assert_same(lines, dialect) > 0 or not DIALECTS[dialect].semicolon  # whose blocks end at `;`
 
 
@@ -123,7 +123,7 @@ modal = st.sampled_from(
 )  # fmt: skip
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.one_of(plain(), plain(), plain(), arc(), modal), min_size=1, max_size=30),
     st.sampled_from(sorted(DIALECTS)),

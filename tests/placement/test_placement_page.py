@@ -23,7 +23,7 @@ ROOT = Path(__file__).parent.parent.parent
 NIST = load_machine("nist")
 STEP = 10e-3  # m
 BOUNDS = ["--x", "-150:150", "--y", "-150:150", "--z", "700:1000", "--step", "10", "--points", "12"]
-TILTS = ("--tilt-a", "-8:8", "--tilt-b", "-8:8")
+TILTS = ("--x=0:0", "--y=0:0", "--tilt-a", "-8:8", "--tilt-b", "-8:8")
 
 
 def placed(tmp_path: Path, name: str, *more: str) -> tuple[str, dict]:
@@ -102,10 +102,9 @@ def test_tools_lean_as_programmed(tilted):
     assert np.linalg.norm(data["axis"], axis=1) == pytest.approx(np.ones(len(drawn)), abs=1e-4)
 
 
-def test_same_bytes_twice_and_nothing_from_the_network(tmp_path, capsys):
+def test_nothing_from_the_network_and_names_are_text(tmp_path, capsys):
     keep_out = ("--keep-out", "<b>vice</b>:100,100,0,300,300,900")
-    page, data = placed(tmp_path / "one", "case_study", *keep_out)
-    assert page == placed(tmp_path / "two", "case_study", *keep_out)[0]
+    page, data = placed(tmp_path / "one", "case_study", *keep_out)  # the same bytes twice: test_command of the search
     assert data["keepouts"] == [{"name": "<b>vice</b>", "box": [[100, 100, 0], [300, 300, 900]]}]
     assert "<b>vice" not in page
     assert "default-src 'none'" in page

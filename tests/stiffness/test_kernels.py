@@ -31,17 +31,14 @@ def poses(n: int, seed: int = 0, tilt: float = 0.35):
 
 def by_equilibrium(machine: Machine, position, rotation) -> np.ndarray:
     """Tip compliance from J^T f = w with a pivoted 6 x 6 solve, written out here again."""
-    result = []
-    for p, r in zip(position, rotation, strict=True):
-        arms = machine.platform_joints @ r.T
-        strut = p + arms - machine.frame_joints
-        length = np.linalg.norm(strut, axis=1)
-        u = strut / length[:, None]
-        force = np.linalg.solve(np.vstack([u.T, np.cross(arms, u).T]), np.eye(6)[:, :3])
-        law = machine.strut_law
-        k = np.interp(length, [0, 10], [law.intercept, law.intercept + 10 * law.slope])
-        result.append(force.T @ (force / k[:, None]))
-    return np.array(result)
+    arms = machine.platform_joints @ np.swapaxes(rotation, 1, 2)
+    strut = position[:, None] + arms - machine.frame_joints
+    length = np.linalg.norm(strut, axis=2)
+    u = strut / length[..., None]
+    force = np.linalg.solve(np.swapaxes(np.concatenate([u, np.cross(arms, u)], axis=2), 1, 2), np.eye(6)[:, :3])
+    law = machine.strut_law
+    k = np.interp(length, [0, 10], [law.intercept, law.intercept + 10 * law.slope])
+    return np.swapaxes(force, 1, 2) @ (force / k[..., None])
 
 
 def worst(found, expected) -> float:
@@ -172,9 +169,10 @@ def test_compliance_along_of_random_machines_is_right_wherever_it_is_called_good
         position = rng.uniform(-0.3, 0.3, (200, 3))
         rotation, direction = rotation_matrices(rng.uniform(-0.6, 0.6, (200, 3))), unit_vectors(200)
         found, _, _, good = along(route, closed_form.prepare(machine), position, direction, rotation)
-        expected = np.einsum("ni,nij,nj->n", direction, by_equilibrium(machine, position, rotation), direction)
+        tensor = by_equilibrium(machine, position, rotation)
+        expected = np.einsum("ni,nij,nj->n", direction, tensor, direction)
         # An error in the forces is an error relative to the tensor's size, of which a direction may see little.
-        size = np.abs(by_equilibrium(machine, position, rotation)).max(axis=(1, 2))
+        size = np.abs(tensor).max(axis=(1, 2))
         assert np.all(np.abs(found - expected)[good] < 1e-9 * size[good])
         doubtful += int((~good).sum())
     assert doubtful > 0
@@ -242,6 +240,17 @@ def test_a_strut_law_beyond_zero_is_refused_on_every_route(route):
     position[7] = [0.0, 0.0, -3.0]  # struts of some 6 m; the law ends at 4.7 m
     with pytest.raises(InputError):
         core.tip_compliance(build_model(NIST), position, route=route)
+
+
+@pytest.mark.parametrize("route", ["exact", *ROUTES])
+@pytest.mark.parametrize("law", [(2.0, 5e-318, 3.0, 5e-318), (1e-303, 4e7, 2e-303, 3e7), (2.0, np.nan, 3.0, 4e7)])
+def test_a_strut_law_that_gives_no_number_is_refused_on_every_route(route, law):
+    from toolpath_stiff.errors import InputError
+
+    model = build_model(NIST.with_changes(strut_law=StrutLaw(*law)))
+    tip = np.linspace([0.0, 0.0, 0.8], [0.2, 0.1, 0.9], 3)
+    with pytest.raises(InputError, match=r"strut \d would be .* at X0 Y0 Z800 mm; expected a finite stiffness above 0"):
+        core.tip_compliance(model, tip, route=route)
 
 
 def test_routes_are_chosen_by_number_and_physics():

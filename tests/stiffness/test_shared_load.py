@@ -89,12 +89,14 @@ def opponent(machine, position, rotation, direction, force, kappa, gap, contact)
     x = np.linalg.solve(rows.T @ (rows / compliance[:, None]) + springs, load)
     for _ in range(500):
         energy, gradient, rate = parts(x)
+        if np.abs(gradient).max() < 1e-9 * force:
+            break
         step = -np.linalg.solve(rows.T @ (rows * rate[:, None]) + springs, gradient)
         share = 1.0
         while share > 1e-12 and parts(x + share * step)[0] > energy + 1e-4 * share * (gradient @ step):
             share *= 0.5
         x = x + share * step
-        if np.abs(step).max() < 1e-13:
+        if np.abs(step).max() < 1e-13 or share <= 1e-12:  # rounding leaves no way further down
             break
     assert np.abs(parts(x)[1]).max() < 1e-4 * force
     return float(force / (x[:3] @ direction))

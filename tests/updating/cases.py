@@ -25,7 +25,7 @@ from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.covariances import Covariance, Groups
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.noise import Noise, noise_models
-from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.inference.prediction import Predictor, idle_on
 from toolpath_stiff.updating.measurements import Measurements, read_measurements
 
 FloatArray = NDArray[np.float64]
@@ -160,7 +160,8 @@ def predictor_for(data: Measurements) -> Predictor:
         PREDICTORS[design] = Predictor(nist(), data)
         PREDICTORS[design].joint_columns()  # kept with the predictor from now on
     found = copy.copy(PREDICTORS[design])
-    found.data = replace(data, warnings=found.data.warnings)
+    idle = idle_on(found.base, data).values()
+    found.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle))))
     return found
 
 

@@ -68,9 +68,8 @@ def table_of(problem: Problem, name: str) -> Table:
 def minus_half_square(residual: FloatArray) -> FloatArray:
     """(...,) -r^T V^-1 r / 2 - ln |V| / 2."""
     inverse = np.linalg.inv(COVARIANCE)
-    return np.asarray(
-        -0.5 * np.einsum("...i,ij,...j->...", residual, inverse, residual) - 0.5 * np.linalg.slogdet(COVARIANCE)[1]
-    )
+    squares = ((residual @ inverse) * residual).sum(axis=-1)
+    return np.asarray(-0.5 * squares - 0.5 * np.linalg.slogdet(COVARIANCE)[1])
 
 
 def brute_force(observed: FloatArray, added: FloatArray) -> float:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, make_problem
+from tests.updating.cases import campaign, predictor_for
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.updating.diagnosis.document import parameters
 from toolpath_stiff.updating.inference.candidates import likely_interval
+from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import refine
 from toolpath_stiff.updating.inference.hypotheses import averaged_interval, score_family
 from toolpath_stiff.updating.inference.noise import noise_models
@@ -85,7 +85,7 @@ def test_intervals_of_several_components_hold_the_truth():
         effect = find_effect(name)
         for seed in range(300, 310):
             data, truth = campaign(seed, "paper", name)
-            problem, _ = make_problem(nist(), data, noise_models(data)[0])
+            problem = Problem.of(predictor_for(data), noise_models(data)[0])
             family = score_family(problem, effect, problem.score_base())
             assert family is not None and family.best is not None
             found = parameters(refine(problem, family.best), family)

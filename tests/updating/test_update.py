@@ -152,7 +152,7 @@ def test_what_is_not_there_is_refused_unless_forced():
         found = updated(data, name, strut_law=True)
         assert not found.accepted
         assert found.supports[0].reasons
-        assert updated(data, name, strut_law=True, force=True).accepted
+    assert updated(data, name, strut_law=True, force=True).accepted
     told = document(Correction(found, None, PROVENANCE, ("a.csv",), None, seed=0))
     assert told["verdict"] == "refused"
     assert found.supports[0].reasons[0] in told["text"]

@@ -57,7 +57,7 @@ class Analysis(EvaluatedPath):
     step
         Distance of the samples in m.
     warnings
-        What deserves a look, sentences for people, the program's own included.
+        What deserves a look, plain sentences, the program's own included.
     """
 
     model: StiffnessModel
@@ -238,7 +238,7 @@ def _words_turn_the_platform(program: Program) -> bool:
 
 
 def assumptions(analysis: Analysis) -> list[str]:
-    """Everything that was assumed or recovered rather than published or given, sentences for people."""
+    """Everything that was assumed or recovered rather than published or given; plain sentences."""
     machine = analysis.machine
     found = list(analysis.program.assumptions)
     if _words_turn_the_platform(analysis.program):

@@ -15,12 +15,11 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff import __version__
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.api.programs import TABLES, analyze, path_options
 from toolpath_stiff.api.results import Progress, Result, one_of
-from toolpath_stiff.defaults import FORCE, LOAD, job_count
+from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessDied, ProcessPool
 from toolpath_stiff.report.batch import files, names, text
@@ -255,7 +254,7 @@ class Task:
     saving: dict[str, Any]
     inputs: tuple[str, ...]
     replace: bool
-    version: str = __version__
+    version: str = VERSION
     run: str = ""
 
     @property
@@ -461,8 +460,8 @@ def _named(error: BaseException) -> str:
 
 def analyze_task(task: Task, machines: Machines | None = None) -> Outcome:
     """Analyse a program and write its report: what an executor is handed, in whatever process."""
-    if task.version != __version__:
-        return _failed(task, f"its process runs toolpath_stiff {__version__}, the caller {task.version}")
+    if task.version != VERSION:
+        return _failed(task, f"its process runs toolpath_stiff {VERSION}, the caller {task.version}")
     if not task.out.is_dir():
         return _failed(
             task, f"its process does not see {task.out}: reports need a file system that all processes share"

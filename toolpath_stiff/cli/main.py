@@ -20,9 +20,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, TextIO
 
-from toolpath_stiff import __version__
 from toolpath_stiff.cli.arguments import whole_options
-from toolpath_stiff.defaults import THREADS
+from toolpath_stiff.defaults import THREADS, VERSION
 from toolpath_stiff.errors import FileError, TpsError, harmless
 
 
@@ -106,7 +105,7 @@ def build_parser(chosen: str | None) -> argparse.ArgumentParser:
         usage="tps [--version] COMMAND ...",
         epilog=_command_list() + "\n" + EPILOG,
     )
-    parser.add_argument("--version", action="version", version=f"tps {__version__}")
+    parser.add_argument("--version", action="version", version=f"tps {VERSION}")
     commands = parser.add_subparsers(
         dest="command", metavar="COMMAND", help=argparse.SUPPRESS, parser_class=Parser, prog="tps"
     )

@@ -123,8 +123,8 @@ def _spread(machine: Machine, strays: list[Stray]) -> float:
     bodies = {"frame": machine.frame_joints.copy(), "platform": machine.platform_joints.copy()}
     for stray in strays:
         bodies[stray.body][stray.joint] = stray.expected
-    mended = machine.with_changes(frame_joints=bodies["frame"], platform_joints=bodies["platform"])
-    return float(solve_struts_at(mended, machine.limits.neutral_pose).lengths.std())
+    corrected = machine.with_changes(frame_joints=bodies["frame"], platform_joints=bodies["platform"])
+    return float(solve_struts_at(corrected, machine.limits.neutral_pose).lengths.std())
 
 
 Fit = Callable[[FloatArray, list[tuple[int, int]]], Callable[[FloatArray], FloatArray]]

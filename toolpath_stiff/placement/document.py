@@ -218,7 +218,7 @@ def placement_warnings(
     present: PlacementFigures,
     best: Analysis,
 ) -> list[str]:
-    """Sentences for people, the gravest first.
+    """Plain sentences, the gravest first.
 
     Parameters
     ----------

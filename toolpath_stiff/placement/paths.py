@@ -262,7 +262,7 @@ def _approach(ends: FloatArray, machine: FloatArray, follows: BoolArray, moves: 
     return legs
 
 
-def telling_path(path: WorkPath, count: int) -> WorkPath:
+def representative_path(path: WorkPath, count: int) -> WorkPath:
     """A path of `count` headline samples that stands for the whole, extremes first.
 
     A quarter as many of the other samples, and of the anchored ones, stay for the limits.

@@ -21,7 +21,7 @@ from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, front_rows, thin
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures, clearances
-from toolpath_stiff.placement.paths import WorkPath, placed_path, telling_path, with_rows
+from toolpath_stiff.placement.paths import WorkPath, placed_path, representative_path, with_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, mm_from_m
@@ -127,7 +127,7 @@ class _Search:
         whole = self.evaluator(path)
         whole.poses = before
         middle, few = (
-            self.evaluator(telling_path(path, count)) if len(path) > count else whole
+            self.evaluator(representative_path(path, count)) if len(path) > count else whole
             for count in (POLISH_SAMPLES, SCOUT_SAMPLES)
         )
         self.evaluators = {"whole": whole, "middle": middle, "few": few}

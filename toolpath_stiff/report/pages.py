@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from toolpath_stiff import __version__
+from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report.figure import Drawing
 from toolpath_stiff.report.words import machine_text, plain
@@ -52,7 +52,7 @@ def render(
         script=Markup(script),
         script_hash=script_hash(script),
         data=None if data is None else Markup(json_for_script(data)),
-        version=__version__,
+        version=VERSION,
         **values,
     )  # fmt: skip
 

@@ -189,8 +189,10 @@ def _assembled(
         machine = active.geometry(machine)
         if not active.effect.unknown_to_control:
             control = active.geometry(control)
-    deceived = any(active.effect.unknown_to_control for active in acting)
-    return StiffnessModel(machine, tuple(acting), tuple(reading), control if deceived else None, given, conditions)
+    control_differs = any(active.effect.unknown_to_control for active in acting)
+    return StiffnessModel(
+        machine, tuple(acting), tuple(reading), control if control_differs else None, given, conditions
+    )
 
 
 def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> StiffnessModel:
@@ -361,7 +363,7 @@ def setup_of(active: ActiveEffect) -> str:
 
 
 def condition_warnings(model: StiffnessModel, tool_given: bool = False) -> list[str]:
-    """What of the model does not act on a program, for want of a condition or as an instrument; sentences for people.
+    """What of the model does not act on a program, for want of a condition or as an instrument; plain sentences.
 
     `tool_given`: whether the length of the tool is known; else it is the reference tool's.
     """
@@ -411,7 +413,7 @@ def machine_words(document: Mapping[str, Any]) -> str:
 
 
 def idle_on_readings(model: StiffnessModel, missing: Collection[str], setups: Collection[str]) -> dict[str, str]:
-    """Effects and instruments of the model that add nothing to readings -> a sentence for people.
+    """Effects and instruments of the model that add nothing to readings -> a sentence that says why.
 
     `missing`: columns that the readings lack; `setups`: names that occur in them.
     """

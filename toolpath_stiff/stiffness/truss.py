@@ -12,6 +12,8 @@ elimination, k = F / x (equation 4). It knows neither effects nor batches: it ex
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -53,6 +55,13 @@ def free_platform_flexibility(platform_joints: FloatArray) -> FloatArray:
     InputError
         Two joints coincide, or the bars form a mechanism, so that this truss cannot stand for the platform.
     """
+    return _free_flexibility(np.asarray(platform_joints, dtype=float).tobytes())
+
+
+@lru_cache(maxsize=64)  # a fit asks for the same joints at every size of the bars
+def _free_flexibility(joints: bytes) -> FloatArray:
+    """`free_platform_flexibility` of six joints, as one array that nobody writes to."""
+    platform_joints = np.frombuffer(joints).reshape(6, 3)
     nodes = platform_nodes(platform_joints)
     stiffness = np.zeros((24, 24))
     for i, j in platform_bars(platform_joints):
@@ -80,9 +89,11 @@ def free_platform_flexibility(platform_joints: FloatArray) -> FloatArray:
     flexibility = np.linalg.inv(held)[np.ix_(loaded, loaded)]
     balance = np.eye(21)
     resultants = rigid[loaded].T  # (6, 21): total force and moment about the tip
-    joints = rigid[:18]  # (18, 6)
-    balance[:18] -= joints @ np.linalg.solve(joints.T @ joints, resultants)
-    return np.asarray(balance.T @ flexibility @ balance)
+    arms = rigid[:18]  # (18, 6)
+    balance[:18] -= arms @ np.linalg.solve(arms.T @ arms, resultants)
+    found = np.asarray(balance.T @ flexibility @ balance)
+    found.flags.writeable = False
+    return found
 
 
 def _rigid_motions(nodes: FloatArray) -> FloatArray:

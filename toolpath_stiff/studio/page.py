@@ -7,7 +7,7 @@ import json
 from importlib import resources
 from typing import TYPE_CHECKING
 
-from toolpath_stiff import __version__
+from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import asset, json_for_script, script_hash
 from toolpath_stiff.studio.picture import document
@@ -38,7 +38,7 @@ def _document(state: str, connect: str, title: str) -> str:
         f"default-src 'none'; script-src '{script_hash(script)}'; style-src 'unsafe-inline'; img-src data:; {connect}"
         "base-uri 'none'; form-action 'none'"
     )
-    body = _own("studio.html").replace("VERSION", __version__)
+    body = _own("studio.html").replace("VERSION", VERSION)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'

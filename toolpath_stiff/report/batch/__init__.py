@@ -14,7 +14,7 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from toolpath_stiff import __version__
+from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.batch.programs import RESERVED, Outcome, summary_csv, terminal_summary
 from toolpath_stiff.report.pages import markup, render
@@ -54,7 +54,7 @@ def batch_page(outcomes: Sequence[Outcome]) -> str:
         warnings=[],
         failures=[one.reason for one in failed],
         table=table,
-        footer=f"toolpath_stiff {__version__}. Stiffness is that of the tool tip along the load.",
+        footer=f"toolpath_stiff {VERSION}. Stiffness is that of the tool tip along the load.",
         verdict_class="unexplained" if failed else "",
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,13 @@ def frame_vertices(frame_joints: FloatArray) -> list[tuple[list[int], FloatArray
     Joints that are neighbours in angle about the centre share a vertex; of the two ways to pair six joints so, the
     one that holds the joints closer together.
     """
+    return _vertices(np.asarray(frame_joints, dtype=float).tobytes())
+
+
+@lru_cache(maxsize=64)  # a fit asks for the same frame at every size
+def _vertices(joints: bytes) -> list[tuple[list[int], FloatArray]]:
+    """`frame_vertices` of six joints, to be read only."""
+    frame_joints = np.frombuffer(joints).reshape(6, 3)
     from_centre = frame_joints - frame_joints.mean(axis=0)
     order = np.argsort(np.arctan2(from_centre[:, 1], from_centre[:, 0]), kind="stable")
     pairings = [[sorted((int(order[i]), int(order[(i + 1) % 6]))) for i in range(start, 6, 2)] for start in (0, 1)]
