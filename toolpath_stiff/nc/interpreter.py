@@ -30,6 +30,7 @@ from toolpath_stiff.nc.codes import (
     Code,
     code_name,
 )
+from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
 from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.offsets import HOLDS_TIP, list_numbers
@@ -60,6 +61,7 @@ def begin(state: State, block: Block) -> CurrentBlock:
     """Take a block's codes and set its modes, not moving yet; doing so twice changes nothing but dwells."""
     current = sort_words(state, block)
     read_numbers(state, current)
+    check_block(state, current)
     for code in _in_order(current, ahead=True):
         code.act(state, current, code.name)
     if any(word.letter == "M" for word in block.words):

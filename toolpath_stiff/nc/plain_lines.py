@@ -25,7 +25,6 @@ from toolpath_stiff.nc.codes.motion import (
     STILL,
     center_by_offsets,
     center_by_radius,
-    normal_of,
     note_tool,
     sweep_about,
 )
@@ -190,6 +189,8 @@ def _suits(state: State) -> bool:
         and state.polar is None
         and state.unsettled is None
         and state.corner is None
+        and state.cutter is None
+        and state.beside is None
         and not state.height_lost
         and not state.arc_absolute
         and not frames.rotated
@@ -388,7 +389,7 @@ class _Lines:
         centers = np.stack(
             [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
         )
-        vector = normal_of(state.plane)
+        vector = geometry.normal_of(state.plane)
         done = zip(rows.tolist(), centers.tolist(), sweeps, strict=False)
         return {row: Arc((x, y, z), vector, sweep) for row, (x, y, z), sweep in done}
 

@@ -11,6 +11,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Arc, Recorder, ToolUse, Unsupported
@@ -203,6 +204,10 @@ class State:
         Each move of the current block, for whoever starts the list.
     corner
         The corner (,C or ,R) that the next block has to make with the one before it; None: there is none.
+    cutter
+        Cutter compensation in force (G41, G42); None: G40.
+    beside
+        After G40, until the next move: from the programmed point to where the tool centre stands (6, set-up frame).
     named_length
         H of a block without G43, which a later G43 without H may mean.
     turning
@@ -243,6 +248,8 @@ class State:
     pointed: bool = False
     trace: list[Segment] | None = None
     corner: Corner | None = None
+    cutter: Cutter | None = None
+    beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
 

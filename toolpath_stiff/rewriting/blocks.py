@@ -38,6 +38,10 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
             "a subprogram (M98, M99) cannot be rewritten: it may run at several places",
             "expand the subprograms first",
         )
+    if source.cutter is not None:
+        raise controls.refusal(
+            "cutter compensation (G41, G42) cannot be rewritten", "post the program with the path of the tool centre"
+        )
     axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane
     begin(out, block)

@@ -265,6 +265,10 @@ def _forget_changes(state: State) -> None:
     state.height_lost = state.height_lost or state.length_changed
     if state.rotation_changed:
         state.unsettled = "G10"
+    if state.beside is not None:  # it then counts from where the tool centre stands
+        frames = state.frames
+        frames.position = [at + b for at, b in zip(frames.position, state.beside, strict=True)]
+        state.beside = None
 
 
 def table_length(state: State, block: CurrentBlock, code: str) -> None:

@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterable, Iterator
 
 from toolpath_stiff.nc.codes import (
-    CUTTER,
     DIAMETER,
     DYNAMIC,
     EVERYWHERE,
@@ -34,6 +33,7 @@ from toolpath_stiff.nc.codes import (
     holds_anyway,
     m_codes,
 )
+from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
 from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
 from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, STRAIGHT_CODES
@@ -125,7 +125,6 @@ PASSIVE_CODES = (
         "M29", M_TAPPING, holds_anyway, "rigid tapping", f"{_FANUC}, Rigid tapping (M29)", ("generic", "fanuc"),
         listed="rigid tapping",
     ),
-    Code("G40", CUTTER, holds_anyway, "cutter compensation off", g_codes("G40")),
     Code(
         "G50", SCALING, scaling_off, "scaling off", "Fanuc, operator's manuals, Scaling (G50, G51)", label=SCALING
     ),
@@ -148,10 +147,8 @@ PASSIVE_CODES = (
     ),
 )  # fmt: skip
 
-_CENTRE_PATH = "post the path of the tool centre, or give --interpreter linuxcnc"
 _OTHER_PLANE = ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C", g_codes("G17 - G19.1"))
 _PROBING = ("probing", "leave probing out", g_codes("G38.2 - G38.5"))
-_CUTTER = ("cutter compensation", _CENTRE_PATH)
 _POCKET = ("a pocket cycle of one control", "post the program with arcs", f"{_HAAS}, G12 and G13")
 _MOVES = "post the moves of the cycle"
 _SAVED = ("saved modal state", "post the program without M70 to M73")
@@ -170,10 +167,6 @@ REFUSED_CODES = (
     Refused("G38.3", *_PROBING),
     Refused("G38.4", *_PROBING),
     Refused("G38.5", *_PROBING),
-    Refused("G41", *_CUTTER, g_codes("G41 G42")),
-    Refused("G41.1", *_CUTTER, g_codes("G41.1 G42.1")),
-    Refused("G42", *_CUTTER, g_codes("G41 G42")),
-    Refused("G42.1", *_CUTTER, g_codes("G41.1 G42.1")),
     Refused("G43.2", "an added tool length", "put the whole length into the tool table", g_codes("G43.2")),
     Refused("G51", "scaling", "post the program at its size", f"{_FANUC}, Scaling (G50, G51)"),
     Refused(
@@ -191,7 +184,7 @@ REFUSED_CODES = (
 
 UNDERSTOOD = (
     *STRAIGHT_CODES, *ARC_CODES, *DRILLING_CODES, *MODE_CODES, *POLAR_CODES, *ROTATION_CODES, *OFFSET_CODES,
-    *FEED_CODES, *TOOL_CODES, *FLOW_CODES, *PASSIVE_CODES, *CORNER_CODES,
+    *FEED_CODES, *TOOL_CODES, *FLOW_CODES, *CUTTER_CODES, *PASSIVE_CODES, *CORNER_CODES,
 )  # fmt: skip
 
 

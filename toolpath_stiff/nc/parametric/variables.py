@@ -180,6 +180,8 @@ class Variables:
             know_height(state, block, word)
         if axis < 2:
             know_place(state, block, word)
+        if state.cutter is not None:
+            raise block.fail(word, "depends on the present point while cutter compensation is on", "G40 before it")
         if frames.from_machine[axis]:
             raise block.fail(
                 word, "depends on where program zero sits on the machine", "a move to program coordinates before"
