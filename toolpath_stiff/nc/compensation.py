@@ -17,13 +17,14 @@ CORNER = 0.05  # rad; less than this is no corner (LinuxCNC's TOLERANCE_CONCAVE_
 SHORTENED = 1e-3  # rad by which a shortened arc may seem longer than before
 MATCHING = 0.01  # program units by which the radii of a shortened arc may differ
 FLAT = 1e-4  # cosine below which no arc of entry is tangent
+TIGHT = 0.01  # mm by which an entry arc must be wider than the tool: below, rounding decides on its centre
 GOUGE = "a concave corner that the tool cannot reach without gouging"
 SMALLER = "a smaller tool, or another contour"
 
 
 @dataclass
 class OffsetArc:
-    """An arc of the tool centre: its centre, +1 counter-clockwise or -1, turns; the programmed sweep, 0 if it has none."""
+    """An arc of the tool centre: centre, +1 counter-clockwise or -1, turns; the programmed sweep, 0 if it has none."""
 
     center: Point2
     turn: int
@@ -35,8 +36,8 @@ class OffsetArc:
 class Pending:
     """A move of the tool centre whose end the next corner may still move back.
 
-    `end`: program coordinates (6); `direction` as programmed, in the plane; `row`: its place in the recorder's lists, -1
-    if it has none.
+    `end`: program coordinates (6); `direction` as programmed, in the plane; `row`: its place in the recorder's lists,
+    -1 if it has none.
     """
 
     end: list[float]
@@ -122,7 +123,7 @@ def enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, tur
     _check_length(cutter, start, target)
     inside = cutter.side * turn > 0
     if inside:
-        _check_fits(cutter, math.dist(center, start))
+        _check_fits(cutter, math.dist(center, start) - TIGHT)
     end = _beside(target, cutter.radius, _angle(target, center) if inside else _angle(center, target))
     inward = _angle(end, center)
     cosine = math.cos(_angle(end, start) - inward)
@@ -215,9 +216,7 @@ def _arc_meets_line(cutter: Cutter, arc: OffsetArc, start: Point2, along: float)
     return _beside(arc.center, radius, normal + math.pi - side * arc.turn * back)
 
 
-def _line_meets_arc(
-    cutter: Cutter, heading: float, corner: float, center: Point2, turn: int, radius: float
-) -> Point2:
+def _line_meets_arc(cutter: Cutter, heading: float, corner: float, center: Point2, turn: int, radius: float) -> Point2:
     """Where the offset line before meets the offset arc."""
     side = 1 if cutter.side * turn > 0 else -1
     offset = radius - side * cutter.radius

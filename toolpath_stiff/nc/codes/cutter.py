@@ -37,8 +37,7 @@ LEFT, RIGHT = 1, -1
 SIDES = {"G41": LEFT, "G41.1": LEFT, "G42": RIGHT, "G42.1": RIGHT}
 # What may stand in a block while compensation is on: all that LinuxCNC allows there and that leaves its path defined.
 GROUPS = frozenset(
-    (MOTION, CUTTER, DISTANCE, ARC_DISTANCE, FEED_MODE, SPINDLE_MODE, DIAMETER)
-    + (M_STOP, M_SPINDLE, M_COOLANT, M_SUBPROGRAM)
+    {MOTION, CUTTER, DISTANCE, ARC_DISTANCE, FEED_MODE, SPINDLE_MODE, DIAMETER, M_SPINDLE, M_COOLANT, M_SUBPROGRAM}
 )
 MOTIONS = ("G0", "G1", "G2", "G3")
 OTHER_CONTROLS = "cutter compensation, whose entry and corners differ from control to control"
@@ -75,11 +74,11 @@ def _diameter(state: State, block: CurrentBlock, code: str) -> float:
         if number is None:
             raise block.fail(word, "without the diameter", "D")
         return number * state.length_scale
-    if number is not None and (number < 1 or number != int(number)):
-        raise block.fail(block.values["D"], "is not the number of a tool", "a whole number from 1")
-    if number is None and state.renamed:
-        raise block.fail(word, "without D after M61", f"D{state.tool}")
-    tool = state.tool if number is None else int(number)
+    if number is not None and (number < 0 or number != int(number)):
+        raise block.fail(block.values["D"], "is not the number of a tool", "a whole number")
+    if not number and state.renamed:
+        raise block.fail(word, "of the tool in the spindle after M61", f"D{state.tool}")
+    tool = int(number) if number else state.tool  # D0: of the tool in the spindle
     entry = (state.tools or {}).get(tool)
     if entry is None or math.isnan(entry.diameter):
         raise block.fail(
@@ -111,10 +110,13 @@ def _check_codes(state: State, block: CurrentBlock, also: tuple[str, ...]) -> No
             (group == PLANE and name == state.plane)
             or (group == UNITS and name == ("G20" if state.inch else "G21"))
             or (group == ONCE and name == "G4")
+            or (group == M_STOP and name in ("M2", "M30"))  # a stop ends the move before it, without a corner
         )
         moves = group == MOTION and name not in MOTIONS
         if moves or (group not in GROUPS and group not in also and not harmless):
-            raise block.fail(block.codes[name], "while cutter compensation is on (G41, G42)", "G40 in a block before it")
+            raise block.fail(
+                block.codes[name], "while cutter compensation is on (G41, G42)", "G40 in a block before it"
+            )
     polar = next((letter for letter in "@^" if block.has(letter)), None)
     if polar is not None:
         raise block.fail(block.values[polar], "while cutter compensation is on", "X and Y")
@@ -132,8 +134,10 @@ def offset_move(
     bound: tuple[bool, bool],
     arc: Arc | None,
 ) -> bool:
-    """Record what a programmed move makes of the tool centre's path; `ends`: tool centre in the set-up frame, programmed
-    end in control coordinates. Returns whether any move was added."""
+    """Record what a programmed move makes of the tool centre's path. Returns whether any move was added.
+
+    `ends`: where the tool centre stands, set-up frame; the programmed end in control coordinates.
+    """
     cutter, frames = state.cutter, state.frames
     assert cutter is not None
     first, second, _ = cutter.axes
@@ -146,8 +150,8 @@ def offset_move(
     rows = len(state.recorder.line)
     try:
         if cutter.at is None:
-            cutter.at, cutter.anchor = frames.to_program(_to_control(state, ends[0])), start
             step, direction = _enter(cutter, start, target, own)
+            cutter.at, cutter.anchor = frames.to_program(_to_control(state, ends[0])), start
         elif own is None and math.dist(start, target) < SAME_PLACE:  # along the tool alone: the corner is still to come
             step = None
         else:
