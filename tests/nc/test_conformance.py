@@ -138,7 +138,7 @@ def test_refusals_must_name_the_file_and_no_path_is_not_a_refusal(tmp_path):
 @pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
 def test_the_command_takes_files_and_folders_and_fails_on_another_path(tmp_path, monkeypatch, capsys):
     (tmp_path / "good.nc").write_text(ARC)
-    (tmp_path / "more.ngc").write_text("M70\nG1 X5 F100\n")
+    (tmp_path / "more.ngc").write_text("G38.2 X5\nG1 X5 F100\n")
     monkeypatch.setattr("sys.argv", ["conformance", str(tmp_path), "--out", str(tmp_path / "table.md")])
     assert conformance.main() == 0
     text = (tmp_path / "table.md").read_text()

@@ -187,7 +187,7 @@ def check_lines(
     >>> checked.complete
     False
     >>> [(code.code, code.text) for code in checked.used][-2:]
-    [('G41', 'cutter compensation: not supported'), ('M30', 'end')]
+    [('G41', 'cutter compensation, tool on the left'), ('M30', 'end')]
     >>> checked.findings[0].line, checked.findings[0].severity
     (3, 'error')
     """

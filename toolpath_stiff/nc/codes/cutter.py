@@ -41,7 +41,10 @@ GROUPS = frozenset(
 )
 MOTIONS = ("G0", "G1", "G2", "G3")
 OTHER_CONTROLS = "cutter compensation, whose entry and corners differ from control to control"
-CENTRE_PATH = "post the path of the tool centre, or take LinuxCNC's path with --dialect linuxcnc"
+CENTRE_PATH = {
+    "generic": "post the path of the tool centre, or take LinuxCNC's path with --dialect linuxcnc",
+    "fanuc": "post the path of the tool centre",
+}
 
 Ends = tuple[list[float], list[float]]
 
@@ -53,7 +56,7 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
     """G41, G42 D: the tool is left or right of the contour, by the diameter in the tool table; D of G41.1 is it."""
     word = block.codes[code]
     if state.dialect.name != "linuxcnc":
-        raise block.fail(word, f"is {OTHER_CONTROLS}", hint=CENTRE_PATH)
+        raise block.fail(word, f"is {OTHER_CONTROLS}", hint=CENTRE_PATH.get(state.dialect.name, CENTRE_PATH["fanuc"]))
     if state.cutter is not None:
         raise block.fail(word, "while cutter compensation is on", "G40 before it")
     _check_codes(state, block, (PLANE, UNITS, M_TOOL))

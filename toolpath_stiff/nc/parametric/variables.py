@@ -89,6 +89,10 @@ class Variables:
             return own[name]
         if name in PREDEFINED:
             return PREDEFINED[name](self)
+        if name == "_TASK":
+            raise LookupError(
+                "#<_task> is 1 on the machine and 0 in a preview: the path would depend on it", "write one of them"
+            )
         raise LookupError(
             f"the variable #<{name.lower()}> is read before it is set", "set it before, in the same subprogram"
         )
