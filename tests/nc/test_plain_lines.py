@@ -96,6 +96,8 @@ def plain(draw):
         words.sort(key="GXYZABCIJKRF".find, reverse=False) if "F" in "".join(words) else None
     if draw(st.integers(0, 3)) == 0:
         words.append("F" + draw(feeds))
+    if draw(st.integers(0, 7)) == 0:
+        words.append("S" + draw(st.sampled_from(["100", "0", "2500.5", ".5", "-1", "1e2", "99999999999"])))
     text = "".join(word + draw(blank) for word in words)
     if draw(st.integers(0, 5)) == 0:
         text = f"N{draw(st.integers(1, 99999))} {text}"

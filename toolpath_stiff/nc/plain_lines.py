@@ -1,4 +1,4 @@
-"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, an N word, comments.
+"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, S, an N word, comments.
 
 Most of a big program is such lines. One regular expression reads them some twenty times faster than `words.read_block`
 reads blocks; a line that it does not match as a whole is not plain and is left to `read_block`, with every error.
@@ -50,14 +50,16 @@ LETTERS = AXES + CENTER_LETTERS
 LENGTH_LETTERS = "XYZIJKR"
 G_COLUMN, FIRST_F, FIRST_LETTER = 0, 1, 2
 LAST_F = FIRST_LETTER + len(LETTERS)
-OTHER = LAST_F + 1  # the text of a line that is not plain
+LAST_S = LAST_F + 1
+OTHER = LAST_S + 1  # the text of a line that is not plain
 
 _NUMBER = r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)"
 _FEED = r"(?:F((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
+_SPEED = r"(?:S((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
 _WORDS = "".join(f"(?:{letter}({_NUMBER}))?" for letter in LETTERS)
 _COMMENT = r"(?:\([^()\n]*+\))*+"
-# The order of words is that of every CAM system, F in front or behind; any other order is not plain.
-_LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_COMMENT}%s$|^(.+)$"
+# The order of words is that of every CAM system, F in front or behind, S last; any other order is not plain.
+_LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_SPEED}{_COMMENT}%s$|^(.+)$"
 _PATTERNS = {True: re.compile(_LINE % r"(?:;.*)?", re.MULTILINE), False: re.compile(_LINE % ";?", re.MULTILINE)}
 _BARE = re.compile(r"^[+-]?0*[1-9][0-9]*$", re.MULTILINE)
 _POINTED = re.compile(r"^[+-]?0*[1-9][0-9]*\.$", re.MULTILINE)
@@ -91,7 +93,7 @@ class PlainLines:
         return self._others[-1] - at
 
     def rows(self, at: int, count: int) -> list[Row]:
-        """The words of lines that `run` has counted, as texts: G, F, `LETTERS`, F; "" where there is none."""
+        """The words of lines that `run` has counted, as texts: G, F, `LETTERS`, F, S; "" where there is none."""
         return self._rows[at - self._start : at - self._start + count]
 
     def _lex(self, at: int) -> None:
@@ -193,7 +195,6 @@ def _suits(state: State) -> bool:
         and state.beside is None
         and not state.height_lost
         and not state.arc_absolute
-        and not frames.rotated
         and not frames.bound
     )
 
@@ -207,6 +208,7 @@ class _Lines:
         columns = list(zip(*rows, strict=True))
         self.codes: Sequence[str] = columns[G_COLUMN]
         self.feeds = (columns[FIRST_F], columns[LAST_F])
+        self.speeds = columns[LAST_S]
         self.texts = {
             letter: column for letter, column in zip(LETTERS, columns[FIRST_LETTER:LAST_F], strict=True) if any(column)
         }
@@ -218,6 +220,8 @@ class _Lines:
         self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
         for letter, values in self.values.items():
             self._stop(np.abs(values) > (LARGEST_MM if letter in AXES else LARGEST_WORD))
+        if any(self.speeds):
+            self._stop(np.array([text != "" and float(text) > LARGEST_WORD for text in self.speeds]))
         if state.dialect.increments:
             self._count_increments()
 
@@ -247,7 +251,7 @@ class _Lines:
         self._stop(self._no_feed())
         if not moving[: self.end].any():
             return self._leave(None)
-        control = self._control()
+        control = self._turned(moving) if self.state.frames.rotated else self._control()
         start, end = self._set_up(control)
         found = self._arcs(np.flatnonzero(arc[: self.end]), control)
         done = slice(self.end)
@@ -348,6 +352,26 @@ class _Lines:
                 control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
         return control
 
+    def _turned(self, moving: BoolArray) -> FloatArray:
+        """The same where a work offset or G68 turns the program's axes: line by line, as each counts from the last."""
+        state, frames = self.state, self.state.frames
+        control = np.zeros((self.n + 1, 6))
+        position, control[0] = frames.position, frames.position
+        words = [
+            (axis, self.values[letter] * (state.length_scale if letter in LINEAR else 1.0), self.given[letter])
+            for axis, letter in enumerate(AXES)
+            if letter in self.values
+        ]
+        for row in range(min(self.n, self.end)):
+            if moving[row]:
+                point = frames.to_program(position)
+                for axis, values, given in words:
+                    if given[row]:
+                        point[axis] = coordinate(state, point[axis], float(values[row]))
+                position = frames.to_control(point)
+            control[row + 1] = position
+        return control
+
     def _set_up(self, control: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Set-up coordinates of each line's start and end; an axis that stands keeps its number (`motion.record`)."""
         setup = np.empty_like(control)
@@ -373,7 +397,7 @@ class _Lines:
         )
         nothing = np.full(self.n, math.nan)
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
-        points = np.stack([state.frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
+        points = self._programmed(control[rows])
         starts = points[:, [first, second]].tolist()
         middles, sweeps = list[geometry.Point2](), list[float]()
         for row, start, word in zip(rows.tolist(), starts, words, strict=True):
@@ -386,12 +410,23 @@ class _Lines:
             sweeps.append(sweep)
         frames, found = state.frames, points[: len(sweeps)]
         found[:, [first, second]] = np.array(middles).reshape(-1, 2)
-        centers = np.stack(
-            [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
-        )
-        vector = geometry.normal_of(state.plane)
+        if frames.rotated:
+            turned = [frames.to_setup(frames.to_control(point))[:3] for point in found.tolist()]
+            centers = np.array(turned).reshape(-1, 3)
+        else:
+            centers = np.stack(
+                [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
+            )
+        vector = frames.turn_direction(geometry.normal_of(state.plane))
         done = zip(rows.tolist(), centers.tolist(), sweeps, strict=False)
         return {row: Arc((x, y, z), vector, sweep) for row, (x, y, z), sweep in done}
+
+    def _programmed(self, control: FloatArray) -> FloatArray:
+        """Program coordinates of points (n, 6)."""
+        frames = self.state.frames
+        if frames.rotated:
+            return np.array([frames.to_program(point) for point in control.tolist()])
+        return np.stack([frames.axis_to_program(axis, control[:, axis]) for axis in range(6)], axis=1)
 
     def _arc(
         self, row: int, here: list[float], x: float, y: float, i: float, j: float, radius: float, off_plane: float
@@ -439,6 +474,9 @@ class _Lines:
             return 0
         if state.dialect.increments and self.counted[: self.end].any():
             assume_increments(state)
+        speed = next((text for text in reversed(self.speeds[: self.end]) if text), "")
+        if speed:
+            state.speed = float(speed)
         if self.mode[last] != NO_MODE:
             state.motion = MODE_NAMES[self.mode[last]]
         if state.feed_mode == "G93":
