@@ -288,14 +288,14 @@ def check_program(
     findings: list[Finding] = list(checked.findings)
     found: Figures | None = None
     speed: dict[str, float] = {}
-    rapid_feed = [machine.rapid_feed] if machine else []
+    rapid_feed = machine.rapid_feed if machine else defaults.RAPID_FEED
     if checked.moves is not None:
-        found = figures(checked.moves, *rapid_feed)
+        found = figures(checked.moves, rapid_feed)
         findings += radii_findings(checked.moves)
         if machine is not None:
             more, speed = machine_findings(checked, machine, checked.origin, step, strut_speed)
             findings += more
-    tools, operations = check_parts(checked, lines, name, *rapid_feed, whole=found)
+    tools, operations = check_parts(checked, lines, name, rapid_feed, found)
     posted = controller.kinematics if checked.dialect in ("", "linuxcnc") else None
     return {
         "program": name,
