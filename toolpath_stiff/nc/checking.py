@@ -23,7 +23,7 @@ from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
-from toolpath_stiff.nc.plain_lines import G_COLUMN
+from toolpath_stiff.nc.plain_words import G_COLUMN
 from toolpath_stiff.nc.reader import (
     INTERPRETERS,
     ZERO,

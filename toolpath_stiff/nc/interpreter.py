@@ -349,7 +349,7 @@ class ProgramRun:
         return execute(self.state, block)
 
     def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
-        """Plain lines from `at` were executed; `rows` are their words (`plain_lines.PlainLines.rows`)."""
+        """Plain lines from `at` were executed; `rows` are their words (`plain_words.PlainLines.rows`)."""
 
     def _read(self, at: int) -> Block:
         block = read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)

@@ -12,13 +12,13 @@ that does not fit) ends the run before it: the interpreter then executes it and 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.modes import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
 from toolpath_stiff.nc.codes.motion import (
     ARCS,
@@ -38,98 +38,26 @@ from toolpath_stiff.nc.codes.points import (
     watches_points,
 )
 from toolpath_stiff.nc.codes.registry import CODES
-from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, MovesInMm
+from toolpath_stiff.nc.plain_holes import LEAST, drill, rows_of_hole, suits
+from toolpath_stiff.nc.plain_words import (
+    FIRST_F,
+    FIRST_LETTER,
+    G_COLUMN,
+    LAST_F,
+    LAST_S,
+    LENGTH_LETTERS,
+    LETTERS,
+    PlainLines,
+    Row,
+    first_bare,
+    has_pointed,
+    is_bare,
+    is_place,
+)
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, read_block
-
-CHUNK = 8192  # lines: their words fit into a processor's cache
-LONGEST_PLAIN = 256  # characters; longer lines are left to `read_block`
-LETTERS = AXES + CENTER_LETTERS
-LENGTH_LETTERS = "XYZIJKR"
-G_COLUMN, FIRST_F, FIRST_LETTER = 0, 1, 2
-LAST_F = FIRST_LETTER + len(LETTERS)
-LAST_S = LAST_F + 1
-OTHER = LAST_S + 1  # the text of a line that is not plain
-
-_NUMBER = r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)"
-_FEED = r"(?:F((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
-_SPEED = r"(?:S((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
-_WORDS = "".join(f"(?:{letter}({_NUMBER}))?" for letter in LETTERS)
-_COMMENT = r"(?:\([^()\n]*+\))*+"
-# The order of words is that of every CAM system, F in front or behind, S last; any other order is not plain.
-_LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_SPEED}{_COMMENT}%s$|^(.+)$"
-_PATTERNS = {True: re.compile(_LINE % r"(?:;.*)?", re.MULTILINE), False: re.compile(_LINE % ";?", re.MULTILINE)}
-_BARE = re.compile(r"^[+-]?0*[1-9][0-9]*$", re.MULTILINE)
-_POINTED = re.compile(r"^[+-]?0*[1-9][0-9]*\.$", re.MULTILINE)
-
-Row = tuple[str, ...]
-
-
-class PlainLines:
-    """The lines of a program, lexed a chunk at a time as they are asked for.
-
-    Parameters
-    ----------
-    lines
-        Of the program.
-    semicolon
-        Whether `;` begins a comment (else it may end a block).
-    """
-
-    def __init__(self, lines: Sequence[str], semicolon: bool) -> None:
-        self.lines = lines
-        self._pattern = _PATTERNS[semicolon]
-        self._start, self._rows = 0, list[Row]()
-        self._others: list[int] = []  # lines of the chunk that are not plain, and its end, in falling order
-
-    def run(self, at: int) -> int:
-        """How many lines from `at` (from 0) are plain; no more than the chunk's rest."""
-        if not self._start <= at < self._start + len(self._rows):
-            self._lex(at)
-        while self._others[-1] < at:
-            self._others.pop()
-        return self._others[-1] - at
-
-    def rows(self, at: int, count: int) -> list[Row]:
-        """The words of lines that `run` has counted, as texts: G, F, `LETTERS`, F, S; "" where there is none."""
-        return self._rows[at - self._start : at - self._start + count]
-
-    def _lex(self, at: int) -> None:
-        chunk = self.lines[at : at + CHUNK]
-        if max(map(len, chunk)) > LONGEST_PLAIN:
-            chunk = [line if len(line) <= LONGEST_PLAIN else "!" for line in chunk]
-        text = "\n".join(chunk).replace(" ", "").replace("\t", "")
-        if text.isascii():  # of other scripts some letters become ASCII ones in upper case
-            text = text.upper()
-        rows = self._pattern.findall(text)
-        self._start, self._rows = at, rows
-        end = at + len(rows)
-        self._others = [end, *(at + i for i in range(len(rows) - 1, -1, -1) if rows[i][OTHER])]
-
-
-def is_bare(text: str) -> bool:
-    """Whether a number other than 0 stands without a decimal point."""
-    return _BARE.match(text) is not None
-
-
-def has_pointed(column: Sequence[str]) -> bool:
-    """Whether a number other than 0 ends with its decimal point."""
-    return _POINTED.search("\n".join(column)) is not None
-
-
-def first_bare(columns: Sequence[Sequence[str]]) -> int | None:
-    """The first row in which a number other than 0 has no decimal point."""
-    found = None
-    for column in columns:
-        text = "\n".join(column)
-        match = _BARE.search(text)
-        if match is not None:
-            row = text.count("\n", 0, match.start())
-            found = row if found is None else min(found, row)
-    return found
-
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -160,13 +88,32 @@ class PlainRun:
             return []
         rows = self.lines.rows(at, count)
         if self.state.motion not in MODES and not rows[0][G_COLUMN] and any(rows[0]):
-            return []
+            return self._holes(at, rows)
         lines = _Lines(self.state, rows)
         done = lines.execute(at)
         if done < FEWEST:
             self._pause = at + done + 4 * FEWEST
         self._watch_points(at, lines, done)
         return rows[:done]
+
+    def _holes(self, at: int, rows: list[Row]) -> list[Row]:
+        """Drill holes like that of the line before; returns the words of the lines executed."""
+        state = self.state
+        if state.motion not in CYCLES or not self.lines.has(at - 1) or not suits(state):
+            return []
+        hole = rows_of_hole(state.recorder, at)
+        count = next((i for i, row in enumerate(rows) if not is_place(row)), len(rows))
+        if hole is None or not is_place(self.lines.rows(at - 1, 1)[0]) or not count:
+            return []
+        lines = _Lines(state, rows[:count])
+        places = lines.places()
+        if not len(places):
+            return []
+        drill(state, hole, at + 1, places)
+        if state.dialect.increments and lines.counted[: len(places)].any():
+            assume_increments(state)
+        self._watch_points(at, lines, len(places))
+        return rows[: len(places)]
 
     def _watch_points(self, at: int, lines: _Lines, done: int) -> None:
         """As `points.read_numbers`, of all lines executed."""
@@ -351,6 +298,13 @@ class _Lines:
             else:
                 control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
         return control
+
+    def places(self) -> FloatArray:
+        """(m, 2) X and Y in control coordinates after each of the first m lines, which all go somewhere else."""
+        control = self._control()[:, :2]
+        way = np.abs(np.diff(control, axis=0)).max(axis=1)
+        self._stop(way < LEAST)
+        return control[1 : self.end + 1]
 
     def _turned(self, moving: BoolArray) -> FloatArray:
         """The same where a work offset or G68 turns the program's axes: line by line, as each counts from the last."""
