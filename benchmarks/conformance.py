@@ -2,7 +2,7 @@
 
 Without arguments: every sample program that Debian's `linuxcnc-uspace` installs. The built-in reader must give the feed
 path that `rs274` gives, within 0.01 mm and 0.01 degrees in both directions, or refuse with file and line; never another
-path. Exit code 1 if one differs.
+path. Both take the program for LinuxCNC's (`--dialect linuxcnc`). Exit code 1 if one differs.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc import Moves, Program, read_program
+from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.path import sample_moves
@@ -27,6 +28,7 @@ from toolpath_stiff.path import sample_moves
 PACKAGE = "linuxcnc-uspace"
 TOLERANCE = 0.01  # mm and degrees
 PRINTED = 0.005  # two digits of 0.0001 inch: a move shorter than that may be lost in print
+LINUXCNC = Controller(DIALECTS["linuxcnc"])
 SUFFIXES = (".ngc", ".nc")
 SAME, NONE, REFUSED, UNCHECKED, OTHER = "same path", "no feed path", "refused", "not checked", "OTHER PATH"
 # The programs name tools without saying how long they are: any length will do, and both readers get the same.
@@ -148,7 +150,7 @@ def _without_a_path(file: Path, theirs: Program | None, said: str, ours: Program
 def read(file: Path, table: Path, interpreter: str, rs274: str | None) -> tuple[Program | None, str]:
     """The program, or why not; no cutting move is told apart, since it is an answer of its own."""
     try:
-        return read_program(file, tool_table=table, interpreter=interpreter, rs274=rs274), "read"
+        return read_program(file, tool_table=table, interpreter=interpreter, rs274=rs274, controller=LINUXCNC), "read"
     except InputError as error:
         return None, NONE if error.found == "no cutting move" else str(error)
     except TpsError as error:

@@ -18,10 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.hunt_compensation import Beside, Tolerances
 from benchmarks.hunt_programs import Cam, Harsh, Parametric, Zeros
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
+from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.linuxcnc import refusal
 from toolpath_stiff.nc.words import split_lines
 
@@ -96,7 +98,7 @@ def arcs_apart(mine: tuple[np.ndarray, np.ndarray, float], other: tuple[np.ndarr
     return "centres" if np.linalg.norm(apart - (apart @ normal) * normal) > CENTER_TOLERANCE else ""
 
 
-def hunt_one(text: str, folder: Path) -> Outcome | None:
+def hunt_one(text: str, folder: Path, controller: Controller = UNKNOWN_CONTROL) -> Outcome | None:
     """Hold a program against the witness; None if LinuxCNC must not be given it."""
     ours_table = "".join(f"T{n} P{n} Z{z} D6.35 ;\n" for n, z in LENGTHS.items())
     # rs274 takes the lengths of its table as inches.
@@ -115,7 +117,7 @@ def hunt_one(text: str, folder: Path) -> Outcome | None:
         theirs = rs274.run(file, folder, their_table)
         program, answer = None, ""
         try:
-            program = read_program(file, tool_table=folder / "ours.tbl")
+            program = read_program(file, tool_table=folder / "ours.tbl", controller=controller)
         except TpsError as error:
             answer = str(error)
         if program is not None and not theirs.error:
@@ -161,7 +163,7 @@ def main() -> int:
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as name:
         for seed in range(args.seed, args.seed + args.programs):
-            outcome = hunt_one(program_of(seed), Path(name))
+            outcome = hunt_one(program_of(seed), Path(name), control_of(seed))
             counts[outcome.verdict if outcome else "not given to LinuxCNC"] += 1
             if outcome and outcome.verdict == OTHER:
                 print(f"seed {seed}: {outcome.detail}\n{outcome.text}\n")
@@ -170,9 +172,18 @@ def main() -> int:
     return 1 if counts[OTHER] else 0
 
 
+KINDS = (Harsh, Zeros, Harsh, Cam, Parametric, Beside, Tolerances)
+LINUXCNC = Controller(DIALECTS["linuxcnc"])
+
+
 def program_of(seed: int) -> str:
-    """The program of a seed, of the four kinds in turn, the harsh one twice."""
-    return (Harsh, Zeros, Harsh, Cam, Parametric)[seed % 5](seed).program()
+    """The program of a seed, of the kinds in turn, the harsh one twice."""
+    return KINDS[seed % len(KINDS)](seed).program()
+
+
+def control_of(seed: int) -> Controller:
+    """The control that the built-in reader takes it for: compensation is read in LinuxCNC's dialect alone."""
+    return LINUXCNC if KINDS[seed % len(KINDS)] is Beside else UNKNOWN_CONTROL
 
 
 if __name__ == "__main__":

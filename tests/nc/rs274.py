@@ -86,6 +86,10 @@ def parse(text: str) -> Canon:
             tool = [v * unit for v in numbers[:3]]
         elif name == "SELECT_PLANE":
             plane = re.search(r"CANON_PLANE_(\w+)", inner)[1]
+        elif name == "RIGID_TAP":  # to the point, and back
+            start = [n - t for n, t in zip(nose, (*tool, 0.0, 0.0, 0.0), strict=True)]
+            end = [*world([*numbers[:3], 0.0, 0.0, 0.0])[:3], *start[3:]]
+            moves += [("feed", start, end, None), ("feed", end, start, None)]
         elif name in ("STRAIGHT_FEED", "STRAIGHT_TRAVERSE", "ARC_FEED"):
             start = [n - t for n, t in zip(nose, (*tool, 0.0, 0.0, 0.0), strict=True)]
             if name == "ARC_FEED":

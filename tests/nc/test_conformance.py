@@ -69,7 +69,8 @@ def test_programs_of_others(installed):
     same = 0
     for file in installed.harmless:
         program = installed.read(file, "builtin")
-        if program is None:
+        # rs274 on its own forgets at `M6 G43` in one block what the length did to Z (docs/nc.md): another rapid.
+        if program is None or "M6 G43" in file.read_text(errors="replace"):
             continue
         canon = installed.canon(file)
         said = [line for line in canon.error.splitlines() if not line.strip().startswith(("executing", "link"))]
@@ -138,7 +139,7 @@ def test_refusals_must_name_the_file_and_no_path_is_not_a_refusal(tmp_path):
 @pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
 def test_the_command_takes_files_and_folders_and_fails_on_another_path(tmp_path, monkeypatch, capsys):
     (tmp_path / "good.nc").write_text(ARC)
-    (tmp_path / "more.ngc").write_text("M70\nG1 X5 F100\n")
+    (tmp_path / "more.ngc").write_text("#1=#<_task>\nG1 X5 F100\n")
     monkeypatch.setattr("sys.argv", ["conformance", str(tmp_path), "--out", str(tmp_path / "table.md")])
     assert conformance.main() == 0
     text = (tmp_path / "table.md").read_text()

@@ -74,6 +74,21 @@ def test_programs(program, dialect):
     assert assert_same(lines, dialect) > 0 or not DIALECTS[dialect].semicolon  # whose blocks end at `;`
 
 
+@pytest.mark.parametrize("dialect", ["generic", "haas"])
+@pytest.mark.parametrize(
+    "cycle", ["G81 Z-5. R2.", "G82 Z-5. R2. P1", "G83 Z-5. R2. Q1.5", "G73 Z-5. R2. Q2.", "G85 Z-5. R2."]
+)
+@pytest.mark.parametrize(
+    "head", ["G98", "G99", "G98 G55", "G99\nG92 X1. Y2.", "G91", "G18", "G99 G20", "G10 L2 P1 X3.3"]
+)
+def test_holes(cycle, head, dialect):
+    text = f"G21 F100.\nG0 X0. Y0. Z9.\n{head}\n{cycle} X1. Y1.\nX2.\nX3.5 Y2.25\nY7.\nX4.\nX4. Y7.\nX5 Y8\n"
+    text += "X6. (c)\nN5 X7.\nX8. F50.\nX9.\nX10.\n(none)\nX11.\nX12.\nZ-6. X13.\nX14.\nX15.\nL2 X16.\nX17."
+    text += "\nX18.\nA5. X19.\nX20.\nX21.\nR3. X22.\nX23.\nX24.\nG80\nG1 X0.\nG81 X1. Z-1. R9.\nX2.\nX3.\nX4.\nM30\n"
+    done = assert_same(tuple(text.splitlines()), dialect)
+    assert done > (10 if head in ("G98", "G99") else 0)
+
+
 numbers = st.one_of(
     st.decimals(-200, 200, places=3).map(str),
     st.integers(-100, 100).map(str),
@@ -96,6 +111,8 @@ def plain(draw):
         words.sort(key="GXYZABCIJKRF".find, reverse=False) if "F" in "".join(words) else None
     if draw(st.integers(0, 3)) == 0:
         words.append("F" + draw(feeds))
+    if draw(st.integers(0, 7)) == 0:
+        words.append("S" + draw(st.sampled_from(["100", "0", "2500.5", ".5", "-1", "1e2", "99999999999"])))
     text = "".join(word + draw(blank) for word in words)
     if draw(st.integers(0, 5)) == 0:
         text = f"N{draw(st.integers(1, 99999))} {text}"

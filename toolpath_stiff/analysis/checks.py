@@ -14,7 +14,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.poses import PoseReport, evaluate_poses
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Machine
@@ -83,9 +83,15 @@ def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
 
 
 def figures_of_parts(
-    moves: Moves, of_move: IntArray, count: int, rapid_feed: float = defaults.RAPID_FEED
+    moves: Moves,
+    of_move: IntArray,
+    count: int,
+    rapid_feed: float = defaults.RAPID_FEED,
+    whole: Figures | None = None,
 ) -> list[Figures]:
-    """The same of moves in `count` parts, each of them in the part that `of_move` (n,) says."""
+    """The same of moves in `count` parts, each in the part that `of_move` (n,) says; `whole`: of all of them."""
+    if count == 1 and whole is not None:
+        return [whole]
     order = np.argsort(of_move, kind="stable")
     ends = np.searchsorted(of_move[order], np.arange(count + 1))
     return [figures(moves.take(order[ends[part] : ends[part + 1]]), rapid_feed) for part in range(count)]
@@ -214,17 +220,31 @@ def machine_findings(
 
 def _struts_and_reach(machine: Machine, samples: Samples) -> tuple[FloatArray, Reach]:
     """(n, 6) m strut lengths of n samples, and their reach; block by block, as work arrays of a long path are large."""
-    n = len(samples)
+    other = _other_poses(samples)
+    poses, of_sample = np.flatnonzero(other), np.cumsum(other) - 1
+    n = len(poses)
     lengths = np.empty((n, 6))
-    found = Reach(np.empty(n), np.empty(n, dtype=np.int64), np.empty(n), machine_limits(machine))
+    margin, limit, value = np.empty(n), np.empty(n, dtype=np.int64), np.empty(n)
     for start in range(0, n, BLOCK):
-        rows = slice(start, start + BLOCK)
+        rows = poses[start : start + BLOCK]
+        here = slice(start, start + BLOCK)
         position, rotation = samples.position[rows], rotation_matrices(samples.abc[rows])
         struts = solve_struts(machine, position, rotation, samples.tool_length[rows])
         within = reach(machine, position, struts, rotation)
-        lengths[rows] = struts.lengths
-        found.margin[rows], found.limit[rows], found.value[rows] = within.margin, within.limit, within.value
-    return lengths, found
+        lengths[here] = struts.lengths
+        margin[here], limit[here], value[here] = within.margin, within.limit, within.value
+    return lengths[of_sample], Reach(margin[of_sample], limit[of_sample], value[of_sample], machine_limits(machine))
+
+
+def _other_poses(samples: Samples) -> BoolArray:
+    """(n,) whether a sample is at another pose than the one before: a move begins where the last one has ended."""
+    other = np.ones(len(samples), dtype=bool)
+    length = samples.tool_length
+    same = (length[1:] == length[:-1]) | (np.isnan(length[1:]) & np.isnan(length[:-1]))
+    for values in (samples.position, samples.abc):
+        same &= (values[1:] == values[:-1]).all(axis=1)
+    other[1:] = ~same
+    return other
 
 
 def _rest(code: str, count: int) -> list[Finding]:
@@ -266,16 +286,16 @@ def check_program(
         interpreter, lines, name, origin=origin, default_origin=default, block_delete=block_delete, **run
     )
     findings: list[Finding] = list(checked.findings)
-    found = Figures({}, {}, {}, {})
+    found: Figures | None = None
     speed: dict[str, float] = {}
-    rapid_feed = [machine.rapid_feed] if machine else []
-    tools, operations = check_parts(checked, lines, name, *rapid_feed)
+    rapid_feed = machine.rapid_feed if machine else defaults.RAPID_FEED
     if checked.moves is not None:
-        found = figures(checked.moves, *rapid_feed)
+        found = figures(checked.moves, rapid_feed)
         findings += radii_findings(checked.moves)
         if machine is not None:
             more, speed = machine_findings(checked, machine, checked.origin, step, strut_speed)
             findings += more
+    tools, operations = check_parts(checked, lines, name, rapid_feed, found)
     posted = controller.kinematics if checked.dialect in ("", "linuxcnc") else None
     return {
         "program": name,
@@ -286,7 +306,7 @@ def check_program(
         "used": [asdict(code) for code in checked.used],
         "unsupported": [asdict(word) for word in checked.unsupported],
         "findings": [asdict(finding) for finding in sorted(findings, key=lambda one: (one.line, one.column))],
-        **figure_rows(found),
+        **figure_rows(found or Figures({}, {}, {}, {})),
         "tools": tools,
         "operations": operations,
         "fastest_strut": speed,
@@ -296,7 +316,11 @@ def check_program(
 
 
 def check_parts(
-    checked: Checked, lines: Sequence[str], name: str, rapid_feed: float = defaults.RAPID_FEED
+    checked: Checked,
+    lines: Sequence[str],
+    name: str,
+    rapid_feed: float = defaults.RAPID_FEED,
+    whole: Figures | None = None,
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Tools in order of use, and operations in the order of the run: rows of `--json`, mm, degrees, s.
 
@@ -308,18 +332,20 @@ def check_parts(
         The program.
     rapid_feed
         Of rapids, m/s.
+    whole
+        The figures of all moves, where they are known.
     """
     moves = checked.moves
     if moves is None:
         return [], []
     numbers, first, of_move = np.unique(moves.tool, return_index=True, return_inverse=True)
-    found = figures_of_parts(moves, of_move, len(numbers), rapid_feed)
+    found = figures_of_parts(moves, of_move, len(numbers), rapid_feed, whole)
     tools = [
         {"tool": int(numbers[i]), "remark": checked.remarks.get(int(numbers[i]), ""), **figure_rows(found[i])}
         for i in np.argsort(first).tolist()
     ]
     operations = find_operations(lines, moves, name, checked.remarks, checked.marks, checked.jumps)
-    parts = figures_of_parts(moves, operations.of_move, len(operations.rows), rapid_feed)
+    parts = figures_of_parts(moves, operations.of_move, len(operations.rows), rapid_feed, whole)
     return tools, [
         {
             "operation": row.number,

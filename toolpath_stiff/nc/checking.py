@@ -23,7 +23,7 @@ from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
-from toolpath_stiff.nc.plain_lines import G_COLUMN
+from toolpath_stiff.nc.plain_words import G_COLUMN
 from toolpath_stiff.nc.reader import (
     INTERPRETERS,
     ZERO,
@@ -187,7 +187,7 @@ def check_lines(
     >>> checked.complete
     False
     >>> [(code.code, code.text) for code in checked.used][-2:]
-    [('G41', 'cutter compensation: not supported'), ('M30', 'end')]
+    [('G41', 'cutter compensation, tool on the left'), ('M30', 'end')]
     >>> checked.findings[0].line, checked.findings[0].severity
     (3, 'error')
     """

@@ -42,6 +42,18 @@ SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the 
 MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
 
 
+def normal_of(plane: str) -> Vector:
+    """Unit normal of a plane, in program axes.
+
+    Examples
+    --------
+    >>> normal_of("G18")
+    (0.0, 1.0, 0.0)
+    """
+    normal = PLANES[plane][2]
+    return (float(normal == 0), float(normal == 1), float(normal == 2))
+
+
 # -- arcs --------------------------------------------------------------------------------------------------------------
 
 

@@ -30,11 +30,13 @@ from toolpath_stiff.nc.codes import (
     Code,
     code_name,
 )
+from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
 from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.offsets import HOLDS_TIP, list_numbers
 from toolpath_stiff.nc.codes.points import read_numbers
 from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC, REFUSED, m_parameters
+from toolpath_stiff.nc.codes.saved import leave_level
 from toolpath_stiff.nc.moves import Jump
 from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
@@ -60,6 +62,7 @@ def begin(state: State, block: Block) -> CurrentBlock:
     """Take a block's codes and set its modes, not moving yet; doing so twice changes nothing but dwells."""
     current = sort_words(state, block)
     read_numbers(state, current)
+    check_block(state, current)
     for code in _in_order(current, ahead=True):
         code.act(state, current, code.name)
     if any(word.letter == "M" for word in block.words):
@@ -307,6 +310,7 @@ class ProgramRun:
                     self._check_head(block, numbered)
                     numbered = True
                 if not (block.optional and block.switch in self.switches):
+                    self.state.level = len(self._levels)
                     flow = self._execute(block)
                     if flow is Flow.END:
                         return self._end(at, "the program's end", ended=True)
@@ -345,7 +349,7 @@ class ProgramRun:
         return execute(self.state, block)
 
     def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
-        """Plain lines from `at` were executed; `rows` are their words (`plain_lines.PlainLines.rows`)."""
+        """Plain lines from `at` were executed; `rows` are their words (`plain_words.PlainLines.rows`)."""
 
     def _read(self, at: int) -> Block:
         block = read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)
@@ -432,10 +436,11 @@ class ProgramRun:
     def _return(self, at: int, flow: Flow | GoTo) -> int | None:
         """The line at which M99 goes on; None where that is the beginning of the program, or before this line."""
         if not isinstance(flow, GoTo):
-            return self._leave() if self._levels else None
+            return self._leave(at) if self._levels else None
         to = self._block_numbered(at, "M99 P goes to", flow)
         if not self._levels:
             return to if to > at else None
+        self._restore(at)
         level = self._levels.pop()
         if level.again or to < level.back:
             raise self._fail(
@@ -446,7 +451,14 @@ class ProgramRun:
             )
         return to
 
-    def _leave(self) -> int:
+    def _restore(self, at: int) -> None:
+        """The caller's modes, where M73 has saved them."""
+        found = leave_level(self.state, len(self._levels))
+        if found:
+            raise self._fail(at, f"the subprogram that saved modes with M73 returns where {found}")
+
+    def _leave(self, at: int) -> int:
+        self._restore(at)
         level = self._levels[-1]
         if level.again:
             level.again -= 1

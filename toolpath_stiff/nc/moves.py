@@ -310,6 +310,17 @@ class Recorder:
         self.cuts = self.cuts or motion != RAPID
         return True
 
+    def drop(self, row: int) -> None:
+        """Take a move out of the lists, that of its place there; its pause goes to the one before it."""
+        columns: tuple[list[Any], ...] = (self.line, self.motion, self.start, self.end, self.arc, self.feed)
+        for column in (*columns, self.tool, self.tool_length, self.from_machine):
+            del column[row]
+        pause = self.dwell.pop(row)
+        if row:
+            self.dwell[row - 1] += pause
+        elif self.parts:
+            self.parts[-1].dwell[-1] += pause
+
     def add_many(self, moves: MovesInMm) -> None:
         """Add moves at once, each of some length."""
         if not len(moves):

@@ -1,4 +1,4 @@
-"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, an N word, comments.
+"""Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, S, an N word, comments.
 
 Most of a big program is such lines. One regular expression reads them some twenty times faster than `words.read_block`
 reads blocks; a line that it does not match as a whole is not plain and is left to `read_block`, with every error.
@@ -12,20 +12,19 @@ that does not fit) ends the run before it: the interpreter then executes it and 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.modes import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
 from toolpath_stiff.nc.codes.motion import (
     ARCS,
     STILL,
     center_by_offsets,
     center_by_radius,
-    normal_of,
     note_tool,
     sweep_about,
 )
@@ -39,96 +38,26 @@ from toolpath_stiff.nc.codes.points import (
     watches_points,
 )
 from toolpath_stiff.nc.codes.registry import CODES
-from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, MovesInMm
+from toolpath_stiff.nc.plain_holes import LEAST, drill, rows_of_hole, suits
+from toolpath_stiff.nc.plain_words import (
+    FIRST_F,
+    FIRST_LETTER,
+    G_COLUMN,
+    LAST_F,
+    LAST_S,
+    LENGTH_LETTERS,
+    LETTERS,
+    PlainLines,
+    Row,
+    first_bare,
+    has_pointed,
+    is_bare,
+    is_place,
+)
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, read_block
-
-CHUNK = 8192  # lines: their words fit into a processor's cache
-LONGEST_PLAIN = 256  # characters; longer lines are left to `read_block`
-LETTERS = AXES + CENTER_LETTERS
-LENGTH_LETTERS = "XYZIJKR"
-G_COLUMN, FIRST_F, FIRST_LETTER = 0, 1, 2
-LAST_F = FIRST_LETTER + len(LETTERS)
-OTHER = LAST_F + 1  # the text of a line that is not plain
-
-_NUMBER = r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)"
-_FEED = r"(?:F((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
-_WORDS = "".join(f"(?:{letter}({_NUMBER}))?" for letter in LETTERS)
-_COMMENT = r"(?:\([^()\n]*+\))*+"
-# The order of words is that of every CAM system, F in front or behind; any other order is not plain.
-_LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_COMMENT}%s$|^(.+)$"
-_PATTERNS = {True: re.compile(_LINE % r"(?:;.*)?", re.MULTILINE), False: re.compile(_LINE % ";?", re.MULTILINE)}
-_BARE = re.compile(r"^[+-]?0*[1-9][0-9]*$", re.MULTILINE)
-_POINTED = re.compile(r"^[+-]?0*[1-9][0-9]*\.$", re.MULTILINE)
-
-Row = tuple[str, ...]
-
-
-class PlainLines:
-    """The lines of a program, lexed a chunk at a time as they are asked for.
-
-    Parameters
-    ----------
-    lines
-        Of the program.
-    semicolon
-        Whether `;` begins a comment (else it may end a block).
-    """
-
-    def __init__(self, lines: Sequence[str], semicolon: bool) -> None:
-        self.lines = lines
-        self._pattern = _PATTERNS[semicolon]
-        self._start, self._rows = 0, list[Row]()
-        self._others: list[int] = []  # lines of the chunk that are not plain, and its end, in falling order
-
-    def run(self, at: int) -> int:
-        """How many lines from `at` (from 0) are plain; no more than the chunk's rest."""
-        if not self._start <= at < self._start + len(self._rows):
-            self._lex(at)
-        while self._others[-1] < at:
-            self._others.pop()
-        return self._others[-1] - at
-
-    def rows(self, at: int, count: int) -> list[Row]:
-        """The words of lines that `run` has counted, as texts: G, F, `LETTERS`, F; "" where there is none."""
-        return self._rows[at - self._start : at - self._start + count]
-
-    def _lex(self, at: int) -> None:
-        chunk = self.lines[at : at + CHUNK]
-        if max(map(len, chunk)) > LONGEST_PLAIN:
-            chunk = [line if len(line) <= LONGEST_PLAIN else "!" for line in chunk]
-        text = "\n".join(chunk).replace(" ", "").replace("\t", "")
-        if text.isascii():  # of other scripts some letters become ASCII ones in upper case
-            text = text.upper()
-        rows = self._pattern.findall(text)
-        self._start, self._rows = at, rows
-        end = at + len(rows)
-        self._others = [end, *(at + i for i in range(len(rows) - 1, -1, -1) if rows[i][OTHER])]
-
-
-def is_bare(text: str) -> bool:
-    """Whether a number other than 0 stands without a decimal point."""
-    return _BARE.match(text) is not None
-
-
-def has_pointed(column: Sequence[str]) -> bool:
-    """Whether a number other than 0 ends with its decimal point."""
-    return _POINTED.search("\n".join(column)) is not None
-
-
-def first_bare(columns: Sequence[Sequence[str]]) -> int | None:
-    """The first row in which a number other than 0 has no decimal point."""
-    found = None
-    for column in columns:
-        text = "\n".join(column)
-        match = _BARE.search(text)
-        if match is not None:
-            row = text.count("\n", 0, match.start())
-            found = row if found is None else min(found, row)
-    return found
-
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -159,13 +88,32 @@ class PlainRun:
             return []
         rows = self.lines.rows(at, count)
         if self.state.motion not in MODES and not rows[0][G_COLUMN] and any(rows[0]):
-            return []
+            return self._holes(at, rows)
         lines = _Lines(self.state, rows)
         done = lines.execute(at)
         if done < FEWEST:
             self._pause = at + done + 4 * FEWEST
         self._watch_points(at, lines, done)
         return rows[:done]
+
+    def _holes(self, at: int, rows: list[Row]) -> list[Row]:
+        """Drill holes like that of the line before; returns the words of the lines executed."""
+        state = self.state
+        if state.motion not in CYCLES or not self.lines.has(at - 1) or not suits(state):
+            return []
+        hole = rows_of_hole(state.recorder, at)
+        count = next((i for i, row in enumerate(rows) if not is_place(row)), len(rows))
+        if hole is None or not is_place(self.lines.rows(at - 1, 1)[0]) or not count:
+            return []
+        lines = _Lines(state, rows[:count])
+        places = lines.places()
+        if not len(places):
+            return []
+        drill(state, hole, at + 1, places)
+        if state.dialect.increments and lines.counted[: len(places)].any():
+            assume_increments(state)
+        self._watch_points(at, lines, len(places))
+        return rows[: len(places)]
 
     def _watch_points(self, at: int, lines: _Lines, done: int) -> None:
         """As `points.read_numbers`, of all lines executed."""
@@ -190,9 +138,10 @@ def _suits(state: State) -> bool:
         and state.polar is None
         and state.unsettled is None
         and state.corner is None
+        and state.cutter is None
+        and state.beside is None
         and not state.height_lost
         and not state.arc_absolute
-        and not frames.rotated
         and not frames.bound
     )
 
@@ -206,6 +155,7 @@ class _Lines:
         columns = list(zip(*rows, strict=True))
         self.codes: Sequence[str] = columns[G_COLUMN]
         self.feeds = (columns[FIRST_F], columns[LAST_F])
+        self.speeds = columns[LAST_S]
         self.texts = {
             letter: column for letter, column in zip(LETTERS, columns[FIRST_LETTER:LAST_F], strict=True) if any(column)
         }
@@ -217,6 +167,8 @@ class _Lines:
         self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
         for letter, values in self.values.items():
             self._stop(np.abs(values) > (LARGEST_MM if letter in AXES else LARGEST_WORD))
+        if any(self.speeds):
+            self._stop(np.array([text != "" and float(text) > LARGEST_WORD for text in self.speeds]))
         if state.dialect.increments:
             self._count_increments()
 
@@ -246,7 +198,7 @@ class _Lines:
         self._stop(self._no_feed())
         if not moving[: self.end].any():
             return self._leave(None)
-        control = self._control()
+        control = self._turned(moving) if self.state.frames.rotated else self._control()
         start, end = self._set_up(control)
         found = self._arcs(np.flatnonzero(arc[: self.end]), control)
         done = slice(self.end)
@@ -347,6 +299,33 @@ class _Lines:
                 control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
         return control
 
+    def places(self) -> FloatArray:
+        """(m, 2) X and Y in control coordinates after each of the first m lines, which all go somewhere else."""
+        control = self._control()[:, :2]
+        way = np.abs(np.diff(control, axis=0)).max(axis=1)
+        self._stop(way < LEAST)
+        return control[1 : self.end + 1]
+
+    def _turned(self, moving: BoolArray) -> FloatArray:
+        """The same where a work offset or G68 turns the program's axes: line by line, as each counts from the last."""
+        state, frames = self.state, self.state.frames
+        control = np.zeros((self.n + 1, 6))
+        position, control[0] = frames.position, frames.position
+        words = [
+            (axis, self.values[letter] * (state.length_scale if letter in LINEAR else 1.0), self.given[letter])
+            for axis, letter in enumerate(AXES)
+            if letter in self.values
+        ]
+        for row in range(min(self.n, self.end)):
+            if moving[row]:
+                point = frames.to_program(position)
+                for axis, values, given in words:
+                    if given[row]:
+                        point[axis] = coordinate(state, point[axis], float(values[row]))
+                position = frames.to_control(point)
+            control[row + 1] = position
+        return control
+
     def _set_up(self, control: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Set-up coordinates of each line's start and end; an axis that stands keeps its number (`motion.record`)."""
         setup = np.empty_like(control)
@@ -372,7 +351,7 @@ class _Lines:
         )
         nothing = np.full(self.n, math.nan)
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
-        points = np.stack([state.frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
+        points = self._programmed(control[rows])
         starts = points[:, [first, second]].tolist()
         middles, sweeps = list[geometry.Point2](), list[float]()
         for row, start, word in zip(rows.tolist(), starts, words, strict=True):
@@ -385,12 +364,23 @@ class _Lines:
             sweeps.append(sweep)
         frames, found = state.frames, points[: len(sweeps)]
         found[:, [first, second]] = np.array(middles).reshape(-1, 2)
-        centers = np.stack(
-            [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
-        )
-        vector = normal_of(state.plane)
+        if frames.rotated:
+            turned = [frames.to_setup(frames.to_control(point))[:3] for point in found.tolist()]
+            centers = np.array(turned).reshape(-1, 3)
+        else:
+            centers = np.stack(
+                [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
+            )
+        vector = frames.turn_direction(geometry.normal_of(state.plane))
         done = zip(rows.tolist(), centers.tolist(), sweeps, strict=False)
         return {row: Arc((x, y, z), vector, sweep) for row, (x, y, z), sweep in done}
+
+    def _programmed(self, control: FloatArray) -> FloatArray:
+        """Program coordinates of points (n, 6)."""
+        frames = self.state.frames
+        if frames.rotated:
+            return np.array([frames.to_program(point) for point in control.tolist()])
+        return np.stack([frames.axis_to_program(axis, control[:, axis]) for axis in range(6)], axis=1)
 
     def _arc(
         self, row: int, here: list[float], x: float, y: float, i: float, j: float, radius: float, off_plane: float
@@ -438,6 +428,9 @@ class _Lines:
             return 0
         if state.dialect.increments and self.counted[: self.end].any():
             assume_increments(state)
+        speed = next((text for text in reversed(self.speeds[: self.end]) if text), "")
+        if speed:
+            state.speed = float(speed)
         if self.mode[last] != NO_MODE:
             state.motion = MODE_NAMES[self.mode[last]]
         if state.feed_mode == "G93":

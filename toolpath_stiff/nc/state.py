@@ -11,6 +11,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Arc, Recorder, ToolUse, Unsupported
@@ -139,6 +140,23 @@ class Segment(NamedTuple):
     arc: Arc | None
 
 
+class SavedModes(NamedTuple):
+    """What M70 and M73 save; the tool length and its control must be the same where it is restored."""
+
+    inch: bool
+    plane: str
+    absolute: bool
+    arc_absolute: bool
+    feed_mode: str
+    feed: float | None
+    speed: float
+    retract: str | None
+    offset: int
+    tool: float
+    tip_held: bool
+    at_return: bool
+
+
 @dataclass(frozen=True)
 class Corner:
     """A corner that waits for its second move: `,C` or `,R`, its size in mm, and the line that asks for it."""
@@ -203,6 +221,12 @@ class State:
         Each move of the current block, for whoever starts the list.
     corner
         The corner (,C or ,R) that the next block has to make with the one before it; None: there is none.
+    cutter
+        Cutter compensation in force (G41, G42); None: G40.
+    beside
+        After G40, until the next move: from the programmed point to where the tool centre stands (6, set-up frame).
+    level, saved
+        Calls within each other that run; what M70 or M73 saved, by level.
     named_length
         H of a block without G43, which a later G43 without H may mean.
     turning
@@ -243,6 +267,10 @@ class State:
     pointed: bool = False
     trace: list[Segment] | None = None
     corner: Corner | None = None
+    cutter: Cutter | None = None
+    beside: list[float] | None = None
+    level: int = 0
+    saved: dict[int, SavedModes] = field(default_factory=dict)
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
 

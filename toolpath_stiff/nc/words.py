@@ -7,6 +7,7 @@ handled before it is called, each word keeps its true column, and every word tha
 
 from __future__ import annotations
 
+import codecs
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -359,12 +360,20 @@ BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 
 
 def read_lines(path: str | Path) -> tuple[str, ...]:
-    """Lines of a program file, without line ends. UTF-8 (with or without BOM) or Latin-1; LF, CRLF or CR.
+    """Lines of a program file, without line ends; LF, CRLF or CR.
 
     Raises
     ------
     InputError
-        The file cannot be read or is not text.
+        The file cannot be read, is larger than `LARGEST_FILE`, or is not text.
+    """
+    return split_lines(read_text(path)[0], Path(path).name)
+
+
+def read_text(path: str | Path) -> tuple[str, str]:
+    """Text of a program file with its line ends, and its encoding: UTF-8 (with or without BOM) or Latin-1.
+
+    Raises `InputError` where the file cannot be read or is larger than `LARGEST_FILE`.
     """
     try:
         with Path(path).open("rb") as stream:
@@ -380,11 +389,11 @@ def read_lines(path: str | Path) -> tuple[str, ...]:
             hint="split the program",
             file=Path(path).name,
         )
+    encoding = "utf-8-sig" if content.startswith(codecs.BOM_UTF8) else "utf-8"
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode(encoding), encoding
     except UnicodeDecodeError:
-        text = content.decode("latin-1")
-    return split_lines(text, Path(path).name)
+        return content.decode("latin-1"), "latin-1"
 
 
 def split_lines(text: str, name: str) -> tuple[str, ...]:

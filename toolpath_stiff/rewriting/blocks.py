@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes import M_STOP, ONCE
+from toolpath_stiff.nc.codes import M_STATE, M_STOP, MOTION, ONCE
 from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
@@ -37,6 +37,14 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
         raise controls.refusal(
             "a subprogram (M98, M99) cannot be rewritten: it may run at several places",
             "expand the subprograms first",
+        )
+    if M_STATE in current.groups:
+        raise controls.refusal("saved modes (M70 to M73) cannot be rewritten", "write the modes out")
+    if source.motion in ("G33", "G33.1") or current.groups.get(MOTION) in ("G33", "G33.1"):
+        raise controls.refusal("spindle-synchronised motion (G33) cannot be rewritten", "leave it out")
+    if source.cutter is not None:
+        raise controls.refusal(
+            "cutter compensation (G41, G42) cannot be rewritten", "post the program with the path of the tool centre"
         )
     axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane

@@ -16,7 +16,6 @@ import copy
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
-from toolpath_stiff.nc.words import CORNERS, Block, read_block, split_lines
+from toolpath_stiff.nc.words import CORNERS, Block, read_block, read_text, split_lines
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
 from toolpath_stiff.rewriting.turn import Turn
@@ -225,15 +224,7 @@ def _text_of(program: Program) -> tuple[str, str]:
     """The program's text with its line ends, and its encoding."""
     if not program.path:
         return "\n".join([*program.source, ""]), "utf-8"
-    try:
-        content = Path(program.path).read_bytes()
-    except OSError as error:
-        raise ProgramError(f"cannot read {program.path!r}: {error.strerror}") from None
-    encoding = "utf-8-sig" if content.startswith(b"\xef\xbb\xbf") else "utf-8"
-    try:
-        return content.decode(encoding), encoding
-    except UnicodeDecodeError:
-        return content.decode("latin-1"), "latin-1"
+    return read_text(program.path)
 
 
 # -- offset blocks -----------------------------------------------------------------------------------------------------

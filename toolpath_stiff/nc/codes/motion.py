@@ -11,6 +11,7 @@ from collections.abc import Collection
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes import CORNER, DISTANCE, MOTION, ONCE, Code, g_codes
+from toolpath_stiff.nc.codes.cutter import offset_move
 from toolpath_stiff.nc.codes.modes import feed_of_move
 from toolpath_stiff.nc.codes.points import (
     XY,
@@ -61,7 +62,12 @@ def record(
             end[axis] = start[axis]
     feed = math.nan if motion == RAPID else feed_of_move(state, block, start, end, arc)
     bound = (was, frames.bound)
-    added = state.recorder.add(block.line, motion, start, end, feed, state.tool, state.tool_length, bound, arc)
+    if state.beside is not None:  # the tool centre still stands where compensation left it
+        start, state.beside = [s + b for s, b in zip(start, state.beside, strict=True)], None
+    if state.cutter is not None and state.cutter.radius:
+        added = offset_move(state, block, motion, (start, control), feed, bound, arc)
+    else:
+        added = state.recorder.add(block.line, motion, start, end, feed, state.tool, state.tool_length, bound, arc)
     if state.trace is not None:
         state.trace.append(Segment(motion, list(frames.position), list(control), arc))
     frames.position = control
@@ -121,6 +127,8 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
         if state.corner is not None and code == "G1":
             cut_corner(state, block, target)
         record(state, block, RAPID if code == "G0" else FEED, target, words)
+    elif MOTION in block.groups and state.beside is not None:  # to the programmed point, as LinuxCNC does
+        record(state, block, RAPID if code == "G0" else FEED, list(state.frames.position))
     elif MOTION in block.groups and code == "G1" and state.height_lost:  # rs274 moves then
         find_height(state, block, FEED, named=False)
 
@@ -247,7 +255,7 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
         )
     state.corner = None
     begin, at, end = recorder.start[-1], frames.to_setup(frames.position), frames.to_setup(target)
-    normal = frames.turn_direction(normal_of(state.plane))
+    normal = frames.turn_direction(geometry.normal_of(state.plane))
     try:
         if begin[3:] != at[3:] or at[3:] != end[3:]:
             raise geometry.ArcError("a corner while the rotary axes turn", "X, Y and Z alone")
@@ -283,6 +291,8 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
     """G2, G3: clockwise and counter-clockwise in the plane in force, to the point that the axis words name."""
     if not (any(block.has(letter) for letter in (*POINT_WORDS, *geometry.CENTER_LETTERS)) or MOTION in block.groups):
         return
+    if state.beside is not None:
+        raise block.fail(block.block.words[0], "is an arc as the first move after cutter compensation", "G0 or G1")
     first, second, _ = geometry.PLANES[state.plane]
     frames = state.frames
     here = frames.to_program(frames.position)
@@ -299,14 +309,8 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
     middle = list(here)
     middle[first], middle[second] = center
     x, y, z = frames.to_setup(frames.to_control(middle))[:3]
-    turned = frames.turn_direction(normal_of(state.plane))
+    turned = frames.turn_direction(geometry.normal_of(state.plane))
     record(state, block, ARC, control_point(state, block, here, words), words, arc=Arc((x, y, z), turned, sweep))
-
-
-def normal_of(plane: str) -> tuple[float, float, float]:
-    """Unit normal of a plane, in program axes."""
-    normal = geometry.PLANES[plane][2]
-    return (float(normal == 0), float(normal == 1), float(normal == 2))
 
 
 def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inch: bool, turns: int = 1) -> float:

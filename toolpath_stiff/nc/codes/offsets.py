@@ -19,7 +19,7 @@ from toolpath_stiff.nc.words import Word
 
 def work_offset(state: State, block: CurrentBlock, code: str) -> None:
     """G54 to G59.3: that work offset from here on."""
-    _take_offset(state, block, block.codes[code], WORK_OFFSETS.index(code))
+    _other_offset(state, block, block.codes[code], WORK_OFFSETS.index(code))
 
 
 def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
@@ -39,13 +39,19 @@ def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
             f"P{number} is an offset that nothing defines",
             hint=f'give it in the controller file: [offsets] "{code} P{number}" = [x, y, z]',
         )
-    _take_offset(state, block, word, len(WORK_OFFSETS) + number - 1)
+    _other_offset(state, block, word, len(WORK_OFFSETS) + number - 1)
 
 
-def _take_offset(state: State, block: CurrentBlock, word: Word, index: int) -> None:
+def _other_offset(state: State, block: CurrentBlock, word: Word, index: int) -> None:
+    if index != state.frames.active:
+        refuse_while_rotated(state, block, word, "takes another work offset")
+        take_offset(state, index)
+
+
+def take_offset(state: State, index: int) -> None:
+    """The work offset of an index from here on."""
     frames = state.frames
     if index != frames.active:
-        refuse_while_rotated(state, block, word, "takes another work offset")
         turned = frames.offsets.at(index).rotation != frames.offsets.at(frames.active).rotation
         state.rotation_changed = state.rotation_changed or turned
         frames.active = index
@@ -265,6 +271,10 @@ def _forget_changes(state: State) -> None:
     state.height_lost = state.height_lost or state.length_changed
     if state.rotation_changed:
         state.unsettled = "G10"
+    if state.beside is not None:  # it then counts from where the tool centre stands
+        frames = state.frames
+        frames.position = [at + b for at, b in zip(frames.position, state.beside, strict=True)]
+        state.beside = None
 
 
 def table_length(state: State, block: CurrentBlock, code: str) -> None:

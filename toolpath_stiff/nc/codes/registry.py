@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterable, Iterator
 
 from toolpath_stiff.nc.codes import (
-    CUTTER,
     DIAMETER,
     DYNAMIC,
     EVERYWHERE,
@@ -34,11 +33,14 @@ from toolpath_stiff.nc.codes import (
     holds_anyway,
     m_codes,
 )
+from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
 from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
 from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, STRAIGHT_CODES
 from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_CODES
 from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES
+from toolpath_stiff.nc.codes.saved import SAVED_CODES
+from toolpath_stiff.nc.codes.synchronised import SYNCHRONISED_CODES
 from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
 
 # -- codes that leave the path alone, and refused ones -----------------------------------------------------------------
@@ -125,7 +127,6 @@ PASSIVE_CODES = (
         "M29", M_TAPPING, holds_anyway, "rigid tapping", f"{_FANUC}, Rigid tapping (M29)", ("generic", "fanuc"),
         listed="rigid tapping",
     ),
-    Code("G40", CUTTER, holds_anyway, "cutter compensation off", g_codes("G40")),
     Code(
         "G50", SCALING, scaling_off, "scaling off", "Fanuc, operator's manuals, Scaling (G50, G51)", label=SCALING
     ),
@@ -148,42 +149,48 @@ PASSIVE_CODES = (
     ),
 )  # fmt: skip
 
-_CENTRE_PATH = "post the path of the tool centre, or give --interpreter linuxcnc"
 _OTHER_PLANE = ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C", g_codes("G17 - G19.1"))
 _PROBING = ("probing", "leave probing out", g_codes("G38.2 - G38.5"))
-_CUTTER = ("cutter compensation", _CENTRE_PATH)
-_POCKET = ("a pocket cycle of one control", "post the program with arcs", f"{_HAAS}, G12 and G13")
+_POCKET = (
+    "a circular pocket, whose way from circle to circle no manual gives",
+    "post the program with arcs",
+    f"{_HAAS}, G12 and G13",
+)
+_POLAR_PLANE = (
+    "milling in polar coordinates on a rotary axis",
+    "post X, Y, Z of the tool tip",
+    f"{_FANUC}, Polar coordinate interpolation (G12.1, G13.1)",
+)
+_LATHE_CYCLE = ("a lathe cycle", "this is a mill", g_codes("G70 Lathe finishing cycle; G71 G72 Lathe roughing cycles"))
 _MOVES = "post the moves of the cycle"
-_SAVED = ("saved modal state", "post the program without M70 to M73")
 REFUSED_CODES = (
     Refused("G5.2", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
     Refused("G5.3", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
     Refused("G7", "lathe diameter mode", "this is a mill", g_codes("G7")),
     Refused("G12", *_POCKET),
+    Refused("G12.1", *_POLAR_PLANE),
     Refused("G13", *_POCKET),
+    Refused("G13.1", *_POLAR_PLANE),
     Refused("G17.1", *_OTHER_PLANE),
     Refused("G18.1", *_OTHER_PLANE),
     Refused("G19.1", *_OTHER_PLANE),
-    Refused("G33", "spindle-synchronised motion", "leave threading out", g_codes("G33")),
-    Refused("G33.1", "rigid tapping", "leave tapping out", g_codes("G33.1")),
     Refused("G38.2", *_PROBING),
     Refused("G38.3", *_PROBING),
     Refused("G38.4", *_PROBING),
     Refused("G38.5", *_PROBING),
-    Refused("G41", *_CUTTER, g_codes("G41 G42")),
-    Refused("G41.1", *_CUTTER, g_codes("G41.1 G42.1")),
-    Refused("G42", *_CUTTER, g_codes("G41 G42")),
-    Refused("G42.1", *_CUTTER, g_codes("G41.1 G42.1")),
     Refused("G43.2", "an added tool length", "put the whole length into the tool table", g_codes("G43.2")),
     Refused("G51", "scaling", "post the program at its size", f"{_FANUC}, Scaling (G50, G51)"),
     Refused(
         "G68.2", "a tilted work plane", "post X, Y, Z, A, B, C of the tool tip",
         f"{_FANUC}, Tilted working plane indexing (G68.2)",
     ),
-    Refused("G72", "a lathe cycle", "this is a mill", g_codes("G71-G72")),
+    *(Refused(code, *_LATHE_CYCLE) for code in ("G71.1", "G71.2", "G72", "G72.1", "G72.2")),
+    Refused(
+        "G150", "a pocket cycle of one control, around a subprogram's contour", "post the program with lines and arcs",
+        f"{_HAAS}, G150",
+    ),
     Refused("G87", "back boring", _MOVES, g_codes("G87")),
     Refused("G88", "boring with manual feed out", _MOVES, g_codes("G88")),
-    *(Refused(code, *_SAVED, m_codes("M70 - M73")) for code in ("M70", "M71", "M72", "M73")),
 )  # fmt: skip
 
 
@@ -191,7 +198,8 @@ REFUSED_CODES = (
 
 UNDERSTOOD = (
     *STRAIGHT_CODES, *ARC_CODES, *DRILLING_CODES, *MODE_CODES, *POLAR_CODES, *ROTATION_CODES, *OFFSET_CODES,
-    *FEED_CODES, *TOOL_CODES, *FLOW_CODES, *PASSIVE_CODES, *CORNER_CODES,
+    *FEED_CODES, *TOOL_CODES, *FLOW_CODES, *CUTTER_CODES, *SAVED_CODES, *SYNCHRONISED_CODES, *PASSIVE_CODES,
+    *CORNER_CODES,
 )  # fmt: skip
 
 
@@ -221,7 +229,9 @@ CHANGES = {
     "G68.2": "the whole path: it is turned in space",
     "M97 M98": "the path by whatever is called",
     "G33 G33.1 G76": "the path by the thread's moves",
-    "G87 G88 G12 G13 G70 G71 G72": "the path by the cycle's moves",
+    "G87 G88 G12 G13 G150 G70 G71 G71.1 G71.2 G72 G72.1 G72.2": "the path by the cycle's moves",
+    "G12.1 G13.1": "the whole path: X and C are polar",
+    "M72 M73": "whatever depends on the modes in force",
     "G38.2 G38.3 G38.4 G38.5": "where the tool stops, which only the machine knows",
     "G7": "the size of X",
 }
@@ -245,8 +255,8 @@ def code_meaning(name: str) -> str:
 
     Examples
     --------
-    >>> code_meaning("G2"), code_meaning("M8"), code_meaning("G41")
-    ('clockwise arc', 'coolant: not acted upon', 'cutter compensation: not supported')
+    >>> code_meaning("G2"), code_meaning("M8"), code_meaning("G87")
+    ('clockwise arc', 'coolant: not acted upon', 'back boring: not supported')
     """
     if name in CODES:
         code = CODES[name]

@@ -275,9 +275,9 @@ class ParametricRun(ProgramRun):
         self.variables.levels.append(level)
         self._counts.append({})
 
-    def _leave(self) -> int:
+    def _leave(self, at: int) -> int:
         level = self._levels[-1]
-        back = super()._leave()
+        back = super()._leave(at)
         left = not self._levels or self._levels[-1] is not level
         if isinstance(level, MacroLevel):
             self.variables.levels.pop()
@@ -294,7 +294,7 @@ class ParametricRun(ProgramRun):
         if not isinstance(flow, GoTo) or not self._levels:
             return super()._return(at, flow)
         self._levels[-1].again = 0
-        return self._numbered(self._leave() - 1, flow.number, flow.column)
+        return self._numbered(self._leave(at) - 1, flow.number, flow.column)
 
     def _target(self, at: int, call: Call) -> tuple[int, int]:
         heads = self._heads()
@@ -390,7 +390,7 @@ class ParametricRun(ProgramRun):
         self.variables.named["_VALUE_RETURNED"] = float(value is not None)
         if value is not None:
             self.variables.named["_VALUE"] = value
-        return self._leave()
+        return self._leave(at)
 
     def _call_sub(self, at: int, steering: Steering) -> int | None:
         label = steering.label.known(self.variables)

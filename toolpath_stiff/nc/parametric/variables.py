@@ -89,6 +89,10 @@ class Variables:
             return own[name]
         if name in PREDEFINED:
             return PREDEFINED[name](self)
+        if name == "_TASK":
+            raise LookupError(
+                "#<_task> is 1 on the machine and 0 in a preview: the path would depend on it", "write one of them"
+            )
         raise LookupError(
             f"the variable #<{name.lower()}> is read before it is set", "set it before, in the same subprogram"
         )
@@ -180,6 +184,8 @@ class Variables:
             know_height(state, block, word)
         if axis < 2:
             know_place(state, block, word)
+        if state.cutter is not None:
+            raise block.fail(word, "depends on the present point while cutter compensation is on", "G40 before it")
         if frames.from_machine[axis]:
             raise block.fail(
                 word, "depends on where program zero sits on the machine", "a move to program coordinates before"
