@@ -37,12 +37,14 @@ DIRECTIONS = ("X", "Y", "Z", "radial", "axial", "along the struts", "tangential"
 #   vertex          the forces of the two struts that share a vertex move that vertex; m/N
 #   strut           in series with each strut; m/N
 #   strut factor    a share of the strut's own compliance by the strut law
+#   coupling        the force of one strut stretches another, by a share of the mean of both struts' compliances
 #   joint offset    a joint stands off its place, and the control does not know; m
 #   reading factor  the deflection is read too large by a share
 #   reading shift   the deflection is read too large by a displacement; m
 Action = Literal[
-    "give", "rocking", "tilting", "vertex", "strut", "strut factor", "joint offset", "reading factor", "reading shift"
-]
+    "give", "rocking", "tilting", "vertex", "strut", "strut factor", "coupling", "joint offset", "reading factor",
+    "reading shift",
+]  # fmt: skip
 # Action -> unit, its SI value, bounds and usual sizes in that unit; assumed: what a machine that still mills can have.
 UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = {
     "give": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
@@ -51,6 +53,7 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
     "vertex": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
     "strut": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
     "strut factor": ("%", 0.01, (-50.0, 400.0), (-20.0, 40.0)),
+    "coupling": ("%", 0.01, (-80.0, 80.0), (-20.0, 20.0)),
     "joint offset": ("mm", 1e-3, (-30.0, 30.0), (-3.0, 3.0)),
     "reading factor": ("%", 0.01, (-50.0, 100.0), (-10.0, 10.0)),
     "reading shift": ("um", 1e-6, (-200.0, 200.0), (-10.0, 10.0)),
@@ -73,9 +76,10 @@ class Term:
     where
         Strut (1 to 6) or vertex (1 to 3), numbered from 1; None: all of them, or the link has none.
     at
-        Constants of the shape, in SI, by name: `slope` has `start` (where it is 0) and `end` (where it is 1), or
+        Constants in SI, by name. Of the shape: `slope` has `start` (where it is 0) and `end` (where it is 1), or
         `power` and `reference`; `square` has `centre` and `reach`; `bump` has `centre` and `width`; `threshold` has
-        `edge` and `side` (1: above it, -1: below); `periodic` has `period` and `crest`; `sign` has `side`.
+        `edge` and `side` (1: above it, -1: below); `periodic` has `period` and `crest`; `sign` has `side`. Of a
+        `coupling`: `first` and `second`, numbers of struts.
     column
         Name of the set-up; of `tilt`, "" for the angle from Z, "X" or "Y" for the lean towards that axis; of a
         `joint offset`, "frame" or "platform".
@@ -170,14 +174,18 @@ def variable_values(variable: str, path: LoadPath, column: str = "") -> FloatArr
     return np.zeros(len(path)) if found is None else found
 
 
-def shape_values(shape: str, values: FloatArray, at: Mapping[str, float]) -> FloatArray:
-    """s(v) >= 0 at values of any shape; `at` as of `Term.at`."""
+def shape_values(shape: str, values: FloatArray, at: Mapping[str, float], signed: bool) -> FloatArray:
+    """s(v) at values of any shape; `at` as of `Term.at`. Not below 0, but for slopes of what may change to both sides.
+
+    `at` holds numbers, or arrays that broadcast with the values.
+    """
     if shape == "offset":
         return values
     if shape == "slope":
         if "power" in at:
             return np.asarray((np.maximum(values, IDLE) / at["reference"]) ** at["power"])
-        return np.maximum((values - at["start"]) / (at["end"] - at["start"]), 0.0)
+        line = (values - at["start"]) / (at["end"] - at["start"])
+        return np.asarray(line if signed else np.maximum(line, 0.0))
     if shape == "square":
         return np.asarray(((values - at["centre"]) / at["reach"]) ** 2)
     if shape == "bump":
@@ -194,7 +202,8 @@ def shaped(term: Term, path: LoadPath) -> FloatArray:
 
     What varies from strut to strut belongs to a single strut where the term has one.
     """
-    return shape_values(term.shape, variable_values(term.variable, path, term.column), term.constants)
+    values = variable_values(term.variable, path, term.column)
+    return np.asarray(shape_values(term.shape, values, term.constants, len(term.signs) > 1))
 
 
 # -- links -------------------------------------------------------------------------------------------------------------
@@ -269,13 +278,24 @@ def strut_share(term: Term, path: LoadPath) -> FloatArray:
     return np.asarray(each)
 
 
+def coupled(term: Term) -> tuple[int, int]:
+    """Indices from 0 of the struts of a `coupling`."""
+    return int(term.constants["first"]) - 1, int(term.constants["second"]) - 1
+
+
+def coupling_share(term: Term, path: LoadPath) -> FloatArray:
+    """(n,) m/N that a `coupling` puts between its struts per unit of its size."""
+    stiffness = path.machine.strut_law.stiffness(path.struts.lengths[:, coupled(term)])
+    return np.asarray(shaped(term, path) / np.sqrt(stiffness.prod(axis=1)))
+
+
 def reading_share(term: Term, path: LoadPath) -> FloatArray:
     """(n,) by how much a `reading` is off per unit of the term's size: a share, or a displacement in m."""
     shape = shaped(term, path)
     if term.direction in AXES:
         assert path.direction is not None
         shape = shape * path.direction[:, AXES[term.direction]] ** 2
-    return shape
+    return np.asarray(shape)
 
 
 # -- effects -----------------------------------------------------------------------------------------------------------
@@ -296,6 +316,19 @@ class _Form(TermEffect):
         rows = carriers(term.link, term.action, term.direction, term.where, path)
         weight = p["size"] * shaped(term, path)
         return np.asarray(weight[:, None, None] * np.einsum("nki,nkj->nij", rows, rows))
+
+
+class _Coupling(TermEffect):
+    def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """What couples two struts."""
+        term = self.term
+        if not _seen(term, path):
+            return None
+        first, second = coupled(term)
+        own = p["size"] * coupling_share(term, path)
+        form = np.zeros((len(path), 12, 12))
+        form[:, first, second] = form[:, second, first] = own
+        return form
 
 
 class _Strut(TermEffect):
@@ -362,7 +395,7 @@ def effect_of(term: Term) -> Effect:
         raise ValueError(f"no effect sees the variable {term.variable!r}")
     unit, si, bounds, typical = UNITS[term.action]
     kinds: dict[str, type[TermEffect]] = {
-        "strut": _Strut, "strut factor": _Strut, "joint offset": _Offset, "reading factor": _Reading,
+        "coupling": _Coupling, "strut": _Strut, "strut factor": _Strut, "joint offset": _Offset, "reading factor": _Reading,
         "reading shift": _Reading,
     }  # fmt: skip
     needs = [NEEDS[term.variable]] if term.variable in NEEDS else []
