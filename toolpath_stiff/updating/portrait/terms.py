@@ -270,12 +270,12 @@ def _vertex_carriers(link: str, direction: str, where: int | None, path: LoadPat
 def strut_share(term: Term, path: LoadPath) -> FloatArray:
     """(n, 6) m/N that a `strut` or `strut factor` adds to each strut per unit of its size."""
     shape = shaped(term, path)
-    each = np.broadcast_to(shape[:, None] if shape.ndim == 1 else shape, (len(path), 6)).copy()
+    each = np.array(np.broadcast_to(shape[:, None] if shape.ndim == 1 else shape, (len(path), 6)), dtype=float)
     if term.where is not None:
         each[:, np.arange(6) != term.where - 1] = 0.0
     if term.action == "strut factor":
-        each /= path.machine.strut_law.stiffness(path.struts.lengths)
-    return np.asarray(each)
+        each = np.asarray(each / path.machine.strut_law.stiffness(path.struts.lengths))
+    return each
 
 
 def coupled(term: Term) -> tuple[int, int]:
@@ -395,8 +395,8 @@ def effect_of(term: Term) -> Effect:
         raise ValueError(f"no effect sees the variable {term.variable!r}")
     unit, si, bounds, typical = UNITS[term.action]
     kinds: dict[str, type[TermEffect]] = {
-        "coupling": _Coupling, "strut": _Strut, "strut factor": _Strut, "joint offset": _Offset, "reading factor": _Reading,
-        "reading shift": _Reading,
+        "coupling": _Coupling, "strut": _Strut, "strut factor": _Strut, "joint offset": _Offset,
+        "reading factor": _Reading, "reading shift": _Reading,
     }  # fmt: skip
     needs = [NEEDS[term.variable]] if term.variable in NEEDS else []
     if term.action in ("reading factor", "reading shift"):
