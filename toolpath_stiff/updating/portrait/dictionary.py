@@ -22,6 +22,7 @@ from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.portrait.terms import (
     LINKS,
+    VARIABLES,
     Action,
     Term,
     carriers,
@@ -39,11 +40,10 @@ WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 PLACE = ("x", "y", "z", "radius")
 ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
 SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
-BUMPS = 6
-PERIODS = 4  # periods of a place or of time, down to a quarter of the range
+BUMPS, MOST_EDGES = 5, 5
 SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
-PHASES = 4
-NOTHING = 1e-7  # rms change of ln stiffness per unit... below which a term does nothing to these data
+PHASES = 3  # of half a turn; the other half is the other sign's
+NOTHING = 1e-4  # rms change of stiffness by the largest size below which a term does nothing to these readings
 
 
 @dataclass(frozen=True)
@@ -69,139 +69,141 @@ class Local:
 def locals_of(extra: Iterable[str]) -> list[Local]:
     """Every link with its places and directions; `extra`: names of further columns, which instruments may feel."""
     further = tuple(extra)
-    found = [
-        Local("instrument", "reading factor", "reading", None, (*PLACE, *WHOLE[1:], "tilt", *further)),
+    whole = (*WHOLE, *further)
+    turning = ("X", "Y", "all", "tangential")
+    return [
+        Local("instrument", "reading factor", "reading", None, (*PLACE, *whole[1:], "tilt")),
         *(
-            Local("instrument", "reading factor", axis, None, ("direction", *PLACE, *WHOLE[1:], "tilt", *further))
+            Local("instrument", "reading factor", axis, None, ("direction", *PLACE, *whole[1:], "tilt"))
             for axis in "XYZ"
         ),
         *(
-            Local("instrument", "reading shift", axis, None, ("constant", *PLACE, *WHOLE[2:], *further))
+            Local("instrument", "reading shift", axis, None, ("constant", "time", "order", "temperature", "setup"))
             for axis in ("reading", "X", "Y", "Z")
         ),
-        *(_of_head("tool", further)),
-        *(_of_head("platform", further)),
+        *_of_head("tool", whole),
+        *_of_head("platform", whole),
+        *_of_vertices("platform", ("radial", "tangential", "axial", "along the struts"), (*whole, "tilt")),
+        *_of_joints(whole),
+        *_of_struts(whole),
+        *_of_vertices("frame", ("radial", "tangential", "Z", "along the struts"), whole),
+        *(Local("frame", "give", axis, None, (*whole, *PLACE), SIDE) for axis in ("X", "Y", "Z", "all")),
+        *(Local("frame", "rocking", axis, None, ("constant", "load"), SIDE) for axis in turning),
         *(
-            Local("platform", "vertex", direction, where, (*WHOLE, "tilt", *further))
-            for direction in ("radial", "tangential", "axial", "along the struts")
-            for where in ALL_VERTICES
-        ),
-        *(
-            Local("joints", "strut", "along the struts", where, (*WHOLE, "strut force", "force sign", "tilt", *further))
-            for where in ALL_STRUTS
-        ),
-        *(
-            Local("joints", "joint offset", axis, where, ("constant",), column=end)
-            for axis in "XYZ"
-            for where in ALL_STRUTS[1:]
-            for end in ("frame", "platform")
-        ),
-        *_of_struts(further),
-        *(
-            Local("frame", "vertex", direction, where, (*WHOLE, *further))
-            for direction in ("radial", "tangential", "Z", "along the struts")
-            for where in ALL_VERTICES
-        ),
-        *(Local("frame", "give", axis, None, (*WHOLE, *PLACE, *further), SIDE) for axis in ("X", "Y", "Z", "all")),
-        *(Local("frame", "rocking", axis, None, WHOLE, SIDE) for axis in ("X", "Y", "all", "tangential")),
-        *(
-            Local("table", "give", axis, None, (*WHOLE, *PLACE, *further))
+            Local("table", "give", axis, None, (*whole, *PLACE))
             for axis in ("X", "Y", "Z", "all", "radial", "tangential")
         ),
-        *(Local("table", "rocking", axis, None, (*WHOLE, "z")) for axis in ("X", "Y", "all", "tangential")),
+        *(Local("table", "rocking", axis, None, ("constant", "load", "setup", "z")) for axis in turning),
     ]
-    return found
 
 
-def _of_head(link: str, further: tuple[str, ...]) -> Iterator[Local]:
+def _of_head(link: str, whole: tuple[str, ...]) -> Iterator[Local]:
     """Tool or platform: gives across and along its axis, and tips about the middle of the joints."""
     for direction in ("radial", "axial", "X", "Y", "all"):
-        yield Local(link, "give", direction, None, (*WHOLE, "tilt", *further))
+        yield Local(link, "give", direction, None, (*whole, "tilt"))
     for direction in ("radial", "X", "Y"):
-        yield Local(link, "tilting", direction, None, (*WHOLE, "tilt", *further))
+        yield Local(link, "tilting", direction, None, ("constant", "load", "tilt"))
 
 
-def _of_struts(further: tuple[str, ...]) -> Iterator[Local]:
-    """Struts: their own share of the strut law, all together or one alone, and what couples two of them."""
-    own = (*WHOLE[1:], "strut length", "strut force", "force sign", *further)
+def _of_vertices(link: str, directions: Iterable[str], variables: tuple[str, ...]) -> Iterator[Local]:
+    """The vertices of frame or platform, all together or one alone."""
+    for direction in directions:
+        for where in ALL_VERTICES:
+            yield Local(link, "vertex", direction, where, ("constant", "load") if where else variables)
+
+
+def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
+    """Joints: they give along their strut, or stand off their place."""
     for where in ALL_STRUTS:
-        variables = (*own, *PLACE, "tilt") if where is None else ("constant", *own, *PLACE)
-        link = "struts" if where is None else "one strut"
-        yield Local(link, "strut factor", "along the struts", where, variables)
+        own = ("strut force", "force sign")
+        variables = ("constant", "load", "temperature", *own) if where else (*whole, *own, "tilt")
+        yield Local("joints", "strut", "along the struts", where, variables)
+    for axis in "XYZ":
+        for where in ALL_STRUTS[1:]:
+            for end in ("frame", "platform"):
+                yield Local("joints", "joint offset", axis, where, ("constant",), column=end)
+
+
+def _of_struts(whole: tuple[str, ...]) -> Iterator[Local]:
+    """Struts: their own share of the strut law, all together or one alone, and what couples two of them."""
+    own = (*whole[1:], "strut length", "strut force", "force sign", *PLACE)
+    yield Local("struts", "strut factor", "along the struts", None, (*own, "tilt"))
     for first, second in combinations(range(1, 7), 2):
         at = (("first", float(first)), ("second", float(second)))
         yield Local("struts", "coupling", "along the struts", None, ("constant",), at=at)
+    for where in ALL_STRUTS[1:]:
+        yield Local("one strut", "strut factor", "along the struts", where, ("constant", *own))
 
 
 # -- shapes ------------------------------------------------------------------------------------------------------------
 
 
-def shapes_of(variable: str, values: FloatArray, signed: bool) -> list[tuple[str, Constants]]:
-    """Shapes over the values that a variable takes, with their constants; none where it does not vary."""
+def shapes_of(variable: str, values: FloatArray, signed: bool, lean: bool = False) -> list[tuple[str, Constants]]:
+    """Shapes over the values that a variable takes, with their constants; none where it does not vary.
+
+    `signed`: of what may change to both sides, where one side of each shape says it all; `lean`: of a signed tilt,
+    about which few poses say more than its side and its size.
+    """
     if variable in ("constant", "direction", "setup"):
         return [("offset", ())]
     different = np.unique(np.round(values, 9))
     if variable == "force sign":
-        return [("sign", (("side", 1.0),)), ("sign", (("side", -1.0),))] if len(different) > 1 else []
+        sides = (1.0,) if signed else (1.0, -1.0)
+        return [("sign", (("side", side),)) for side in sides] if len(different) > 1 else []
     if len(different) < 2 or different[-1] - different[0] <= 1e-9 * max(abs(different[-1]), 1e-9):
         return []
     low, high = float(different[0]), float(different[-1])
-    span = high - low
-    found = _slopes(low, high, different, signed)
-    if variable in ("load", "strut force"):
+    many, place = len(different), variable in (*PLACE, "strut length")
+    found: list[tuple[str, Constants]] = []
+    if variable in ("load", "strut force") and not (signed and many == 2):
         reference = float(np.median(values))
-        found += [("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0, 0.5)]
-    if len(different) > 2:
-        centres = [0.5 * (low + high)] + ([0.0] if low < 0.0 < high else [])
-        found += [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
+        found += [("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)]
+    found += _slopes(low, high, signed, many > 4)
+    if many == 2:
+        return found
+    centres = [0.5 * (low + high)] + ([0.0] if low < 0.0 < high and place else [])
+    found += [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
+    edges = [0.0] if lean else _edges(different, MOST_EDGES if place else 3)
+    sides = (1.0,) if signed else (1.0, -1.0)
+    found += [("threshold", (("edge", edge), ("side", side))) for edge in edges for side in sides]
+    if place and many > 4:
         found += [
-            ("threshold", (("edge", edge), ("side", side)))
-            for edge in _edges(different)
-            for side in ((1.0,) if signed else (1.0, -1.0))
-        ]
-    if len(different) > 4:
-        found += [
-            ("bump", (("centre", float(c)), ("width", span / parts)))
+            ("bump", (("centre", float(c)), ("width", (high - low) / parts)))
             for c in np.linspace(low, high, BUMPS)
             for parts in (4.0, 8.0)
         ]
-    if len(different) > 8:
-        found += _periodic(variable, low, span, signed)
+    if (place or variable not in VARIABLES) and many > 8:
+        found += _periodic(variable, low, high - low, many, signed)
     return found
 
 
-def _slopes(low: float, high: float, different: FloatArray, signed: bool) -> list[tuple[str, Constants]]:
-    """Straight lines over the range, and from a place within it on."""
+def _slopes(low: float, high: float, signed: bool, within: bool) -> list[tuple[str, Constants]]:
+    """Straight lines over the range, and from its middle on."""
+    middle = 0.5 * (low + high)
     if signed:
-        return [("slope", (("start", 0.5 * (low + high)), ("end", high)))]
-    starts = [(low, high), (high, low)]
-    if len(different) > 4:
-        for share in (0.25, 0.5, 0.75):
-            inner = low + share * (high - low)
-            starts += [(inner, high), (inner, low)]
-    return [("slope", (("start", start), ("end", end))) for start, end in starts]
+        return [("slope", (("start", middle), ("end", high)))]
+    lines = [(low, high), (high, low)] + ([(middle, high), (middle, low)] if within else [])
+    return [("slope", (("start", start), ("end", end))) for start, end in lines]
 
 
-def _edges(different: FloatArray) -> list[float]:
-    """Edges between values; 0 where it lies among them; at most seven more."""
+def _edges(different: FloatArray, most: int) -> list[float]:
+    """Edges between values, and 0 where it lies among them."""
     between = 0.5 * (different[1:] + different[:-1])
-    chosen = between[np.unique(np.linspace(0, len(between) - 1, 9).round().astype(int)[1:-1])]
-    if len(between) <= 7:
-        chosen = between
-    edges = chosen.tolist()
-    return [*edges, 0.0] if different[0] < 0.0 < different[-1] else edges
+    if len(between) > most:
+        between = between[np.unique(np.linspace(0, len(between) - 1, most + 2).round().astype(int)[1:-1])]
+    return [*between.tolist(), 0.0] if different[0] < 0.0 < different[-1] else between.tolist()
 
 
-def _periodic(variable: str, low: float, span: float, signed: bool) -> list[tuple[str, Constants]]:
+def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -> list[tuple[str, Constants]]:
+    """Waves over the range: two turns at most of a place or of time, down to a screw's lead in a strut's length."""
+    turns = np.array([1.0, 2.0])
     if variable == "strut length":
         # So close that between two neighbours a wave over the whole range loses a quarter of a turn at most.
-        turns = np.arange(1.0, span / SHORTEST_PITCH, 0.5)
-    else:
-        turns = np.arange(1.0, PERIODS + 1.0)
+        turns = np.arange(1.0, min(span / SHORTEST_PITCH, many / 3.0), 0.5)
     found: list[tuple[str, Constants]] = []
     for turn in turns.tolist():
         period = span / turn
-        phases = np.arange(PHASES) / (2.0 * PHASES) if signed else np.arange(2 * PHASES) / (2.0 * PHASES)
+        phases = np.arange(PHASES if signed else 2 * PHASES) / (2.0 * PHASES)
         found += [("periodic", (("period", period), ("crest", low + float(p) * period))) for p in phases]
     return found
 
@@ -367,7 +369,7 @@ def _shaped(local: Local, variable: str, ground: Ground) -> Iterator[tuple[str, 
         if values.ndim == 2 and local.where is not None and local.action in ("strut", "strut factor"):
             values = values[:, local.where - 1]
         made: dict[str, list[Constants]] = {}
-        for shape, at in shapes_of(variable, values, signed):
+        for shape, at in shapes_of(variable, values, signed, bool(column)):
             made.setdefault(shape if "power" not in dict(at) else f"{shape} power", []).append(at)
         yield column, {name.split(" ")[0]: at for name, at in made.items() if " " not in name}
         if "slope power" in made:
@@ -382,7 +384,8 @@ def _largest(term: Term) -> float:
 def _follows_law(relative: FloatArray, scale: FloatArray) -> NDArray[np.bool_]:
     """Terms that change every reading alike: the strut law does that."""
     flat = relative - relative.mean(axis=1, keepdims=True)
-    return np.asarray((flat**2).mean(axis=1) < (1e-6 * scale) ** 2)
+    still: NDArray[np.bool_] = (flat**2).mean(axis=1) < (1e-6 * scale) ** 2
+    return still
 
 
 def _log_prior(groups: list[tuple[str, str, tuple[Any, ...], str, float]]) -> FloatArray:
