@@ -12,14 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import LoadPath
-from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.portrait.terms import (
     LINKS,
     VARIABLES,
@@ -208,6 +208,34 @@ def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -
     return found
 
 
+def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
+    """The same term with constants about its own: steps of a grid's spacing times `finer`."""
+    at = term.constants
+    names = [name for name in at if name not in ("first", "second", "side", "power", "reference", "reach")]
+    if not names or term.shape == "sign":
+        return []
+    values = ground.values(term.variable, term.column)
+    low, high = float(values.min()), float(values.max())
+    step = finer * (high - low) / BUMPS
+    moves: dict[str, FloatArray] = {name: at[name] + step * np.linspace(-0.5, 0.5, 7) for name in names}
+    for name in {"width", "period"} & set(names):
+        spread = 0.7 if name == "width" else 0.25 * at["period"] / (high - low)
+        moves[name] = at[name] * np.exp(finer * np.linspace(-spread, spread, 7))
+    if "crest" in names:
+        moves["crest"] = at["crest"] + finer * at["period"] / (2 * PHASES) * np.linspace(-0.5, 0.5, 7)
+    if term.shape == "slope":  # where it begins; its end is a matter of scale
+        moves = {"start": np.clip(moves["start"], low - step, high + step)} if len(term.signs) == 1 else {}
+    found = []
+    for values_of in product(*moves.values()):
+        new = at | dict(zip(moves, (float(v) for v in values_of), strict=True))
+        if "width" in new and new["width"] < (high - low) / 30.0:
+            continue
+        if term.shape == "slope" and (new["end"] - new["start"]) * (at["end"] - at["start"]) <= 0.0:
+            continue
+        found.append(replace(term, at=tuple(new.items())))
+    return found if moves else []
+
+
 # -- columns -----------------------------------------------------------------------------------------------------------
 
 
@@ -218,17 +246,17 @@ class Ground:
     ----------
     predictor
         The model and n readings.
-    compliance
-        (n,) m/N of the model that a term is added to.
+    compliance, law
+        (n,) m/N of the model that a term is added to; (2,) logarithms of the factors on its strut law.
     """
 
-    def __init__(self, predictor: Predictor, compliance: FloatArray) -> None:
+    def __init__(self, predictor: Predictor, compliance: FloatArray, law: FloatArray) -> None:
         data, path = predictor.data, predictor.full_path()
         forces = predictor.strut_forces()
         self.predictor, self.data, self.compliance = predictor, data, compliance
         self.path: LoadPath = replace(path, strut_forces=forces * data.force[:, None], direction=data.direction)
         self.forces = np.concatenate([forces, data.direction, np.zeros_like(data.direction)], axis=1)  # [f; w]
-        self.softness = 1.0 / predictor.machine.strut_law.stiffness(path.struts.lengths)
+        self.softness = 1.0 / scaled_law(predictor.machine.strut_law, law).stiffness(path.struts.lengths)
         self._values: dict[tuple[str, str], FloatArray] = {}
 
     def values(self, variable: str, column: str = "") -> FloatArray:
@@ -304,7 +332,7 @@ class Dictionary:
     terms
         The terms.
     columns
-        (N, n) d ln stiffness per change of ln stiffness of rms 1: scaled, and of the sign that more of it has.
+        (N, n) change of compliance over the compliance, scaled to an rms of 1.
     scale
         (N,) rms of compliance change over compliance, per SI unit of size.
     log_prior
@@ -339,7 +367,7 @@ def dictionary_of(ground: Ground) -> Dictionary:
                     terms += [local.term(variable, shape, one, column) for one in at]
                     place = (local.action, local.direction, local.where, local.at, local.column or column)
                     groups += [(local.link, variable, place, shape, local.weight)] * len(at)
-    relative = -np.concatenate(blocks) / ground.compliance
+    relative = np.concatenate(blocks) / ground.compliance
     scale = np.sqrt((relative**2).mean(axis=1))
     kept = scale * np.array([_largest(term) for term in terms]) > NOTHING
     kept &= ~_follows_law(relative, scale)
@@ -404,7 +432,7 @@ def _log_prior(groups: list[tuple[str, str, tuple[Any, ...], str, float]]) -> Fl
                 for shape, (many, weight) in shapes.items():
                     share = weight / max(total, len(places) * SIDE) / len(shapes) / many
                     logs[link, variable, place, shape, weight] = float(np.log(share / len(variables) / len(tree)))
-    return np.array([logs[one] for one in groups])
+    return np.array([logs[one] for one in groups], dtype=float)
 
 
 assert set(LINKS) >= {local.link for local in locals_of(())}
