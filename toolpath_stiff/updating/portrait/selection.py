@@ -1,8 +1,8 @@
 """Which terms of the dictionary describe what is missing: few, chosen by likelihood, held to left-out points.
 
 Terms are added one by one. Every term's gain is first its score beside what is fitted already (Rao's score test, sizes
-on their allowed side); the best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j: exact
-for whatever gives way in series. A term joins where its gain is more than the best of the whole dictionary would reach
+on their allowed side); the best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j,
+exact for whatever gives way in series. A term joins where its gain is more than the best of the whole dictionary would reach
 by chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls.
 """
 
@@ -263,7 +263,7 @@ class Selection:
         found = self.together(before, [entry.term for entry in entries])
         # Under the law of few places for many constants, the likelier of two that fit alike.
         best = int(np.argmax(found.posterior))
-        grown = self._settled(before, self._with(before, entries[best].term))
+        grown = self._settled(before, self.extended(before, entries[best].term))
         return self._best_place(before, grown)
 
     def _best_place(self, before: Description, grown: Description) -> Description:
@@ -271,18 +271,20 @@ class Selection:
         entries = crossed(grown.terms[-1], self.ground)
         if len(entries) < 2:
             return grown
-        found = self.together(self._scattered(before, grown), [entry.term for entry in entries])
+        found = self.together(self.scattered(before, grown), [entry.term for entry in entries])
         logs = found.posterior + np.array([entry.log_prior for entry in entries])
         best = entries[int(np.argmax(logs))].term
         if best == grown.terms[-1]:
             return grown
-        better = self._with(before, best)
+        better = self.extended(before, best)
         return better if better.posterior > grown.posterior - TIE else grown
 
-    def _scattered(self, before: Description, grown: Description) -> Description:
+    def scattered(self, before: Description, grown: Description) -> Description:
+        """A description under the scatter of another one."""
         return replace(before, fit=replace(before.fit, scatter=grown.fit.scatter))
 
-    def _with(self, before: Description, term: Term) -> Description:
+    def extended(self, before: Description, term: Term) -> Description:
+        """A description with a term more, all refitted."""
         column = self.ground.column(term) / self.compliance
         scale = float(np.sqrt(np.mean(column**2)))
         return self.described(
@@ -299,8 +301,8 @@ class Selection:
             near = shapes_near(grown.terms[-1], self.ground, finer)
             if not near:
                 return grown
-            found = self.together(self._scattered(before, grown), near)
-            better = self._with(before, near[int(np.argmax(found.posterior))])
+            found = self.together(self.scattered(before, grown), near)
+            better = self.extended(before, near[int(np.argmax(found.posterior))])
             if better.posterior > grown.posterior:
                 grown = better
         return grown
@@ -328,7 +330,7 @@ def _bounded_step(
     held = np.zeros(step.shape, dtype=bool)
     held[:, 2:] = goal != moved
     if not held.any():
-        return step
+        return np.asarray(step)
     fixed = np.zeros(step.shape)
     fixed[:, 2:] = np.where(held[:, 2:], goal - size, 0.0)
     left = right - np.einsum("gij,gj->gi", matrix, fixed * scale)
@@ -380,21 +382,21 @@ class Chosen:
     held: HeldOut
 
 
-def choose(selection: Selection) -> Chosen | None:
-    """One to three terms; None where nothing stands out from chance."""
+def choose(selection: Selection) -> tuple[Chosen | None, float]:
+    """One to three terms, none where nothing stands out from chance; and how often chance does as much."""
     start = selection.start
     gains = selection.scores(start)
     chance, threshold = selection.chance(start, float(gains.max(initial=0.0)))
     found = selection.grown(start)
     if chance > LEADS or found is None:
-        return None
+        return None, chance
     while len(found.terms) < MOST_TERMS:
         more = _one_more(selection, found, threshold)
         if more is None:
             break
         found = more
     found = _leading_first(selection, found)
-    return Chosen(found, chance, weigh(selection, found), _held(selection, found))
+    return Chosen(found, chance, weigh(selection, found), _held(selection, found)), chance
 
 
 def _one_more(selection: Selection, before: Description, threshold: float) -> Description | None:
@@ -440,7 +442,7 @@ def temper(selection: Selection, description: Description) -> float:
 def weigh(selection: Selection, description: Description) -> Weighed:
     """Posterior probabilities of terms in the place of the leading one, beside the others."""
     others = selection.without(description, 0)
-    others = selection._scattered(others, description)
+    others = selection.scattered(others, description)
     entries = selection.finalists(selection.scores(others)) + crossed(description.terms[0], selection.ground)
     entries = list({entry.term: entry for entry in entries}.values())
     found = selection.together(others, [entry.term for entry in entries])
