@@ -1,7 +1,7 @@
 """The yardstick of a description: what a smooth unknown one reaches at points that it has not seen.
 
-The discrepancy as a Gaussian process with one of the forms of covariance of `inference.gates` (Kennedy and O'Hagan 2001,
-Bayesian calibration of computer models), its amplitude the likeliest; predictions at left-out points in closed form.
+The discrepancy as a Gaussian process with one of the forms of covariance of `inference.gates` (Kennedy and O'Hagan
+2001, Bayesian calibration of computer models), its amplitude the likeliest; left-out points in closed form.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from toolpath_stiff.updating.inference.covariances import Groups
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import POINT_TO_POINT, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import AMPLITUDES
+from toolpath_stiff.updating.portrait.selection import law_prior
 
 FloatArray = NDArray[np.float64]
 
@@ -22,8 +23,7 @@ def smooth_rms(problem: Problem, fit: Fit) -> float:
     points = Groups.by(problem.predictor.data.point)
     if points.count < 3:
         return float("nan")
-    projected = problem.projected(fit.jacobian) if not fit.scatter.wild else None
-    precision = projected or fit.scatter.precision.beside(fit.jacobian.T, _prior(fit))
+    precision = fit.scatter.precision.beside(fit.jacobian.T, law_prior(fit))
     best: tuple[float, FloatArray, float] | None = None
     pull = precision.times(fit.residual)
     for words, features in discrepancy_forms(problem.predictor).items():
@@ -45,11 +45,3 @@ def smooth_rms(problem: Problem, fit: Fit) -> float:
     for out in points.members():
         residual[out] = np.linalg.solve(whole.block(out), pulls[out])
     return float(np.sqrt(np.mean(np.expm1(-residual) ** 2)))
-
-
-def _prior(fit: Fit) -> FloatArray:
-    from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
-
-    prior = np.zeros((fit.jacobian.shape[1],) * 2)
-    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
-    return prior
