@@ -296,7 +296,7 @@ def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | 
             return None
         base = diagnosis.fits[diagnosis.best]
     say("describing what is missing")
-    found = draw_portrait(main.problem, base, diagnosis.noise, diagnosis.seed)
+    found = draw_portrait(main.problem, base, diagnosis.noise, diagnosis.seed, main.base_gate.worst)
     return found if found.terms or verdict == "unexplained" else None
 
 

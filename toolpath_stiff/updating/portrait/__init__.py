@@ -83,7 +83,7 @@ class Portrait:
     values: FloatArray | None = None
 
 
-def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portrait:
+def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: str = "") -> Portrait:
     """Describe what a fit leaves.
 
     Parameters
@@ -94,12 +94,14 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portr
         The fit that leaves something: the model with its strut law refitted, or the best explanation.
     seed
         Of the simulated campaigns.
+    form
+        The form of discrepancy that stands out most, in words, for the yardstick.
     """
     selection = Selection(problem, base, noise, seed)
     chosen, chance = choose(selection)
     start = selection.start
     points = problem.predictor.data.point
-    smooth = smooth_rms(problem, start.fit)
+    smooth = smooth_rms(problem, start.fit, form)
     if chosen is None:
         return Portrait(
             look_elsewhere=chance, smooth_rms=smooth, error=float(start.fit.errors.mean()),

@@ -18,17 +18,25 @@ from toolpath_stiff.updating.portrait.selection import law_prior
 FloatArray = NDArray[np.float64]
 
 
-def smooth_rms(problem: Problem, fit: Fit) -> float:
-    """Rms of (modelled - measured) / measured at left-out points, of the likeliest form; nan with too few points."""
+GENERAL = ("smooth over the workspace, different by direction", "linear over the workspace, different by direction")
+
+
+def smooth_rms(problem: Problem, fit: Fit, form: str) -> float:
+    """Rms of (modelled - measured) / measured at left-out points; nan with too few points.
+
+    Of the likeliest form: `form`, the one that stands out most, in words, or what is smooth over the workspace.
+    """
     points = Groups.by(problem.predictor.data.point)
     if points.count < 3:
         return float("nan")
     precision = fit.scatter.precision.beside(fit.jacobian.T, law_prior(fit))
     best: tuple[float, FloatArray, float] | None = None
     pull = precision.times(fit.residual)
-    for words, features in discrepancy_forms(problem.predictor).items():
-        if words == POINT_TO_POINT:  # nothing of one point is known from another
+    forms = discrepancy_forms(problem.predictor)
+    for words in dict.fromkeys((form, *GENERAL)):
+        if words not in forms or words == POINT_TO_POINT:  # of which nothing is known from another point
             continue
+        features = forms[words]
         inner = precision.times(features.T) @ features
         own, turn = np.linalg.eigh(inner)
         turned = (turn.T @ (features.T @ pull)) ** 2

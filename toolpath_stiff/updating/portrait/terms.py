@@ -79,8 +79,8 @@ class Term:
     at
         Constants in SI, by name. Of the shape: `slope` has `start` (where it is 0) and `end` (where it is 1), or
         `power` and `reference`; `square` has `centre` and `reach`; `bump` has `centre` and `width`; `threshold` has
-        `edge` and `side` (1: above it, -1: below), or `beyond`, a force that friction holds: s = 1 - beyond / v above it; `periodic` has `period` and `crest`; `sign` has `side`. Of a
-        `coupling`: `first` and `second`, numbers of struts.
+        `edge` and `side` (1: above it, -1: below), or `beyond`, a force that friction holds; `periodic` has `period`
+        and `crest`; `sign` has `side`. Of a `coupling`: `first` and `second`, numbers of struts.
     column
         Name of the set-up; of `tilt`, "" for the angle from Z, "X" or "Y" for the lean towards that axis; of a
         `joint offset`, "frame" or "platform".

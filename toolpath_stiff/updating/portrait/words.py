@@ -107,7 +107,7 @@ def _with(term: Term) -> str:
 def size_words(sized: Sized) -> str:
     """Size with its interval and the change that it makes: "9.1 nm/N (8 to 10), 6 % of stiffness in the mean"."""
     si = sized.term.si
-    low, high = (f"{float(f'{end / si:.2g}'):g}" for end in sized.interval)
+    low, high = (f"{float(f'{end / si:.3g}'):g}" for end in sized.interval)
     return (
         f"{float(f'{sized.term.size / si:.3g}'):g} {sized.term.unit} ({low} to {high}), "
         f"{100.0 * sized.rms:.2g} % of stiffness (rms)"
