@@ -133,7 +133,9 @@ def _bars(axes: Axes, links: Sequence[Mapping[str, Any]], variables: Sequence[Ma
     axes.set_ylim(max(len(rows), 5) - 0.5, -0.5)
     axes.set_xlim(0.0, 1.15)
     axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100 %"])
-    axes.set_title("which link (blue), what it varies with (orange)", size=9.5, loc="right", color=MUTED)
+    axes.set_title(
+        "which link (blue), what it varies with (orange)", size=9.5, loc="right", color=MUTED, weight="normal"
+    )
     axes.grid(visible=False, axis="y")
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
