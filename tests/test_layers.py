@@ -51,6 +51,7 @@ UPDATING_RANK = {
     "inference": 2,
     "comparison": 3,
     "planning": 3,
+    "portrait": 3,
     "diagnosis": 4,
     "correction": 5,
 }
