@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
 from toolpath_stiff.updating.inference.covariances import Groups, Precision
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.updating.inference.minima import bounded_step
 from toolpath_stiff.updating.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
 
 FloatArray = NDArray[np.float64]
@@ -148,23 +149,17 @@ class _Search:
     def newton_step(self, flat: FloatArray, information: FloatArray, gradient: FloatArray) -> FloatArray:
         """Step (2 + free,) of law and free sizes to the least quadratic model within the bounds.
 
-        By bounded-variable least squares (Stark and Parker 1995, Computational Statistics 10, 129) where the plain
-        step would leave them: cutting that off leads uphill where sizes trade off against each other.
+        By bounded-variable least squares where the plain step would leave them: cutting that off leads uphill where
+        sizes trade off against each other.
         """
         step = _solve(information, gradient)
         low, high = (limit[list(self.free)] - flat[list(self.free)] for limit in self.limits())
         if ((step[2:] >= low) & (step[2:] <= high)).all():
             return step
-        from scipy.optimize import lsq_linear
-
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-        values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        kept = values > 1e-12 * values[-1]
-        root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
-        target = vectors[:, kept].T @ (gradient / scale) / np.sqrt(values[kept])
         free_law = np.full(2, np.inf)
-        bounds = (np.concatenate([-free_law, low * scale[2:]]), np.concatenate([free_law, high * scale[2:]]))
-        return np.asarray(lsq_linear(root, target, bounds, method="bvls").x / scale)
+        return bounded_step(
+            information, gradient, np.concatenate([-free_law, low]), np.concatenate([free_law, high])
+        )
 
     def jacobian(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> FloatArray:
         columns = []

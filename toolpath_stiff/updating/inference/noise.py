@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Precision
+from toolpath_stiff.updating.inference.minima import bounded_minimum
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -312,8 +313,6 @@ def _drifts(data: Measurements) -> FloatArray:
 
 def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
     """Repeat noise and clamping that make the contrasts most likely, and whether they tell of clamping at all."""
-    from scipy.optimize import minimize_scalar
-
     values, loads = contrasts.values, contrasts.loads
     rest = max(float(contrasts.left @ contrasts.left) - float(loads.sum()), 0.0)
 
@@ -328,8 +327,8 @@ def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
 
     if not contrasts.tells:
         return repeat_at(0.0), 0.0, False
-    best = minimize_scalar(minus_log_likelihood, bounds=(0.0, 5.0), method="bounded")
-    root = float(best.x) if best.fun < minus_log_likelihood(0.0) else 0.0
+    best = bounded_minimum(minus_log_likelihood, 0.0, 5.0)
+    root = best if minus_log_likelihood(best) < minus_log_likelihood(0.0) else 0.0
     return repeat_at(root**2), root * repeat_at(root**2), True
 
 

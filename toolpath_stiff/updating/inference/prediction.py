@@ -130,7 +130,10 @@ class Predictor:
             model.machine.platform_joints is self.base.machine.platform_joints
             and model.machine.frame_joints is self.base.machine.frame_joints
         )
-        path = replace(prepared.path, machine=model.machine) if same_geometry else measured_path(model, prepared.data)
+        if same_geometry:
+            path = replace(prepared.path, machine=model.machine)
+            return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction, prepared.forces))
+        path = measured_path(model, prepared.data)
         return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction))
 
     def _full_path(self) -> LoadPath:
