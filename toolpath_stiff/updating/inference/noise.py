@@ -35,7 +35,10 @@ FloatArray = NDArray[np.float64]
 At = TypeVar("At")  # where a fit stands
 
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
-OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0  # share of wild readings, and how much wider they scatter; assumed
+# Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their
+# share is expected about the assumed one (sd of its logarithm), within the ends.
+OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0
+OUTLIER_SPREAD, OUTLIER_ENDS = 1.5, (0.005, 0.20)
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
 LOW_GUESS, HIGH_GUESS = 0.02, 0.10
@@ -46,7 +49,9 @@ LEAST = 1e-3
 # Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
 # states it, within a third where it is guessed; assumed.
 STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
+CONTRADICTED = 3.3  # standard deviations of the logarithm of their ratio from which repeats overrule a stated noise
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
+MOST_TRIMS = 8
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
@@ -72,6 +77,8 @@ class Noise:
         Degrees of freedom behind `repeat`: how far it is to be trusted.
     origin
         Where the figures come from, a sentence.
+    remark
+        That a stated noise is not what the repeats show; "" where nothing is to be said.
     """
 
     name: str
@@ -83,6 +90,7 @@ class Noise:
     outlier_width: float
     freedom: float
     origin: str
+    remark: str = ""
 
     @property
     def reading(self) -> FloatArray:
@@ -132,26 +140,40 @@ def noise_models(
         A stated noise that cannot be.
     """
 
-    def model(name: str, repeat: FloatArray, clamping: float, freedom: float, origin: str) -> Noise:
+    def model(
+        name: str, repeat: FloatArray, clamping: float, freedom: float, origin: str, wild: float = OUTLIERS,
+        remark: str = "",
+    ) -> Noise:  # fmt: skip
         if repeat.min() < LEAST:
             repeat = np.maximum(repeat, LEAST)
             origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
-        return Noise(name, repeat, clamping, strut_spread, joint_error, OUTLIERS, OUTLIER_WIDTH, freedom, origin)
+        return Noise(
+            name, repeat, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark
+        )
 
     n = len(data)
+    repeats = None if copied(data) else _from_repeats(data)
+    remark = ""
     if stated is not None:
         both = stated if isinstance(stated, tuple) else _shared(stated)
         if not (0.0 < both[0] <= LARGEST and 0.0 <= both[1] <= LARGEST):
             raise InputError(f"a noise of {stated!r}", expected=f"more than 0 and at most {100 * LARGEST:g} %")
-        return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}"),)
-    repeats = None if copied(data) else estimate_from_repeats(data)
+        remark = "" if repeats is None else _disagreement(repeats, both[0], both[1], "noise stated with --noise")
+        if not remark:
+            wild = OUTLIERS if repeats is None else repeats.wild
+            return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}", wild),)
+    relative = data.sd / data.stiffness
+    column = stated is None and not np.isnan(relative).any()
     if repeats is not None:
-        repeat, clamping, freedom, clamps = repeats
-        origin = f"estimated from {freedom} differences between repeats: {_percent(repeat, clamping)}"
-        origin += "" if clamps else " (clamping assumed: no point was clamped twice)"
-        return (model("measured", np.full(n, repeat), clamping, float(freedom), origin),)
-    if not np.isnan(data.sd).any():
-        relative = data.sd / data.stiffness
+        if column:
+            total = float(np.sqrt(np.mean(relative**2)))
+            remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file")
+        origin = f"estimated from {repeats.freedom} differences between repeats: "
+        origin += _percent(repeats.repeat, repeats.clamping)
+        origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
+        repeat = np.full(n, repeats.repeat)
+        return (model("measured", repeat, repeats.clamping, float(repeats.freedom), origin, repeats.wild, remark),)
+    if column:
         clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
         repeat = np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2))
         origin = (
@@ -166,6 +188,25 @@ def noise_models(
         origin = f"a {name} guess, {_percent(*both)}: {why}"
         guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
     return tuple(guesses)
+
+
+def _disagreement(repeats: _Repeats, repeat: float, clamping: float, what: str) -> str:
+    """That repeats contradict a stated noise, in a sentence; "" where they do not.
+
+    Both are estimates: the stated one to `STATED_FREEDOM`, the repeats' to theirs (sd of a ratio's logarithm).
+    """
+    told, found = repeat, repeats.repeat
+    if repeats.clamps:
+        told, found = float(np.hypot(repeat, clamping)), float(np.hypot(repeats.repeat, repeats.clamping))
+    ratio = found / told
+    sd = np.sqrt(0.5 / STATED_FREEDOM + 0.5 / repeats.freedom)
+    if abs(np.log(ratio)) < CONTRADICTED * sd:
+        return ""
+    small = ratio > 1.0
+    return (
+        f"the {what} is too {'small' if small else 'large'}: {100 * told:.2g} %, where {repeats.freedom} differences "
+        f"between repeats scatter {ratio:.2g} times as much; what the repeats show is used instead"
+    )
 
 
 def _shared(total: float) -> tuple[float, float]:
@@ -204,30 +245,73 @@ def copied(data: Measurements) -> bool:
     return bool(again.any() and (data.stiffness == data.stiffness[first][groups])[again].all())
 
 
+@dataclass(frozen=True)
+class _Repeats:
+    """What repeats tell: relative sds, degrees of freedom, whether clamping was estimated, share of wild readings."""
+
+    repeat: float
+    clamping: float
+    freedom: int
+    clamps: bool
+    wild: float
+
+
 def estimate_from_repeats(data: Measurements) -> tuple[float, float, int, bool] | None:
     """(repeat, clamping, degrees of freedom, whether clamping was estimated) from repeats, or None without enough.
 
     What differs between repeats beside chance, the time since zeroing and the order, is projected out first, so that
-    a drift is not taken for noise. Differences beyond `WILD` standard deviations are set aside as wild.
+    a drift is not taken for noise. Differences beyond `WILD` standard deviations are set aside as wild; what that
+    leaves of the scatter, and the share of wild readings, are those of the mixture that makes all differences likeliest.
     """
+    found = _from_repeats(data)
+    return None if found is None else (found.repeat, found.clamping, found.freedom, found.clamps)
+
+
+def _from_repeats(data: Measurements) -> _Repeats | None:
     groups = repeat_groups(data)
-    kept = np.bincount(groups)[groups] > 1
+    every = kept = np.bincount(groups)[groups] > 1
+    kept = kept.copy()
     result = None
-    for _ in range(4):
+    for _ in range(MOST_TRIMS):
         if not kept.any():
-            return result
+            break
         contrasts = _Contrasts.of(data.select(kept), groups[kept])
         if contrasts.count < FEWEST_CONTRASTS:
-            return result
+            break
         repeat, clamping, found = _maximum_likelihood(contrasts)
-        result = (repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found)
-        wild = contrasts.deviations(*result[:2]) > WILD
+        result = _Repeats(repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found, OUTLIERS)
+        wild = contrasts.deviations(result.repeat, result.clamping) > WILD
         if not wild.any():
-            return result
+            break
         indices = np.flatnonzero(kept)
         kept[indices[wild]] = False
         kept &= np.bincount(groups, weights=kept, minlength=groups.max() + 1)[groups] > 1
-    return result
+    if result is None:
+        return None
+    whole = _Contrasts.of(data.select(every), groups[every])
+    factor, share = _mixture(whole.deviations(result.repeat, result.clamping), np.bincount(groups)[groups[every]])
+    return replace(result, repeat=factor * result.repeat, wild=share)
+
+
+def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, float]:
+    """Factor on the scatter, and share of wild readings, that make deviations (n,) of repeats likeliest.
+
+    A reading's deviation from the others of its group of `size` (n,) is wild with itself or with one of them; for pairs
+    that is exact. Each group counts with its degrees of freedom.
+    """
+    squared, wide = deviations[:, None, None] ** 2, OUTLIER_WIDTH**2
+    factors = np.linspace(0.6, 1.3, 71)[:, None]
+    shares = np.geomspace(*OUTLIER_ENDS, 60)
+    own = 1.0 - 1.0 / size[:, None, None]  # of the variance of a deviation
+    total = np.zeros(np.broadcast_shapes(squared.shape, factors.shape, shares.shape))
+    for mine, chance in ((wide, shares), (1.0, 1.0 - shares)):
+        for others, odds in ((wide, shares), (1.0, 1.0 - shares)):
+            sd = factors * np.sqrt(own * mine + (1.0 - own) * others)
+            total = total + chance * odds * np.exp(-0.5 * squared / sd**2) / sd
+    logs = (np.log(np.maximum(total, 1e-300)) * own).sum(axis=0)
+    logs = logs - 0.5 * (np.log(shares / OUTLIERS) / OUTLIER_SPREAD) ** 2
+    at = np.unravel_index(int(np.argmax(logs)), logs.shape)
+    return float(factors[at[0], 0]), float(shares[at[1]])
 
 
 @dataclass(frozen=True)
@@ -336,7 +420,8 @@ def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
 #
 # The scatter of the readings, with wild ones found out fit by fit.
 
-MOST_WILD = 0.05  # share of readings that may be taken for wild
+MOST_WILD = 0.05  # share of readings that may be taken for wild; more where more of them are
+OFTEN_WILD = 2.0  # times the expected share
 NEVER = 1e12  # price of a wild reading where there are none
 
 
@@ -354,19 +439,27 @@ class Scatter:
         Minus the log odds of a reading being wild.
     wild
         Readings taken for wild.
+    beyond
+        Squared deviation beyond which a reading's widening pays that price.
+    most
+        Share of readings that may be taken for wild.
     """
 
     covariance: Covariance
     widening: FloatArray
     price: float
     wild: tuple[int, ...] = ()
+    beyond: float = np.inf
+    most: float = MOST_WILD
 
     @classmethod
     def of(cls, noise: Noise, covariance: Covariance) -> Scatter:
         """From a noise model and its covariance."""
         widening = (noise.outlier_width**2 - 1.0) * noise.repeat**2
         price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
-        return cls(covariance, widening, float(price))
+        wide = noise.outlier_width**2
+        beyond = (2.0 * price + np.log(wide)) * wide / (wide - 1.0)
+        return cls(covariance, widening, float(price), (), float(beyond), max(MOST_WILD, OFTEN_WILD * noise.outliers))
 
     @property
     def precision(self) -> Precision:
@@ -381,7 +474,7 @@ class Scatter:
         """
         diagonal, wild = self.precision.diagonal, list(self.wild)
         pull = self.precision.times(residual)
-        most = int(MOST_WILD * len(residual)) + 1
+        most = int(self.most * len(residual)) + 1
         taken = np.zeros((most, len(residual)))  # the inverse falls by row^T row of each
         for k in range(most):
             own = 1.0 + self.widening * diagonal
