@@ -21,9 +21,9 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
-from multiprocessing import Pool
 from pathlib import Path
 
+from benchmarks.case_loop import case_loop, read_records
 from benchmarks.diagnosis_bars import FLOOR_PERCENT, Figure, Record, figures, middle_of
 from benchmarks.diagnosis_cases import PLANNED_CASES, Job, make_jobs, run
 from benchmarks.diagnosis_tables import (
@@ -49,49 +49,37 @@ CPU_RUNS = 5
 
 def run_all(jobs: Sequence[Job], workers: int, into: Path) -> list[Record]:
     """Diagnose all cases, then plan for the ambiguous ones; each record is written as it comes."""
-    into.parent.mkdir(parents=True, exist_ok=True)
     # The longest cases first, so that no worker is left with one at the end.
     first = sorted(jobs, key=lambda job: (job.layout != "tilted", job.group not in ("outside", "two")))
-    records: list[Record] = []
-    with Pool(workers) as pool, into.open("w", encoding="utf-8") as stream:
-
-        def collect(name: str, some: Sequence[Job]) -> None:
-            for count, record in enumerate(pool.imap_unordered(run, some, chunksize=1), 1):
-                records.append(record)
-                stream.write(json.dumps(record) + "\n")
-                stream.flush()
-                if count % 10 == 0 or count == len(some):
-                    print(f"{name}: {count} of {len(some)}", file=sys.stderr, flush=True)
-
-        collect("diagnosed", first)
+    with case_loop(workers, into) as collect:
+        records = collect("diagnosed", run, first)
         open_ones = {r["seed"] for r in records if r["layout"] == "tilted" and r["group"] == "one" and _ambiguous(r)}
         again = [j for j in jobs if j.layout == "tilted" and j.group == "one" and j.seed in open_ones]
-        collect("planned", [replace(job, plan=True) for job in again[:PLANNED_CASES]])
-        for record in cpu_records(CPU_RUNS, min((j.seed for j in jobs), default=0)):
-            records.append(record)
-            stream.write(json.dumps(record) + "\n")
-    return records
+        records += collect("planned", run, [replace(job, plan=True) for job in again[:PLANNED_CASES]])
+    seed = min((j.seed for j in jobs), default=0)
+    # After the others, one at a time: what is measured is the command's own time on a free machine.
+    commands = [command_record(seed, k) for k in range(CPU_RUNS)]
+    with into.open("a", encoding="utf-8") as stream:
+        stream.writelines(json.dumps(record) + "\n" for record in commands)
+    return records + commands
 
 
 def _ambiguous(record: Record) -> bool:
     return record.get("verdict") == "ambiguous"
 
 
-def cpu_records(runs: int, seed: int) -> list[Record]:
+def command_record(seed: int, k: int) -> Record:
     """CPU time of the whole command, pictures and page included, on 288 rows of which nothing or one is hidden."""
-    found = []
     with tempfile.TemporaryDirectory() as folder:
-        for k in range(runs):
-            hidden = "none" if k % 2 else "one"
-            file = Path(folder) / f"case_{k}.csv"
-            file.write_text(rig.csv_text(rig.make_case(seed + k, "tilted", hidden=hidden)[0]), encoding="utf-8")
-            command = [sys.executable, "-m", "toolpath_stiff", "diagnose", str(file), "--out", f"{folder}/out_{k}"]
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-            found.append({"group": "command", "layout": "tilted", "seed": seed + k, "hidden": hidden, "cpu": cpu})
-    return found
+        hidden = "none" if k % 2 else "one"
+        file = Path(folder) / f"case_{k}.csv"
+        file.write_text(rig.csv_text(rig.make_case(seed + k, "tilted", hidden=hidden)[0]), encoding="utf-8")
+        command = [sys.executable, "-m", "toolpath_stiff", "diagnose", str(file), "--out", f"{folder}/out_{k}"]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {"group": "command", "layout": "tilted", "seed": seed + k, "hidden": hidden, "cpu": cpu}
 
 
 def cpu_figures(records: Sequence[Record]) -> list[Figure]:
@@ -182,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, help="write the tables to this file as well")
     args = parser.parse_args(arguments)
     if args.table_only:
-        records = [json.loads(line) for line in args.records.read_text(encoding="utf-8").splitlines()]
+        records = read_records(args.records)
     else:
         jobs = make_jobs(args.first_seed, args.each, args.none, args.outside, args.two, args.misstated)
         records = run_all(jobs, args.jobs, args.records)

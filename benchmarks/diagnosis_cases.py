@@ -19,7 +19,7 @@ from toolpath_stiff.machine import Machine, load_machine
 from toolpath_stiff.rig.case import again
 from toolpath_stiff.rig.exercise import read_plan
 from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
-from toolpath_stiff.updating.diagnosis.document import document
+from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument, document
 from toolpath_stiff.updating.measurements import read_measurements
 from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
 from toolpath_stiff.updating.planning.document import plan_csv, plan_rows
@@ -105,13 +105,20 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     rows, truth = rig.make_case(job.seed, job.layout, hidden=job.hidden)
     if job.factor != 1.0:
         rows["sd_N_per_mm"] = rows["sd_N_per_mm"] * job.factor
+    return _heading(job) | judged(rows, truth, folder)[0]
+
+
+def judged(
+    rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: Any
+) -> tuple[dict[str, Any], DiagnosisDocument]:
+    """Truth, verdict and probabilities of a case as a record, and the whole document; `stated` goes to `diagnose`."""
     file = folder / "measurements.csv"
     file.write_text(rig.csv_text(rows), encoding="utf-8")
     start = time.process_time()
-    diagnosis = diagnose(machine(), read_measurements(file, machine()), plan_next=False)
+    diagnosis = diagnose(machine(), read_measurements(file, machine()), plan_next=False, **stated)
     found = document(diagnosis)
     cpu = time.process_time() - start
-    record = _heading(job) | {
+    record = {
         "truth": truth["hidden"],
         "kind": truth["kind"],
         "effects": truth["effects"],
@@ -124,10 +131,10 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     }
     if truth["kind"] == "one":
         record |= _right_effect(found, truth["effects"][0])
-    return record
+    return record, found
 
 
-def _right_effect(found: dict[str, Any], hidden: dict[str, Any]) -> dict[str, Any]:
+def _right_effect(found: DiagnosisDocument, hidden: dict[str, Any]) -> dict[str, Any]:
     """How the effect that was hidden fares: place, errors, adequacy, and whether its intervals hold the truth."""
     names = [candidate["effect"] for candidate in found["candidates"]]
     if hidden["effect"] not in names:

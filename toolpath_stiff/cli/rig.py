@@ -42,7 +42,9 @@ def rig_arguments(parser: argparse.ArgumentParser) -> None:
     )
     new.add_argument("--at", metavar="PLAN.csv", help="poses of layout campaign: measurement file without stiffness")
     new.add_argument(
-        "--hidden", metavar="WHAT", help="none, one, two, outside, or NAME[,NAME]; default: drawn blindly from the seed"
+        "--hidden",
+        metavar="WHAT",
+        help="none, one, two, three, outside, or NAME[,NAME]; default: drawn blindly from the seed",
     )
     new.add_argument("--noise", type=float, default=2.0, metavar="PERCENT", help="repeat noise of a reading; default 2")
     add_replace_option(new)

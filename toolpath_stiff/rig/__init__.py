@@ -12,10 +12,12 @@ from toolpath_stiff.rig.case import Case, draw_case, effects_of_layout, make_cas
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text, measure_again, new_exercise, reveal
 from toolpath_stiff.rig.hidden import OUTSIDE, Nuisances
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 __all__ = [
     "CATALOGUE",
     "OUTSIDE",
+    "UNKNOWNS",
     "Case",
     "Nuisances",
     "csv_text",

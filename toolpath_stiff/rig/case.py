@@ -26,13 +26,14 @@ from toolpath_stiff.rig.hidden import (
     OUTSIDE,
     HiddenMachine,
     Nuisances,
-    Rows,
     disturb_machine,
     disturb_readings,
     reading_sd,
     readings,
 )
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, reachable
+from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 Table = dict[str, Any]
@@ -177,6 +178,7 @@ def rows_of(table: Mapping[str, Any], elapsed: FloatArray | None = None) -> Rows
         time=s_from_min(column("time_min", 0.0)),
         elapsed=np.linspace(0.0, 1.0, n) if elapsed is None else elapsed,
         setup=np.array(table["setup"] if "setup" in table else [DEFAULT_SETUP] * n, dtype=np.str_),
+        temperature=column("temperature_C", ROOM_TEMPERATURE),
     )
 
 
@@ -202,7 +204,8 @@ class Case:
         Measurement table in shop units, in measuring order.
     truth
         What was hidden: `hidden` (names; empty if nothing), `kind`, `effects` with parameters in shop units,
-        their `size` (rms change of ln stiffness) and `detectability` (see `effects.DETECTABLE`).
+        their `size` (rms change of ln stiffness) and `detectability` (see `effects.DETECTABLE`); of an unknown also
+        `links` and `variables`, what a description may name.
     nominal, machine, nuisances
         To measure the same machine again.
     """
@@ -227,7 +230,7 @@ def make_case(
     noise: float = 0.02,
     machine: str | Nominal = defaults.MACHINE,
     plan: Mapping[str, Any] | None = None,
-    size: float | None = None,
+    size: float | Sequence[float] | None = None,
     nuisances: Nuisances | None = None,
 ) -> tuple[Table, dict[str, Any]]:
     """Rows of a blind campaign and their truth; the same arguments give the same rows.
@@ -239,7 +242,8 @@ def make_case(
     layout
         `paper` (42 rows), `tilted` (288 rows) or `campaign` (the rows of `plan`).
     hidden
-        None: drawn blindly; `none`, `one`, `two`, `outside`; or names of effects (oddities included).
+        None: drawn blindly; `none`, `one`, `two`, `three`, `outside`, `unknown`; or names of effects (oddities and
+        unknowns included). An unknown is never drawn where nothing is said.
     noise
         Relative repeat noise of one reading.
     machine
@@ -247,7 +251,8 @@ def make_case(
     plan
         Table of poses in shop units without stiffness.
     size
-        Rms change of ln stiffness that each effect makes, instead of a draw; less where its bound is reached.
+        Rms change of ln stiffness that each effect makes, instead of a draw; less where its bound is reached. Several:
+        one for each effect, in the order of `truth["hidden"]`.
     nuisances
         Instead of the standard ones; `noise` is then not used.
 
@@ -267,7 +272,7 @@ def draw_case(
     noise: float = 0.02,
     machine: str | Nominal = defaults.MACHINE,
     plan: Mapping[str, Any] | None = None,
-    size: float | None = None,
+    size: float | Sequence[float] | None = None,
     nuisances: Nuisances | None = None,
 ) -> Case:
     """As `make_case`, with the machine itself."""
@@ -285,18 +290,18 @@ def draw_case(
     true, effects = HiddenMachine(), []
     if names:
         scale = scale_of(nominal, rows, clamp_of(table), nuisances)
-        for name in names:
+        for name, wanted in zip(names, _sizes(size, len(names)), strict=True):
             # A stream of its own for each effect: sizes of different effects of one seed have nothing in common.
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
-            parameters, found = scale.draw(name, size, rng)
+            parameters, found = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
-            effects.append({"effect": name, "parameters": parameters, **found})
+            effects.append({"effect": name, "parameters": parameters, **found, **_looks(name)})
     true = disturb_machine(true, nuisances, streams["machine"])
     measured = measure(nominal, true, table, rows, nuisances, streams["noise"], stated_sd=layout == "paper")
-    outside = any(name in OUTSIDE for name in names)
+    outside = any(name in (*OUTSIDE, *UNKNOWNS) for name in names)
     truth = {
         "hidden": list(names),
-        "kind": "outside" if outside else ("none", "one", "two")[min(len(names), 2)],
+        "kind": "outside" if outside else ("none", "one", "two", "three")[min(len(names), 3)],
         "effects": effects,
     }
     return Case(measured, truth, nominal, true, nuisances)
@@ -360,6 +365,15 @@ def _campaign(layout: str, nominal: Nominal, plan: Mapping[str, Any] | None, rng
         ) from None
 
 
+def _sizes(size: float | Sequence[float] | None, count: int) -> tuple[float | None, ...]:
+    """The size wanted of each of `count` effects."""
+    if size is None or isinstance(size, (int, float)):
+        return (size,) * count
+    if len(size) != count:
+        raise InputError(f"{len(size)} sizes for {count} hidden effects", expected="one size, or one for each effect")
+    return tuple(size)
+
+
 def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator) -> tuple[str, ...]:
     """Names of what is hidden."""
     if hidden is None:
@@ -369,19 +383,21 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
         return ()
     if hidden == "one":
         return (str(rng.choice(known)),)
-    if hidden == "two":
-        first, second = rng.choice(len(known), size=2, replace=False)
-        return (known[first], known[second])
+    if hidden in ("two", "three"):
+        return tuple(known[i] for i in rng.choice(len(known), size=2 if hidden == "two" else 3, replace=False))
+    if hidden == "unknown":
+        return (str(rng.choice([name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)])),)
     if hidden == "outside":
         return (str(rng.choice(list(ODDITIES) if layout == "paper" else list(OUTSIDE))),)
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
+    all_names = (*CATALOGUE, *OUTSIDE, *UNKNOWNS)
     for name in names:
-        if name not in (*CATALOGUE, *OUTSIDE):
+        if name not in all_names:
             raise InputError(
                 f"nothing called {name!r} to hide",
-                expected=f"none, one, two, outside, or of {', '.join((*CATALOGUE, *OUTSIDE))}",
+                expected=f"none, one, two, three, outside, unknown, or of {', '.join(all_names)}",
             )
-    if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
+    if len(set(names)) < len(names) or sum(name in (*OUTSIDE, *UNKNOWNS) for name in names) > 1:
         raise InputError(
             f"hidden effects {', '.join(names)}", expected="each once, and at most one outside the catalogue"
         )
@@ -389,4 +405,16 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
         raise InputError(
             "thermal_drift needs the column time_min", expected="layout tilted, or a plan with that column"
         )
+    for name in names:
+        if lacking := [c for c in (UNKNOWNS[name].columns if name in UNKNOWNS else ()) if c not in table]:
+            raise InputError(
+                f"{name} needs the column {', '.join(lacking)}", expected="layout tilted, or a plan with that column"
+            )
     return names
+
+
+def _looks(name: str) -> dict[str, Any]:
+    """What an unknown looks like from outside: the links that could do it and what it varies with."""
+    if name not in UNKNOWNS:
+        return {}
+    return {"links": sorted(UNKNOWNS[name].links), "variables": sorted(UNKNOWNS[name].variables)}

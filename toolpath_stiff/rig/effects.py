@@ -18,8 +18,10 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, Oddity, Rows, readings
+from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, Oddity, readings
 from toolpath_stiff.rig.nominal import Nominal
+from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.unknowns import UNKNOWNS, Unknown
 from toolpath_stiff.units import m_from_mm, m_from_um, per_s_from_per_min
 
 Parameters = dict[str, Any]
@@ -43,6 +45,7 @@ ODDITY_LIMITS = {
 }
 
 LARGEST = 0.30  # rms change of ln stiffness
+UNKNOWN_SIZES = (0.04, 0.15)  # rms change of ln stiffness that an unknown is drawn with, log-uniform
 LARGEST_SINGLE = 1.0  # change of one reading: whoever reads nearly three times the others throws it away (assumed)
 # Whitened length of an effect's signature, beside strut law and nuisances, that is found with 80 % power at 5 %
 # among some twenty candidates: z(1 - 0.0025/2) + z(0.8) = 3.02 + 0.84 (normal quantiles, Bonferroni).
@@ -92,7 +95,7 @@ def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> P
         case "cable_drag" | "strut_crosstalk":
             return {"sign": _signs(rng)}
         case _:
-            return {}
+            return UNKNOWNS[name].shape(rng) if name in UNKNOWNS else {}
 
 
 def at_strength(name: str, shape: Mapping[str, Any], strength: float) -> Parameters:
@@ -132,7 +135,8 @@ def at_strength(name: str, shape: Mapping[str, Any], strength: float) -> Paramet
             return {"rate": 20.0 * strength * sign}
         case _:
             own = {key: value for key, value in shape.items() if key != "sign"}
-            return {**own, "size": ODDITY_LIMITS[name] * strength * sign}
+            limit = UNKNOWNS[name].limit if name in UNKNOWNS else ODDITY_LIMITS[name]
+            return {**own, "size": limit * strength * sign}
 
 
 Change = Callable[[HiddenMachine, Mapping[str, Any]], dict[str, Any]]
@@ -177,6 +181,8 @@ def with_effect(hidden: HiddenMachine, name: str, parameters: Mapping[str, Any])
     """The machine with one more effect; parameters in shop units by the catalogue's names."""
     if name in CATALOGUE:
         return dataclasses.replace(hidden, **CATALOGUE[name](hidden, parameters))
+    if name in UNKNOWNS:
+        return dataclasses.replace(hidden, unknown=Unknown(name, parameters["size"], dict(parameters)))
     return dataclasses.replace(hidden, oddity=Oddity(kind=name, **parameters))
 
 
@@ -206,8 +212,10 @@ class Scale:
         rms, seen = _rms(change), self._detectability(change)
         if size is None:
             # To first order both grow in proportion to the strength.
-            smallest = min(max(rms * DETECTABLE / max(seen, 1e-12), 1e-4), LARGEST)
-            size = smallest * (LARGEST / smallest) ** fraction
+            smallest, largest = min(max(rms * DETECTABLE / max(seen, 1e-12), 1e-4), LARGEST), LARGEST
+            if name in UNKNOWNS:
+                smallest, largest = UNKNOWN_SIZES
+            size = smallest * (largest / smallest) ** fraction
         strength, change = self._reach(name, shape, size, start=strength)
         parameters = {
             key: float(f"{value:.4g}") if isinstance(value, float) else value

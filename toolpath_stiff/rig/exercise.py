@@ -31,6 +31,7 @@ from toolpath_stiff.rig.case import AXES, DEFAULT_SETUP, POSE, Case, Table, agai
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.hidden import OUTSIDE, HiddenMachine, Nuisances, Oddity
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
+from toolpath_stiff.rig.unknowns import UNKNOWNS, Unknown
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 MAGIC = b"tps-rig-sealed-1\n"
@@ -66,6 +67,8 @@ def seal(case: Case, seed: int, layout: str) -> bytes:
     }
     if case.machine.oddity is not None:
         machine["oddity"] = dataclasses.asdict(case.machine.oddity)
+    if case.machine.unknown is not None:
+        machine["unknown"] = dataclasses.asdict(case.machine.unknown)
     content = {
         "seed": seed,
         "layout": layout,
@@ -102,6 +105,8 @@ def unseal(file: str | Path) -> tuple[Case, dict[str, Any]]:
     machine["spindle"] = tuple(sealed["machine"]["spindle"])
     if sealed["machine"]["oddity"] is not None:
         machine["oddity"] = Oddity(**sealed["machine"]["oddity"])
+    if sealed["machine"].get("unknown") is not None:
+        machine["unknown"] = Unknown(**sealed["machine"]["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
     case = Case({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"]))
     return case, sealed
@@ -123,7 +128,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     claimed = {name for name in claim if name not in ("none", "adequate")}
     truth = set(hidden)
     if claimed & {"outside", "unexplained"}:
-        claimed = (claimed - {"outside", "unexplained"}) | ((truth & set(OUTSIDE)) or {"outside"})
+        claimed = (claimed - {"outside", "unexplained"}) | ((truth & {*OUTSIDE, *UNKNOWNS}) or {"outside"})
     if not truth:
         return "wrong" if claimed else "correctly none"
     if claimed == truth:
@@ -301,7 +306,7 @@ def measure_again(folder: str | Path, plan_file: str, out: str | Path, visit: in
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
-    known = ("none", "adequate", "outside", "unexplained", *CATALOGUE, *OUTSIDE)
+    known = ("none", "adequate", "outside", "unexplained", *CATALOGUE, *OUTSIDE, *UNKNOWNS)
     for name in claims:
         if name not in known:
             raise InputError(f"a claim {name!r}", expected=f"one or several of {', '.join(known)}")

@@ -14,14 +14,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
 
-from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, platform_points, rotations, true_poses
+from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Geometry, Links, secant_compliance
+from toolpath_stiff.rig.unknowns import UNKNOWNS, State, Unknown
 from toolpath_stiff.units import n_per_m_from_n_per_mm, n_per_mm_from_n_per_m
 
 REACH = 0.3  # m, half the width of the workspace that the paper measured
@@ -124,42 +126,6 @@ def reading_factor(odd: Oddity | None, rows: Rows) -> FloatArray:
     return factor
 
 
-@dataclass(frozen=True)
-class Rows:
-    """n rows of a campaign, SI.
-
-    Attributes
-    ----------
-    position, angles
-        (n, 3) m and rad: commanded tool tip; roll, pitch, yaw.
-    direction
-        (n, 3) unit vectors of the load.
-    force
-        (n,) N.
-    extension
-        (n,) m, tool longer than the reference tool.
-    time
-        (n,) s since the indicator was zeroed.
-    elapsed
-        (n,) 0 at the beginning of the campaign, 1 at its end.
-    setup
-        (n,) name of the clamping arrangement.
-    """
-
-    position: FloatArray
-    angles: FloatArray
-    direction: FloatArray
-    force: FloatArray
-    extension: FloatArray
-    time: FloatArray
-    elapsed: FloatArray
-    setup: TextArray
-
-    def take(self, index: IntArray) -> Rows:
-        """Some of the rows."""
-        return Rows(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
-
-
 def _zeros(*shape: int) -> FloatArray:
     return np.zeros(shape)
 
@@ -198,8 +164,8 @@ class HiddenMachine:
         `X`, `Y`, `Z` or the name of a set-up, whose readings are multiplied.
     drift
         m/s of the indicator.
-    oddity
-        Something outside the catalogue.
+    oddity, unknown
+        Something outside the catalogue: one of the oddities here, or one of `unknowns`.
     """
 
     frame_errors: FloatArray = field(default_factory=lambda: _zeros(6, 3))
@@ -224,13 +190,17 @@ class HiddenMachine:
     gauge_factor: float = 1.0
     drift: float = 0.0
     oddity: Oddity | None = None
+    unknown: Unknown | None = None
 
 
 def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m that the gauge and the indicator show, before noise: k = factor F / (F / k_true + drift t)."""
     stiffness = true_stiffness(nominal, hidden, rows)
     shown = rows.force / (rows.force / stiffness + hidden.drift * rows.time)
-    return np.asarray(shown * _gauge(hidden, rows) * reading_factor(hidden.oddity, rows))
+    shown = shown * _gauge(hidden, rows) * reading_factor(hidden.oddity, rows)
+    if hidden.unknown is not None and (read := UNKNOWNS[hidden.unknown.kind].read) is not None:
+        shown = shown * read(rows, hidden.unknown)
+    return np.asarray(shown)
 
 
 def true_stiffness(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
@@ -248,6 +218,9 @@ def _distinct(hidden: HiddenMachine, rows: Rows) -> tuple[IntArray, IntArray]:
         states.append(rows.force[:, None])
     if odd == "warming_leg":
         states.append(rows.elapsed[:, None])
+    if hidden.unknown is not None:
+        varies = UNKNOWNS[hidden.unknown.kind].varies
+        states += [np.asarray(getattr(rows, name), dtype=float)[:, None] for name in varies]
     _, first, which = np.unique(np.concatenate(states, axis=1), axis=0, return_index=True, return_inverse=True)
     return first, which.ravel()
 
@@ -267,6 +240,8 @@ def _stiffness_row_by_row(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -
         rocking=hidden.rocking,
         setup=np.where((rows.setup == hidden.setup)[:, None] & bool(hidden.setup), hidden.setup_compliance, 0.0),
     )
+    if hidden.unknown is not None and (act := UNKNOWNS[hidden.unknown.kind].act) is not None:
+        links = act(links, State(nominal, rows, lengths, place), hidden.unknown)
     return np.asarray(1.0 / secant_compliance(place, links, rows.direction, rows.force))
 
 
@@ -275,6 +250,8 @@ def _true_geometry(
 ) -> Geometry:
     """Where joints and tip are when struts of the commanded lengths carry the true platform on the true frame."""
     frame = nominal.frame_joints + hidden.frame_errors
+    if hidden.unknown is not None and (move := UNKNOWNS[hidden.unknown.kind].move) is not None:
+        frame = frame + move(hidden.unknown)
     platform = nominal.platform_joints + hidden.platform_errors
     radius = np.linalg.norm(nominal.platform_joints[:, :2], axis=1, keepdims=True)
     platform[:, :2] *= 1.0 + hidden.radius_error / radius

@@ -254,7 +254,7 @@ def reachable(nominal: Nominal, tips: FloatArray, angles: FloatArray, extension:
     if nominal.swing is None:
         return np.asarray(inside)
     rest, moved = (
-        _strut_directions(nominal, *pose)
+        strut_directions(nominal, *pose)
         for pose in (
             (nominal.neutral_pose[None, :3], rotations(nominal.neutral_pose[None, 3:]), np.zeros(1)),
             (tips, turned, extension),
@@ -266,7 +266,7 @@ def reachable(nominal: Nominal, tips: FloatArray, angles: FloatArray, extension:
     return np.asarray(inside)
 
 
-def _strut_directions(
+def strut_directions(
     nominal: Nominal, tips: FloatArray, turned: FloatArray, extension: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Unit vectors (n, 6, 3) along the struts in base axes and in platform axes."""

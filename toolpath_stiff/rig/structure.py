@@ -18,6 +18,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 
+BARS = 19  # of the platform truss (the paper's Figure 2b)
 HUB, TIP = 6, 7  # nodes of the platform truss after its six joints
 SECANT_STEPS = 60
 SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two steps
@@ -57,9 +58,9 @@ class Links:
     joints
         Secant compliance (n, 6) m/N along the struts from strut forces (n, 6) N (tension positive).
     moment
-        N m/rad, rotational spring at both ends of every strut.
+        N m/rad, rotational spring at both ends of every strut; (n, 6) where struts and rows differ.
     bars
-        N/m, bars of the platform truss; inf is rigid.
+        N/m, bars of the platform truss; inf is rigid; (19,) where they differ, in the order of `truss_bars`.
     spindle
         (n, 3) m/N in platform axes.
     vertices
@@ -70,23 +71,31 @@ class Links:
         rad/(N m), of the table about the base frame's x and y axes through its origin.
     setup
         (n, 3) m/N along base axes.
+    loose
+        What the vertices give beside `vertices`, (n, vertices, 2) m/N, from strut forces (n, 6) N.
+    ends
+        Further links between tool and work that carry the whole load: lever (n, 3) and compliance (n,) each. A unit
+        load along d puts d . lever on such a link (a force, or a torque where the lever is in m), and the tip moves
+        along d by that times the compliance times d . lever.
     """
 
     struts: FloatArray
     joints: Callable[[FloatArray], FloatArray]
-    moment: float
-    bars: float
+    moment: float | FloatArray
+    bars: float | FloatArray
     spindle: FloatArray
     vertices: FloatArray
     table: FloatArray
     rocking: float
     setup: FloatArray
+    loose: Callable[[FloatArray], FloatArray] | None = None
+    ends: tuple[tuple[FloatArray, FloatArray], ...] = ()
 
 
 def secant_compliance(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> FloatArray:
     """(n,) m/N between tool and workpiece along unit vectors `direction` (n, 3) under loads `force` (n,) N."""
     stretch, platform_springs, platform_dofs = _struts(place, links)
-    load = _load_vector(place, direction, platform_dofs)
+    load = _load_vector(place, links, direction, platform_dofs)
     give = _give(place, links)
     n, size = load.shape
     fixed = platform_springs + np.einsum("nai,nab,nbj->nij", stretch, links.struts, stretch)
@@ -95,6 +104,9 @@ def secant_compliance(place: Geometry, links: Links, direction: FloatArray, forc
     compliance = np.zeros(n)
     for _ in range(SECANT_STEPS):
         give[:, :6] = links.joints(forces)
+        if links.loose is not None:
+            extra = links.vertices + links.loose(forces)
+            give[:, 6 : 6 + links.vertices.size] = extra.reshape(n, -1)
         held = np.ones((n, size))
         held[:, first:] = give > 0.0
         springs = np.zeros((n, size))
@@ -119,11 +131,11 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
     unit = strut / length[:, :, None]
     nodes = _nodes(place)
     rigid = _rigid_motions(nodes - place.work_point[:, None, :])  # (n, 24, 6)
-    flexible = np.isfinite(links.bars)
+    flexible = bool(np.isfinite(links.bars).all())
     motion = np.broadcast_to(np.eye(24), (n, 24, 24)) if flexible else rigid
     dofs = motion.shape[2]
     vertex_count = len(links.vertices)
-    size = dofs + _give_size(vertex_count)
+    size = dofs + _give_size(vertex_count, len(links.ends))
     # Displacement of the platform end minus that of the frame end, base axes, per unknown.
     relative = np.zeros((n, 6, 3, size))
     relative[..., :dofs] = motion[:, :18].reshape(n, 6, 3, dofs)
@@ -135,18 +147,21 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
     stretch[:, range(6), range(dofs, dofs + 6)] = -1.0  # what the joints take is not left for the strut
     springs = np.zeros((n, size, size))
     if flexible:
-        springs[:, :dofs, :dofs] = links.bars * _truss(nodes)
-    if links.moment > 0.0:
+        springs[:, :dofs, :dofs] = _truss(nodes, np.broadcast_to(links.bars, (BARS,)))
+    if np.any(np.asarray(links.moment) > 0.0):
         # Rotation of the platform: the rigid motion that follows its joints best; exact when it is rigid.
         follow = np.linalg.pinv(rigid[:, :18])[:, 3:]  # (n, 3, 18)
         platform_turn = np.zeros((n, 3, size))
         platform_turn[..., :dofs] = follow @ motion[:, :18]
-        springs += links.moment * _end_rotations(unit, length, relative, platform_turn)
+        moment = np.broadcast_to(links.moment, (n, 6))
+        springs += _end_rotations(unit, length, relative, platform_turn, moment)
     return stretch, springs, dofs
 
 
-def _end_rotations(unit: FloatArray, length: FloatArray, relative: FloatArray, platform_turn: FloatArray) -> FloatArray:
-    """(n, N, N) for unit springs: sum of squares of the strut's rotations against frame and platform, spin left out.
+def _end_rotations(
+    unit: FloatArray, length: FloatArray, relative: FloatArray, platform_turn: FloatArray, moment: FloatArray
+) -> FloatArray:
+    """(n, N, N) for springs `moment` (n, 6): squares of the struts' rotations against frame and platform, without spin.
 
     A strut that stays straight turns by u x (displacement of its ends) / L; its spin about u meets no resistance.
     """
@@ -154,8 +169,8 @@ def _end_rotations(unit: FloatArray, length: FloatArray, relative: FloatArray, p
     across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
     at_platform = strut_turn - across @ platform_turn[:, None]
     return np.asarray(
-        np.einsum("nkci,nkcj->nij", strut_turn, strut_turn, optimize=True)
-        + np.einsum("nkci,nkcj->nij", at_platform, at_platform, optimize=True)
+        np.einsum("nk,nkci,nkcj->nij", moment, strut_turn, strut_turn, optimize=True)
+        + np.einsum("nk,nkci,nkcj->nij", moment, at_platform, at_platform, optimize=True)
     )
 
 
@@ -167,22 +182,26 @@ def _nodes(place: Geometry) -> FloatArray:
     return np.concatenate([place.platform_joints, hub[:, None], place.work_point[:, None]], axis=1)
 
 
-def _truss(nodes: FloatArray) -> FloatArray:
-    """(n, 24, 24) stiffness of the platform's 19 bars of 1 N/m: rim, spokes, joints to tip, hub to tip."""
+def truss_bars(nodes: FloatArray) -> list[tuple[int, int]]:
+    """Nodes (0 to 5: joints) that each of the platform's 19 bars joins: rim, spokes, joints to tip, hub to tip."""
     spread = nodes[0, :6] - nodes[0, HUB]
     axis = nodes[0, TIP] - nodes[0, HUB]
     axis = axis / np.linalg.norm(axis)
     first = spread[0] - (spread[0] @ axis) * axis
     around = np.argsort(np.arctan2(spread @ np.cross(axis, first), spread @ first * np.linalg.norm(axis)))
-    rim = [(around[i], around[(i + 1) % 6]) for i in range(6)]
-    bars = [*rim, *((i, HUB) for i in range(6)), *((i, TIP) for i in range(6)), (HUB, TIP)]
+    rim = [(int(around[i]), int(around[(i + 1) % 6])) for i in range(6)]
+    return [*rim, *((i, HUB) for i in range(6)), *((i, TIP) for i in range(6)), (HUB, TIP)]
+
+
+def _truss(nodes: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """(n, 24, 24) stiffness of the platform's bars, `stiffness` (19,) N/m."""
     total = np.zeros((len(nodes), 24, 24))
-    for i, j in bars:
+    for (i, j), spring in zip(truss_bars(nodes), stiffness, strict=True):
         bar = nodes[:, j] - nodes[:, i]
         unit = bar / np.linalg.norm(bar, axis=1, keepdims=True)
         row = np.zeros((len(nodes), 24))
         row[:, 3 * i : 3 * i + 3], row[:, 3 * j : 3 * j + 3] = -unit, unit
-        total += row[:, :, None] * row[:, None, :]
+        total += spring * row[:, :, None] * row[:, None, :]
     return total
 
 
@@ -202,9 +221,9 @@ def _radial(place: Geometry, vertex: int) -> FloatArray:
     return np.asarray(outward / np.linalg.norm(outward, axis=1, keepdims=True))
 
 
-def _give_size(vertex_count: int) -> int:
-    """Unknowns beside the platform's: six joints, two a vertex, spindle 3, table 3 and rocking 2, set-up 3."""
-    return 6 + 2 * vertex_count + 3 + 3 + 2 + 3
+def _give_size(vertex_count: int, further: int) -> int:
+    """Unknowns beside the platform's: six joints, two a vertex, spindle 3, table 3 and rocking 2, set-up 3, others."""
+    return 6 + 2 * vertex_count + 3 + 3 + 2 + 3 + further
 
 
 def _give(place: Geometry, links: Links) -> FloatArray:
@@ -218,23 +237,26 @@ def _give(place: Geometry, links: Links) -> FloatArray:
             links.table,
             np.full((n, 2), links.rocking),
             links.setup,
+            *(compliance[:, None] for _, compliance in links.ends),
         ],
         axis=1,
     )
 
 
-def _load_vector(place: Geometry, direction: FloatArray, dofs: int) -> FloatArray:
+def _load_vector(place: Geometry, links: Links, direction: FloatArray, dofs: int) -> FloatArray:
     """(n, N) what each unknown adds to the movement of tool against workpiece along `direction`."""
     n = len(direction)
-    size = dofs + _give_size(int(place.vertices.max()) + 1)
+    size = dofs + _give_size(len(links.vertices), len(links.ends))
     vector = np.zeros((n, size))
     # Tip of a rigid platform: the first three unknowns; node TIP of a truss: three of its last ones.
     tip = 0 if dofs == 6 else 3 * TIP
     vector[:, tip : tip + 3] = direction
-    end = size - 3 - 2 - 3 - 3
+    end = dofs + 6 + 2 * len(links.vertices)
     vector[:, end : end + 3] = np.einsum("ni,nij->nj", direction, place.rotation)  # spindle, platform axes
     # The workpiece is pushed back: the load on it is -direction, so its give counts with the same sign.
     vector[:, end + 3 : end + 6] = direction
     vector[:, end + 6 : end + 8] = np.cross(place.work_point, direction)[:, :2]
     vector[:, end + 8 : end + 11] = direction
+    for column, (lever, _) in enumerate(links.ends, end + 11):
+        vector[:, column] = np.einsum("ni,ni->n", direction, lever)
     return vector

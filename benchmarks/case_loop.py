@@ -1,0 +1,45 @@
+"""Blind cases run in whole processes, each record written as it comes."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import Pool
+from pathlib import Path
+from typing import Any
+
+Record = dict[str, Any]
+Collect = Callable[[str, Callable[[Any], Record], Sequence[Any]], list[Record]]
+
+
+@contextmanager
+def case_loop(workers: int, into: Path) -> Iterator[Collect]:
+    """A function (what is said, what makes a record of a job, jobs) -> records, which all go into one file of lines.
+
+    Processes are started only where there are several.
+    """
+    into.parent.mkdir(parents=True, exist_ok=True)
+    with into.open("w", encoding="utf-8") as stream:
+
+        def collect(name: str, made: Iterator[Record], count: int) -> list[Record]:
+            records = []
+            for record in made:
+                records.append(record)
+                stream.write(json.dumps(record) + "\n")
+                stream.flush()
+                if len(records) % 10 == 0 or len(records) == count:
+                    print(f"{name}: {len(records)} of {count}", file=sys.stderr, flush=True)
+            return records
+
+        if workers <= 1:
+            yield lambda name, run, jobs: collect(name, map(run, jobs), len(jobs))
+            return
+        with Pool(workers) as pool:
+            yield lambda name, run, jobs: collect(name, pool.imap_unordered(run, jobs, chunksize=1), len(jobs))
+
+
+def read_records(file: Path) -> list[Record]:
+    """The records of an earlier run."""
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]

@@ -1,0 +1,160 @@
+"""Figures of `benchmarks.portrait`, each against its bar."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import fmean, median
+
+from benchmarks.case_loop import Record
+from benchmarks.diagnosis_bars import Figure, mean, middle_of, share
+
+LARGEST_SET = {"links": 4, "variables": 3}  # a longer list says that it cannot tell
+SEEN = ("unexplained", "described")
+RATIOS = ((1.3, 0.75), (1.5, 0.90))  # held-out error over the noise floor, and the share of cases that must keep to it
+PROBABILITIES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0 + 1e-9)
+
+
+def right_set(record: Record, name: str) -> bool:
+    """Whether an acceptable word is in the portrait's set, and the set is short enough to say something."""
+    found = (record["portrait"] or {}).get(name, {})
+    return 0 < len(found) <= LARGEST_SET[name] and not set(found).isdisjoint(record["effects"][0][name])
+
+
+def first_right(record: Record, name: str) -> bool:
+    """Whether the likeliest word is an acceptable one."""
+    found = (record["portrait"] or {}).get(name, {})
+    return bool(found) and max(found, key=lambda word: found[word]) in record["effects"][0][name]
+
+
+def ratio(record: Record) -> float:
+    """Error of the description at left-out points over what noise alone leaves there; infinite without one."""
+    portrait = record["portrait"]
+    if not portrait or portrait["held_out_rms_percent"] is None or not portrait["noise_floor_percent"]:
+        return math.inf
+    return float(portrait["held_out_rms_percent"] / portrait["noise_floor_percent"])
+
+
+def named_by_catalogue(record: Record) -> bool:
+    """`identified`: a name of the catalogue for what no effect of it describes."""
+    return bool(record["verdict"] == "identified")
+
+
+def figures(records: Sequence[Record]) -> list[Figure]:
+    """Every figure, by layout."""
+    found: list[Figure] = []
+    for layout in ("tilted", "paper"):
+        unknown = [r for r in records if r["layout"] == layout and r["hidden"] != "none"]
+        sound = [r for r in records if r["layout"] == layout and r["hidden"] == "none"]
+        found += _of_unknowns(layout, unknown) if unknown else []
+        found += _of_sound(layout, sound) if sound else []
+    return found
+
+
+def _of_unknowns(layout: str, records: Sequence[Record]) -> list[Figure]:
+    barred = layout == "tilted"
+    drawn = [r for r in records if r["portrait"]]
+    found = [
+        share(layout, "unknown: `unexplained` or `described`", [r["verdict"] in SEEN for r in records],
+              at_least=0.92 if barred else 0.70),
+        share(layout, "unknown: `identified`, a name of the catalogue", [named_by_catalogue(r) for r in records]),
+        share(layout, "unknown: has a portrait", [bool(r["portrait"]) for r in records]),
+    ]  # fmt: skip
+    for name in LARGEST_SET:
+        bar = 0.85 if barred else None
+        found += [
+            share(layout, f"portrait: {name}, the set holds the truth", [right_set(r, name) for r in drawn],
+                  at_least=bar),
+            share(layout, f"portrait: {name}, the likeliest is right", [first_right(r, name) for r in drawn]),
+            mean(layout, f"portrait: {name}, mean size of the set", [float(len(r["portrait"][name])) for r in drawn]),
+            share(layout, f"unknown: {name} right, cases without a portrait counted as wrong",
+                  [right_set(r, name) for r in records]),
+        ]  # fmt: skip
+    ratios = [ratio(r) for r in drawn]
+    found += [
+        share(layout, f"portrait: held-out error at most {most:g} of the noise floor", [r <= most for r in ratios],
+              at_least=at_least if barred else None)
+        for most, at_least in RATIOS
+    ]  # fmt: skip
+    finite = [r for r in ratios if math.isfinite(r)]
+    if finite:
+        found.append(middle_of(layout, "portrait: held-out error over the noise floor, median", finite))
+    found.append(
+        middle_of(layout, "CPU of `diagnose` with the portrait, median", [r["cpu"] for r in records], None, " s")
+    )
+    return found
+
+
+def _of_sound(layout: str, records: Sequence[Record]) -> list[Figure]:
+    return [
+        share(layout, "sound machine: a portrait all the same", [bool(r["portrait"]) for r in records],
+              at_most=0.03 if layout == "tilted" else None),
+        share(layout, "sound machine: anything but `adequate`", [r["verdict"] != "adequate" for r in records]),
+        middle_of(layout, "CPU of `diagnose`, sound machine, median", [r["cpu"] for r in records], None, " s"),
+    ]  # fmt: skip
+
+
+def kinds_table(records: Sequence[Record], layout: str) -> list[str]:
+    """How each kind fares."""
+    lines = [
+        "| unknown | cases | unexplained or described | identified | portrait | link right | of how many | variable "
+        "right | of how many | held-out over floor |",
+        "| --- " + "| ---: " * 9 + "|",
+    ]
+    mine = [r for r in records if r["layout"] == layout and r["hidden"] != "none"]
+    for kind in dict.fromkeys(r["hidden"] for r in mine):
+        cases = [r for r in mine if r["hidden"] == kind]
+        drawn = [r for r in cases if r["portrait"]]
+        cells = [len(cases), sum(r["verdict"] in SEEN for r in cases), sum(map(named_by_catalogue, cases)), len(drawn)]
+        for name in LARGEST_SET:
+            size = f"{fmean(len(r['portrait'][name]) for r in drawn):.1f}" if drawn else ""
+            cells += [sum(right_set(r, name) for r in drawn), size]
+        cells.append(f"{median(map(ratio, drawn)):.2f}" if drawn else "")
+        lines.append(f"| {kind} | " + " | ".join(map(str, cells)) + " |")
+    return lines
+
+
+def calibration_table(records: Sequence[Record]) -> list[str]:
+    """Stated probabilities of links and variables against how often they are acceptable."""
+    lines = ["| set | stated | words | mean stated | right |", "| --- | --- | ---: | ---: | ---: |"]
+    drawn = [r for r in records if r["hidden"] != "none" and r["portrait"] and r["layout"] == "tilted"]
+    for name in LARGEST_SET:
+        claims = [
+            (weight, word in r["effects"][0][name]) for r in drawn for word, weight in r["portrait"][name].items()
+        ]
+        for low, high in pairwise(PROBABILITIES):
+            inside = [claim for claim in claims if low <= claim[0] < high]
+            if inside:
+                stated, right = (fmean(column) for column in zip(*inside, strict=True))
+                lines.append(
+                    f"| {name} | {100 * low:g} to {100 * min(high, 1.0):g} % | {len(inside)} | {100 * stated:.0f} % | "
+                    f"{100 * right:.0f} % |"
+                )
+    return lines
+
+
+def failures_table(records: Sequence[Record]) -> list[str]:
+    """Every case that counts against a bar: what it is and what was said of it."""
+    lines = [
+        "| layout | seed | unknown | size, % | verdict | what | links | variables | terms |",
+        "| --- | ---: | --- | ---: | --- | --- | --- | --- | --- |",
+    ]
+    for r in records:
+        portrait = r["portrait"] or {"links": {}, "variables": {}, "terms": []}
+        if r["hidden"] == "none":
+            what = ["a description of a sound machine"] if r["portrait"] else []
+            size = 0.0
+        else:
+            what = [] if r["verdict"] in SEEN else [f"not seen: {', '.join(r['plausible'])}"]
+            if r["portrait"]:
+                what += [f"{name} wrong" for name in LARGEST_SET if not right_set(r, name)]
+                what += [f"held-out {ratio(r):.2f} of the floor"] if ratio(r) > RATIOS[0][0] else []
+            size = 100.0 * r["effects"][0]["size"]
+        if what:
+            words = (", ".join(f"{w} {100 * p:.0f} %" for w, p in portrait[name].items()) for name in LARGEST_SET)
+            lines.append(
+                f"| {r['layout']} | {r['seed']} | {r['hidden']} | {size:.1f} | {r['verdict']} | {'; '.join(what)} | "
+                f"{' | '.join(words)} | {'; '.join(portrait['terms'])} |"
+            )
+    return lines

@@ -1,0 +1,139 @@
+"""Blind cases of `benchmarks.several`: two and three effects at once, wild readings, a wrong noise, mistyped rows."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.diagnosis_cases import judged
+from toolpath_stiff import rig
+from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.rig.hidden import Nuisances
+from toolpath_stiff.rig.slips import SLIPS, slipped_case, with_stated_noise
+
+GROUPS = ("pair", "three", "outliers", "stated", "slip")
+SIZES = {"pair": (0.10, 0.05), "three": (0.10, 0.07, 0.05), "one": None, "none": None}
+HIDDEN = {"pair": "two", "three": "three", "one": "one", "none": "none"}
+FEW_OUTLIERS, MANY_OUTLIERS = 0.02, 0.10
+FACTORS = (0.5, 1.0, 2.0)
+# Layout and way in which a noise is stated; the tilted one has repeats, the paper's has none.
+WAYS = (("tilted", "option"), ("tilted", "column"), ("paper", "option"), ("paper", "column"))
+GROUP_SEEDS = 10_000  # distance of the seeds of groups
+
+
+@dataclass(frozen=True)
+class Job:
+    """One case.
+
+    Attributes
+    ----------
+    group
+        One of `GROUPS`.
+    layout, seed
+        Of the rig.
+    hidden
+        A key of `HIDDEN`.
+    outliers
+        Share of wild readings.
+    way, factor
+        How a noise is stated (`option`: `--noise`; `column`: `sd_N_per_mm`; "": not), and over the true one.
+    slip
+        Kind of the slip; "": none.
+    """
+
+    group: str
+    layout: str
+    seed: int
+    hidden: str
+    outliers: float = FEW_OUTLIERS
+    way: str = ""
+    factor: float = 1.0
+    slip: str = ""
+
+
+def make_jobs(first_seed: int, cases: int, groups: Sequence[str] = GROUPS) -> list[Job]:
+    """All cases: `cases` pairs, half as many of three effects and of each kind with outliers, a tenth of the rest.
+
+    Cases that are compared with each other share their seed. More cases leave the first ones as they were.
+    """
+    half, tenth = max(cases // 2, 1), max(cases // 10, 1)
+    start = {group: first_seed + GROUP_SEEDS * number for number, group in enumerate(GROUPS)}
+    jobs = [Job("pair", "tilted", start["pair"] + k, "pair") for k in range(cases)]
+    jobs += [Job("three", "tilted", start["three"] + k, "three") for k in range(half)]
+    for number, hidden in enumerate(("none", "one", "pair")):
+        for k in range(half):
+            seed = start["outliers"] + 1000 * number + k
+            jobs += [Job("outliers", "tilted", seed, hidden, share) for share in (FEW_OUTLIERS, MANY_OUTLIERS)]
+    for number, (layout, way) in enumerate(WAYS):
+        for k in range(tenth):
+            for other, hidden in enumerate(("none", "one")):
+                seed = start["stated"] + 1000 * number + 500 * other + k
+                jobs += [Job("stated", layout, seed, hidden, way=way, factor=factor) for factor in FACTORS]
+    for number, slip in enumerate(("", *SLIPS)):
+        for k in range(tenth if slip else half):
+            # Alternately on a sound machine and on one that hides an effect.
+            jobs.append(Job("slip", "tilted", start["slip"] + 1000 * number + k, "one" if k % 2 else "none", slip=slip))
+    return [job for job in jobs if job.group in groups]
+
+
+def run(job: Job) -> dict[str, Any]:
+    """The record of a case; with `error`, the traceback, where it failed."""
+    heading = asdict(job)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            return heading | _diagnosed(job, Path(folder))
+    except Exception:  # a case that breaks must be counted, not end the run
+        return heading | {"error": traceback.format_exc()}
+
+
+def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
+    """Draw, disturb, diagnose, and what the document says of noise and rows."""
+    nuisances = Nuisances(outliers=job.outliers)
+    case = rig.draw_case(job.seed, job.layout, HIDDEN[job.hidden], size=SIZES[job.hidden], nuisances=nuisances)
+    rows, truth, stated = case.rows, dict(case.truth), {}
+    more: dict[str, Any] = {}
+    if job.way == "column":
+        rows, more["noise"] = with_stated_noise(rows, nuisances, job.factor)
+    elif job.way == "option":
+        rows = {name: values for name, values in rows.items() if name != "sd_N_per_mm"}
+        stated["noise"] = (job.factor * nuisances.repeat, job.factor * nuisances.clamping)
+    if job.slip:
+        rows, more["slips"] = slipped_case(case, job.seed, job.slip)
+    try:
+        record, document = judged(rows, truth, folder, **stated)
+    except (InputError, InputErrors) as refusal:
+        message = str(refusal).replace(f"{folder}/", "")
+        return more | {"truth": truth["hidden"], "effects": truth["effects"], "verdict": "refused", "plausible": [],
+                       "refused": message, "suspects": suspects_of_refusal(message)}  # fmt: skip
+    return more | record | {
+        "noise_found": document["noise"],
+        "noise_remarks": noise_remarks(document),
+        "suspects": list(document.get("suspect_rows", [])),
+    }  # fmt: skip
+
+
+def suspects_of_refusal(message: str) -> list[dict[str, Any]]:
+    """The lines that the reader names (`FILE.csv:152: ...`) as suspected rows; the heading is line 1."""
+    return [{"row": int(line) - 1, "words": message} for line in re.findall(r"\.csv:(\d+)", message)]
+
+
+# What a sentence must say to be about a wrong noise: that one was stated, and that it is not what the readings show.
+_STATED = re.compile(r"\bstated|sd_N_per_mm|--noise", re.IGNORECASE)
+_WRONG = re.compile(r"\btoo (small|large|low|high)|\b(smaller|larger|lower|higher) than|\bhalf\b|\btwice\b|\btimes\b")
+
+
+def noise_remarks(document: Mapping[str, Any]) -> list[str]:
+    """Sentences that say a stated noise is wrong, where a reader looks: text, reasons, warnings, notes, its origin."""
+    sentences = [
+        document["text"],
+        *document["why"],
+        *document["warnings"],
+        *document["notes"],
+        document["noise"]["origin"],
+    ]
+    return [one for one in sentences if _STATED.search(one) and _WRONG.search(one)]
