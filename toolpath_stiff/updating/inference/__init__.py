@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.inference.candidates import EXPECTED
+from toolpath_stiff.updating.inference.doubts import noise_doubt
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.fits import refine
 from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
@@ -95,6 +96,8 @@ class Judgement:
         The form of discrepancy that stands out, in words; "" if none was looked for.
     question
         Whether these are readings of this machine, and why it is asked; "" where nothing says that they are not.
+    doubt
+        That the noise is not what was stated; "" where nothing says so.
     """
 
     verdict: str
@@ -110,11 +113,20 @@ class Judgement:
     probability: dict[str, float]
     form: str
     question: str = ""
+    doubt: str = ""
 
     @property
     def plausible(self) -> tuple[str, ...]:
         """Names of the effects in `explanations`, each once."""
         return tuple(dict.fromkeys(name for one in self.explanations for name in one.split(" + ")))
+
+    @property
+    def likeliest(self) -> Fit:
+        """The fit of the likeliest hypothesis: of those left standing, else the closest."""
+        for name in self.explanations:
+            if name == NONE or name in self.fits:
+                return self.fits.get(name, self.base)
+        return max(self.fits.values(), key=lambda fit: fit.log_posterior, default=self.base)
 
     def family(self, name: str) -> Family:
         """The family of an effect."""
@@ -139,9 +151,10 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     weighed = weigh(problem, noise, candidates, gates)
     asked = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
+    doubt = "" if asked else noise_doubt(problem, noise, gates.base, verdict == "unexplained", seed)
     return Judgement(
         verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked,
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, noise.remark or doubt,
     )  # fmt: skip
 
 
@@ -303,7 +316,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
             break
         if passes(family.name, family.best):
             singles.append(family)
-    evidence = {(f.name,): f.log_evidence for f in families}
+    evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
     tried, search = search_pairs(problem, families, base)
     pairs, tried = _standing(tried, evidence, fits, passes)
     if not singles and not pairs:
@@ -321,7 +334,7 @@ def _standing(
     fits: Fits,
     passes: Callable[[str, Fit], bool],
 ) -> tuple[list[Combination], list[Combination]]:
-    """Those of the likeliest that beat each of their parts and pass; all, as the model itself has it where it was asked.
+    """Those of the likeliest that beat each of their parts and pass; and all of them.
 
     What two effects do to each other is not in their tables: the final fit says how much more likely it makes the data.
     """

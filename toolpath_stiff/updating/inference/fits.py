@@ -157,9 +157,7 @@ class _Search:
         if ((step[2:] >= low) & (step[2:] <= high)).all():
             return step
         free_law = np.full(2, np.inf)
-        return bounded_step(
-            information, gradient, np.concatenate([-free_law, low]), np.concatenate([free_law, high])
-        )
+        return bounded_step(information, gradient, np.concatenate([-free_law, low]), np.concatenate([free_law, high]))
 
     def jacobian(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> FloatArray:
         columns = []

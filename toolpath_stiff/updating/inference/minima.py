@@ -57,7 +57,7 @@ def bounded_minimum(function: Callable[[float], float], low: float, high: float,
                 third, at_third, second, at_second = second, at_second, trial, found
             elif found <= at_third or third in (best, second):
                 third, at_third = trial, found
-    return best
+    return float(best)
 
 
 def bounded_step(information: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -217,7 +217,7 @@ class LinearSearch:
         price = np.where(present, np.log(np.maximum(np.abs(sizes), 1.0)) + PER_SIZE, 0.0).sum(axis=1)
         subsets = np.log(2.0) * (high > low).sum(axis=1)
         # A set with an absent effect is a smaller set.
-        parts = present.reshape(len(at), -1, self.columns.shape[1]).any(axis=2).all(axis=1)
+        parts = np.all(present.reshape(len(at), -1, self.columns.shape[1]).any(axis=2), axis=1)
         scores = 0.5 * gains - 0.5 * volume - price - subsets - self._choices(at)
         return sizes / scale[at], np.where(parts, scores, -np.inf)
 
@@ -288,9 +288,7 @@ def _within(table: Table, sizes: FloatArray) -> FloatArray:
     return np.clip(sizes, 0.9 * bounds[:, 0], 0.9 * bounds[:, 1])
 
 
-def _likeliest_subset(
-    problem: Problem, tables: Sequence[Table], sizes: Sequence[FloatArray], base: Fit
-) -> Fit | None:
+def _likeliest_subset(problem: Problem, tables: Sequence[Table], sizes: Sequence[FloatArray], base: Fit) -> Fit | None:
     """The tables with those of their components that make the data most likely: from all, the faintest dropped."""
     ends = np.cumsum([0, *(len(x) for x in sizes)])
     start = [_within(table, x) for table, x in zip(tables, sizes, strict=True)]
@@ -304,10 +302,8 @@ def _likeliest_subset(
         return [i for i, owner in zip(free, owners, strict=True) if owners.count(owner) > 1]
 
     while True:
-        begin = [np.where(np.isin(np.arange(a, b), free), flat[a:b], 0.0) for a, b in zip(ends, ends[1:], strict=False)]
-        found = problem.score_subset(
-            tables, free, replace(base, tables=tuple(tables), sizes=tuple(begin), free=free)
-        )
+        begin = [np.where(np.isin(np.arange(a, b), free), flat[a:b], 0.0) for a, b in pairwise(ends.tolist())]
+        found = problem.score_subset(tables, free, replace(base, tables=tuple(tables), sizes=tuple(begin), free=free))
         good = found is not None and found.possible
         if found is not None and good:
             found = replace(found, log_evidence=found.log_evidence + weight)

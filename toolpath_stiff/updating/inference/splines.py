@@ -34,7 +34,9 @@ class Spline:
         share = (at - self.knots[piece])[..., None] / step
         rest = 1.0 - share
         start, end = self.values[piece], self.values[piece + 1]
-        bend = rest * (self.slopes[piece] * step - (end - start)) - share * (self.slopes[piece + 1] * step - end + start)
+        bend = rest * (self.slopes[piece] * step - (end - start)) - share * (
+            self.slopes[piece + 1] * step - end + start
+        )
         return np.asarray(start + share * ((end - start) + rest * bend))
 
 
@@ -54,10 +56,8 @@ def _slopes(knots: FloatArray, values: FloatArray) -> FloatArray:
     system[inner, inner] = 2.0 * (step[:-1] + step[1:])
     system[inner, inner + 1] = step[:-1]
     right[1:-1] = 3.0 * (step[1:, None] * rise[:-1] + step[:-1, None] * rise[1:])
-    for end, near, far, (first, second) in ((0, 1, 2, (0, 1)), (-1, -2, -3, (-1, -2))):
+    for end, near, (first, second) in ((0, 1, (0, 1)), (-1, -2, (-1, -2))):
         both = step[first] + step[second]
         system[end, end], system[end, near] = step[second], both
-        right[end] = (
-            (step[first] + 2.0 * both) * step[second] * rise[first] + step[first] ** 2 * rise[second]
-        ) / both
+        right[end] = ((step[first] + 2.0 * both) * step[second] * rise[first] + step[first] ** 2 * rise[second]) / both
     return np.asarray(np.linalg.solve(system, right))
