@@ -250,8 +250,8 @@ def document_of(
         "noise": noises,
         "not_tested": [*(f"no column {name}" for name in data.missing), *notes],
         "assumptions": _assumptions(answers),
-        "warnings": [*data.warnings, *doubts],
-        "notes": list(data.notes),
+        "warnings": list(data.warnings),
+        "notes": [*data.notes, *doubts],
         "suspect_rows": suspects,
         "hints": [] if findings else _hints(answers[-1], tests, looked_for, numbers, residual),
         "text": " ".join(

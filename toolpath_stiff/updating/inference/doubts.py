@@ -229,10 +229,11 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
 
 def _suspect(data: Measurements, ways: Sequence[_Slip], odds: float) -> Suspect:
     first = ways[0]
+    several = len(first.rows) > 1
     lines = ", ".join(str(int(data.line[row])) for row in first.rows)
-    where = f"{data.file[first.rows[0]]}, line{'s' if len(first.rows) > 1 else ''} {lines}"
+    where = f"line{'s' if several else ''} {lines} of {data.file[first.rows[0]]}"
     said = " or ".join(f"{way.column} {way.meant} instead of {way.stands}" for way in ways)
-    words = f"{where} {'look' if len(first.rows) > 1 else 'looks'} mistyped: {said} would fit all other readings"
+    words = f"{where} {'look' if several else 'looks'} mistyped: {said} would fit all other readings"
     return Suspect(tuple(first.rows.tolist()), first.column, first.stands, first.meant, words, odds)
 
 
@@ -360,7 +361,7 @@ def _changes(problem: Problem, fit: Fit, slips: Sequence[_Slip]) -> list[FloatAr
 def _log_odds(
     problem: Problem, fit: Fit, slips: Sequence[_Slip], changes: Sequence[FloatArray], taken: NDArray[np.bool_]
 ) -> FloatArray:
-    """(slips,) log likelihood of each slip over that of its rows as they stand, plain or wild; -inf where it is none."""
+    """(slips,) log likelihood of each slip over that of its rows as they stand, plain or wild; -inf for none."""
     scatter, inflated = problem.scatter, _inflation(fit)
     known: dict[tuple[int, ...], tuple[Precision, FloatArray]] = {}
     found = np.full(len(slips), -np.inf)
