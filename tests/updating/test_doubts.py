@@ -74,12 +74,14 @@ def test_repeats_overrule_a_stated_noise(factor: float) -> None:
 
 
 def test_the_share_of_wild_readings_is_estimated() -> None:
-    """One reading in seven made wild; the share found lies nearer to that than to the assumed one in fifty."""
-    rng = np.random.default_rng(4)
-    wild = rng.choice(len(DATA), len(DATA) // 7, replace=False)
-    logs = np.log(DATA.stiffness)
-    logs[wild] += 0.08 * rng.standard_normal(len(wild))
-    told, before = from_repeats(replace(DATA, stiffness=np.exp(logs))), from_repeats(DATA)
-    assert told is not None and before is not None
-    assert told.wild > 0.06 > before.wild
-    assert told.repeat == pytest.approx(before.repeat, rel=0.25)
+    """One reading in ten made wild, 4 times as wide: taken for noise they would make it 1.6 times as large."""
+    before, found = from_repeats(DATA), []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        wild = rng.choice(len(DATA), len(DATA) // 10, replace=False)
+        logs = np.log(DATA.stiffness)
+        logs[wild] += 0.08 * rng.standard_normal(len(wild))
+        found.append(from_repeats(replace(DATA, stiffness=np.exp(logs))))
+    assert before is not None
+    assert np.mean([one.wild for one in found if one]) > 0.045 > before.wild
+    assert np.mean([one.repeat for one in found if one]) < 1.35 * before.repeat
