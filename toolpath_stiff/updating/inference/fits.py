@@ -160,11 +160,7 @@ class _Search:
         return bounded_step(information, gradient, np.concatenate([-free_law, low]), np.concatenate([free_law, high]))
 
     def jacobian(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> FloatArray:
-        columns = []
-        for j in range(2):
-            moved = law.copy()
-            moved[j] += 1e-4
-            columns.append((residual - self.residual(moved, flat)) / 1e-4)
+        columns = self._law_columns(law, flat, residual)
         components = [component for c in self.candidates for component in c.components]
         for index in self.free:
             size = flat[index]
@@ -175,6 +171,18 @@ class _Search:
             moved[index] += step
             columns.append((residual - self.residual(law, moved)) / step)
         return np.nan_to_num(np.stack(columns, axis=1))
+
+    def _law_columns(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> list[FloatArray]:
+        """Two (n,) d ln k / d law: in closed form where the struts carry what equilibrium says."""
+        predictor = self.problem.predictor
+        if np.isfinite(residual).all() and predictor.struts_carry_all(c.effect for c in self.candidates):
+            return list(predictor.law_columns(self.problem.observed - residual, law).T)
+        columns = []
+        for j in range(2):
+            moved = law.copy()
+            moved[j] += 1e-4
+            columns.append((residual - self.residual(moved, flat)) / 1e-4)
+        return columns
 
     def step(
         self, law: FloatArray, flat: FloatArray, residual: FloatArray, step: FloatArray, scatter: Scatter

@@ -72,8 +72,14 @@ def _scores(problem: Problem, table: Table, base: Fit) -> list[tuple[Fit, float]
     if table.knots:
         return [(problem.score_single(table, base), 0.0)]
     subsets = list(table.candidate.subsets())
-    found = ((problem.score_subset([table], free, base), -float(np.log(len(subsets)))) for free in subsets)
-    return [(score, weight) for score, weight in found if score is not None]
+    weight, found, start = -float(np.log(len(subsets))), [], base
+    for free in subsets:
+        score = problem.score_subset([table], free, start)
+        if score is not None:
+            found.append((score, weight))
+            # The next subset begins where this one has ended, with the readings that it takes for wild.
+            start = score
+    return found
 
 
 def score_families(

@@ -95,8 +95,8 @@ def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, fl
     that is exact. Each group counts with its degrees of freedom.
     """
     squared, wide = deviations[:, None, None] ** 2, OUTLIER_WIDTH**2
-    factors = np.linspace(0.6, 1.3, 71)[:, None]
-    shares = np.geomspace(*OUTLIER_ENDS, 60)
+    factors = np.linspace(0.6, 1.3, 36)[:, None]
+    shares = np.geomspace(*OUTLIER_ENDS, 30)
     own = 1.0 - 1.0 / size[:, None, None]  # of the variance of a deviation
     total = np.zeros(np.broadcast_shapes(squared.shape, factors.shape, shares.shape))
     for mine, chance in ((wide, shares), (1.0, 1.0 - shares)):
