@@ -18,7 +18,7 @@ Two gates. Absolute: a hypothesis must leave residuals that its own noise explai
 posterior probabilities decide; only a name far ahead of all others is given as the answer.
 
 adequate      nothing is missing that these data could show
-identified    one effect (or one pair) explains the data, far likelier than any other
+identified    one effect (or pair, or triple) explains the data, far likelier than any other
 ambiguous     several explain them, and none is far likelier than the others
 unexplained   something is missing, and nothing in the catalogue accounts for it; or the readings do not look as if
               they were of this machine at all (`question`)
@@ -88,7 +88,7 @@ class Judgement:
     gates, fits
         Effect (or "a + b") -> its absolute test and final fit, where they were made.
     pairs
-        Pairs tried, most likely first.
+        Pairs tried, and triples, most likely first.
     probability
         Hypothesis -> posterior probability: effects, `none`, "a + b", `OUTSIDE`. Hypotheses that fail the absolute gate
         have none unless nothing passes.
@@ -293,7 +293,7 @@ class Gates:
 
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
-    """The model alone, then single effects, then pairs: of the likeliest single that passes, else of the best ones."""
+    """The model alone, then single effects, then all pairs, then triples where nothing else passes."""
     simulator = Simulator.of(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
