@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -15,11 +16,10 @@ from toolpath_stiff.rig import Nuisances
 from toolpath_stiff.updating.inference.noise import (
     Scatter,
     covariance,
-    estimate_from_repeats,
     noise_models,
-    repeat_groups,
 )
 from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.inference.repeats import from_repeats, repeat_groups
 
 REPEAT, CLAMPING = 0.02, 0.03
 
@@ -49,8 +49,8 @@ def repeated(seed: int, repeat=REPEAT, clamping=CLAMPING, clamps_a_point=2, poin
 
 def mean_of_estimates(count=60, **how):
     """Root mean squares of the estimated repeat noise and clamping, and the degrees of freedom."""
-    found = [estimate_from_repeats(repeated(seed, **how)) for seed in range(count)]
-    repeat, clamping, freedom, told = zip(*found, strict=True)
+    found = [from_repeats(repeated(seed, **how)) for seed in range(count)]
+    repeat, clamping, freedom, told, _ = zip(*(astuple(one) for one in found), strict=True)
     assert all(told)
     return math.sqrt(np.mean(np.square(repeat))), math.sqrt(np.mean(np.square(clamping))), min(freedom)
 

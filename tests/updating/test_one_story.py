@@ -198,11 +198,17 @@ def test_a_pair_is_shaded_and_its_members_are_not():
 def ambiguous(**chances: float) -> SimpleNamespace:
     """As much of a diagnosis as its sentence needs."""
     names = tuple(name.replace("_and_", " + ") for name in chances)
-    main = SimpleNamespace(probability=dict(zip(names, chances.values(), strict=True)), verdict="ambiguous")
+    main = SimpleNamespace(probability=dict(zip(names, chances.values(), strict=True)), verdict="ambiguous", doubt="")
     main.explanations = names
     fits = {name: SimpleNamespace(findings=tuple(f"{one} gives way" for one in name.split(" + "))) for name in names}
     return SimpleNamespace(
-        verdict="ambiguous", explanations=names, plausible=names, fits=fits, main=main, judgements={"measured": main}
+        verdict="ambiguous",
+        explanations=names,
+        plausible=names,
+        fits=fits,
+        main=main,
+        judgements={"measured": main},
+        suspects=(),
     )
 
 

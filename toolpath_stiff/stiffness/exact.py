@@ -372,10 +372,35 @@ def under_load(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> 
     return Loaded(path, links, twists[..., 0], forces[..., 0])
 
 
-def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
-    """(n,) m/N, displacement along unit vectors (n, 3) per force along them; see `under_load`."""
-    along = np.asarray(np.einsum("ni,ni->n", under_load(model, path, direction).twists[:, :3], direction))
-    return guard.possible(_acting(model), path, along[:, None, None])[:, 0, 0]
+def compliance_along(
+    model: StiffnessModel, path: LoadPath, direction: FloatArray, equilibrium: FloatArray | None = None
+) -> FloatArray:
+    """(n,) m/N, displacement along unit vectors (n, 3) per force along them; see `under_load`.
+
+    `equilibrium`: (n, 6) N, strut forces in equilibrium with the unit vectors, where they are known: unless a stiffness
+    parallel to the struts shares the load, the energy that they store is the answer (Castigliano), and nothing is
+    solved.
+    """
+    along = None if equilibrium is None else _stored_along(model, path, direction, equilibrium)
+    if along is None:
+        along = np.einsum("ni,ni->n", under_load(model, path, direction).twists[:, :3], direction)
+    return guard.possible(_acting(model), path, np.asarray(along)[:, None, None])[:, 0, 0]
+
+
+def _stored_along(
+    model: StiffnessModel, path: LoadPath, direction: FloatArray, forces: FloatArray
+) -> FloatArray | None:
+    """(n,) [f; w]^T Q [f; w], twice the energy stored under unit forces; None where the struts share the load."""
+    if model.load_dependent:
+        path = replace(path, strut_forces=forces * path.force[:, None])
+    links = assemble_links(model, path)
+    if links.parallel is not None:
+        return None
+    stored = np.einsum("ni,ni->n", links.strut, forces**2)
+    if links.loads is not None:
+        both = np.concatenate([forces, direction], axis=1)  # no moment
+        stored += np.einsum("ni,nij,nj->n", both, links.loads[:, :9, :9], both)
+    return np.asarray(stored)
 
 
 def _settled(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenches: FloatArray) -> LoadPath:

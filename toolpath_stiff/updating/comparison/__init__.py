@@ -34,6 +34,7 @@ from toolpath_stiff.updating.comparison.structure import (
 )
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
 from toolpath_stiff.updating.inference.covariances import Covariance, Groups
+from toolpath_stiff.updating.inference.doubts import suspect_entries, suspect_rows
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import Baseline, fit_effects
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance, noise_models
@@ -163,21 +164,23 @@ def compare(
         scattering = Scattering(model, spread, data.clamp, place, draws, seed)
         structure = find_structure(residual, looked_for, scattering)
         refitted = law = None
+        problem = Problem(predictor, Scatter.of(model, spread))
         if len(data) >= FEWEST_TO_REFIT:
-            law = Baseline.of(Problem(predictor, Scatter.of(model, spread))).refitted
+            law = Baseline.of(problem).refitted
             if np.linalg.cond(law_columns) < 1.0 / TELLS_LAW:
                 refitted = find_structure(residual, looked_for, scattering, law_columns.T, most=0)
         free = assess(checks, data, spread, scattering.draws(0.0))
-        return Answer(model, scattering, structure, refitted, law, free)
+        return Answer(model, scattering, structure, refitted, law, free, problem)
 
     answers = [answer(one) for one in noises]
+    last = answers[-1]
     files = tuple(dict.fromkeys(data.file.tolist()))
     asked = asked or Asked(files, machine.name, tuple(map(str, effect_files)), noise, strut_spread)
     document = document_of(
         predictor, answers, residual, looked_for, numbers, cannot, notes, seed,
         [hint("which effect would explain it", asked.command("diagnose"))],
+        suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=False),
     )  # fmt: skip
-    last = answers[-1]
     return Comparison(
         predictor, data, noises, log_model, residual, np.sqrt(last.scattering.square), last.scattering.covariance,
         last.scattering.places, last.structure.excess, tuple(numbers), tuple(names),

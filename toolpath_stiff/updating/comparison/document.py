@@ -29,7 +29,8 @@ from toolpath_stiff.updating.comparison.structure import (
     far_off,
 )
 from toolpath_stiff.updating.inference import question
-from toolpath_stiff.updating.inference.evidence import Fit
+from toolpath_stiff.updating.inference.doubts import SuspectEntry
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import ErrorFigures, deviation_percent, error_figures, errors_text
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
@@ -161,6 +162,7 @@ class ComparisonDocument(TypedDict):
     assumptions: list[str]
     warnings: list[str]
     notes: list[str]
+    suspect_rows: list[SuspectEntry]
     hints: list[FindingEntry]
     text: str
     question: str
@@ -177,6 +179,7 @@ class Answer:
     refitted: FoundPatterns | None
     law: Fit | None
     model_free: list[CheckEntry]
+    problem: Problem
 
 
 def _figures(residual: FloatArray, answers: list[Answer], rows: NDArray[np.bool_]) -> Figures:
@@ -210,6 +213,7 @@ def document_of(
     notes: list[str],
     seed: int,
     following: list[str],
+    suspects: list[SuspectEntry],
 ) -> ComparisonDocument:
     """The content of compare.json; `following` are the commands that go on from here."""
     data, asked = predictor.data, question(predictor)
@@ -223,6 +227,10 @@ def document_of(
     baseline = _baseline(predictor, answers, residual)
     findings, tests = merged_findings(by_noise, answers_tests(answers, looked_for)), _tests(answers, looked_for)
     noises = [_noise(one.noise) for one in answers]
+    doubts = [
+        *dict.fromkeys(one.noise.remark for one in answers if one.noise.remark),
+        *(one["words"] for one in suspects),
+    ]
     written: ComparisonDocument = {
         "machine": predictor.machine.name,
         "effects": predictor.effects_that_act,
@@ -243,9 +251,19 @@ def document_of(
         "not_tested": [*(f"no column {name}" for name in data.missing), *notes],
         "assumptions": _assumptions(answers),
         "warnings": list(data.warnings),
-        "notes": list(data.notes),
+        "notes": [*data.notes, *doubts],
+        "suspect_rows": suspects,
         "hints": [] if findings else _hints(answers[-1], tests, looked_for, numbers, residual),
-        "text": " ".join(filter(None, (asked, overall_text(len(data), baseline, noises, findings)))),
+        "text": " ".join(
+            filter(
+                None,
+                (
+                    asked,
+                    overall_text(len(data), baseline, noises, findings),
+                    *(f"{d[:1].upper()}{d[1:]}." for d in doubts),
+                ),
+            )
+        ),
         "question": asked,
         "next": following,
     }

@@ -22,6 +22,7 @@ from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
 from toolpath_stiff.stiffness.model import build_model, setup_of
 from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
+from toolpath_stiff.updating.inference.doubts import SuspectEntry, suspect_entries, suspect_rows
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, refine
 from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
@@ -73,6 +74,8 @@ class Diagnosis:
         How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
     portrait
         What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
+    suspects
+        Rows that look mistyped; `data` no longer holds those that are clear.
     """
 
     verdict: str
@@ -98,6 +101,7 @@ class Diagnosis:
     remarks: tuple[str, ...] = ()
     path: dict[str, Any] | None = None
     portrait: Portrait | None = None
+    suspects: tuple[SuspectEntry, ...] = ()
 
     @property
     def noise(self) -> Noise:
@@ -243,15 +247,27 @@ def _examined(
             f"{len(data)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
             expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
         )
-    predictor = Predictor(machine, data, effect_files)
-    effects, cannot = testable_effects(predictor)
-    judgements: dict[str, Judgement] = {}
-    for one in noise_models(data, noise, strut_spread, joint_error):
-        say(f"searching {len(effects)} effects, noise {one.name}")
-        judgements[one.name] = judge(Problem.of(predictor, one), one, effects, seed)
+
+    def judged(data: Measurements) -> tuple[dict[str, Judgement], Judgement]:
+        predictor, judgements = Predictor(machine, data, effect_files), {}
+        effects = testable_effects(predictor)[0]
+        for one in noise_models(data, noise, strut_spread, joint_error):
+            say(f"searching {len(effects)} effects, noise {one.name}")
+            judgements[one.name] = judge(Problem.of(predictor, one), one, effects, seed)
+        # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
+        return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
+
+    judgements, main = judged(data)
+    suspects = () if main.question else suspect_rows(main.problem, main.likeliest)
+    entries = suspect_entries(suspects, data, left_out=True)
+    kept = np.ones(len(data), dtype=bool)
+    kept[[row for one in suspects if one.clear for row in one.rows]] = False
+    if not kept.all() and kept.sum() >= FEWEST:
+        say("once more without the rows that look mistyped")
+        data = data.select(kept)
+        judgements, main = judged(data)
     verdict, plausible = common_verdict(list(judgements.values()))
-    # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
-    main = max(judgements.values(), key=lambda judgement: judgement.noise.typical)
+    effects, cannot = testable_effects(main.problem.predictor)
     say("final fits, errors held out by point")
     baseline = Baseline.of(main.problem)
     fits = dict(main.fits)
@@ -265,7 +281,7 @@ def _examined(
         fits, held_out(baseline.refitted, data.point), {name: held_out(fit, data.point) for name, fit in fits.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
-        files or tuple(dict.fromkeys(data.file.tolist())), seed,
+        files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
     )  # fmt: skip
 
 

@@ -12,9 +12,10 @@ from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import json_number, mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
-from toolpath_stiff.updating.diagnosis.words import assumptions, next_steps, row_words, verdict_text, why
+from toolpath_stiff.updating.diagnosis.words import assumptions, doubts, next_steps, row_words, verdict_text, why
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
 from toolpath_stiff.updating.inference.candidates import Component
+from toolpath_stiff.updating.inference.doubts import SuspectEntry
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
@@ -210,6 +211,7 @@ class DiagnosisDocument(TypedDict):
     assumptions: list[str]
     warnings: list[str]
     notes: list[str]
+    suspect_rows: list[SuspectEntry]
     seed: int
     machine: str
     effects: list[str]
@@ -261,7 +263,8 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
-        "notes": list(diagnosis.data.notes),
+        "notes": [*diagnosis.data.notes, *doubts(diagnosis)],
+        "suspect_rows": list(diagnosis.suspects),
         "seed": diagnosis.seed,
         "machine": diagnosis.machine.name,
         "effects": diagnosis.predictor.effects_that_act,

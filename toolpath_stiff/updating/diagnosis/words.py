@@ -14,12 +14,23 @@ from toolpath_stiff.updating.inference.candidates import EXPECTED
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
 from toolpath_stiff.updating.inference.fits import errors_text
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED
+from toolpath_stiff.updating.inference.repeats import OUTLIERS
 
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:
-    """The verdict in one or two sentences, the cause first."""
+    """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
+    return " ".join([_verdict_text(diagnosis), *(f"{_capital(one)}." for one in doubts(diagnosis))])
+
+
+def doubts(diagnosis: Diagnosis) -> list[str]:
+    """What may be wrong with the data instead of the machine: the stated noise, single rows."""
+    noise = dict.fromkeys(judgement.doubt for judgement in diagnosis.judgements.values() if judgement.doubt)
+    return [*noise, *(one["words"] for one in diagnosis.suspects)]
+
+
+def _verdict_text(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "adequate":
         return f"Nothing is missing that these data could show: what is left is scatter.{_not_excluded(diagnosis)}"
     if diagnosis.verdict == "identified":
@@ -234,7 +245,8 @@ def assumptions(diagnosis: Diagnosis) -> list[str]:
         f"noise: {noise.origin}",
         f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
         f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
-        f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: assumed",
+        f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: "
+        + ("assumed" if noise.outliers == OUTLIERS else "as the repeats have it"),
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
         "(sd) of the machine file: effective values, which absorb part of every other effect",
         f"sizes of effects: flat in the logarithm between {100 * EXPECTED[0]:g} and {100 * EXPECTED[1]:g} % change of "

@@ -18,7 +18,7 @@ Two gates. Absolute: a hypothesis must leave residuals that its own noise explai
 posterior probabilities decide; only a name far ahead of all others is given as the answer.
 
 adequate      nothing is missing that these data could show
-identified    one effect (or one pair) explains the data, far likelier than any other
+identified    one effect (or pair, or triple) explains the data, far likelier than any other
 ambiguous     several explain them, and none is far likelier than the others
 unexplained   something is missing, and nothing in the catalogue accounts for it; or the readings do not look as if
               they were of this machine at all (`question`)
@@ -26,35 +26,36 @@ unexplained   something is missing, and nothing in the catalogue accounts for it
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.inference.candidates import EXPECTED
+from toolpath_stiff.updating.inference.doubts import noise_doubt
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.fits import refine
 from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import (
     Family,
-    Pair,
     discrepancy_evidence,
     probabilities,
     score_families,
-    score_pairs,
     signatures,
 )
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.inference.several import Combination, search_pairs, search_triples
 
 FloatArray = NDArray[np.float64]
 
 NONE = "none"
 OUTSIDE = "outside the catalogue"
 # What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
-PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.10
+PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_TRIPLES, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.03, 0.10
 FALSE_ALARM = 0.05  # of the base model's gate
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
 NAMED = 0.90  # probability from which a single name is the answer
@@ -87,7 +88,7 @@ class Judgement:
     gates, fits
         Effect (or "a + b") -> its absolute test and final fit, where they were made.
     pairs
-        Pairs tried, most likely first.
+        Pairs tried, and triples, most likely first.
     probability
         Hypothesis -> posterior probability: effects, `none`, "a + b", `OUTSIDE`. Hypotheses that fail the absolute gate
         have none unless nothing passes.
@@ -95,6 +96,8 @@ class Judgement:
         The form of discrepancy that stands out, in words; "" if none was looked for.
     question
         Whether these are readings of this machine, and why it is asked; "" where nothing says that they are not.
+    doubt
+        That the noise is not what was stated; "" where nothing says so.
     """
 
     verdict: str
@@ -106,15 +109,24 @@ class Judgement:
     families: tuple[Family, ...]
     gates: dict[str, Gate]
     fits: dict[str, Fit]
-    pairs: tuple[Pair, ...]
+    pairs: tuple[Combination, ...]
     probability: dict[str, float]
     form: str
     question: str = ""
+    doubt: str = ""
 
     @property
     def plausible(self) -> tuple[str, ...]:
         """Names of the effects in `explanations`, each once."""
         return tuple(dict.fromkeys(name for one in self.explanations for name in one.split(" + ")))
+
+    @property
+    def likeliest(self) -> Fit:
+        """The fit of the likeliest hypothesis: of those left standing, else the closest."""
+        for name in self.explanations:
+            if name == NONE or name in self.fits:
+                return self.fits.get(name, self.base)
+        return max(self.fits.values(), key=lambda fit: fit.log_posterior, default=self.base)
 
     def family(self, name: str) -> Family:
         """The family of an effect."""
@@ -139,9 +151,10 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     weighed = weigh(problem, noise, candidates, gates)
     asked = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
+    doubt = "" if asked else noise_doubt(problem, noise, gates.base, verdict == "unexplained", seed)
     return Judgement(
         verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked,
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, noise.remark or doubt,
     )  # fmt: skip
 
 
@@ -269,8 +282,8 @@ class Gates:
     base: Gate
     none_stands: bool
     singles: tuple[str, ...] = ()
-    pairs: tuple[Pair, ...] = ()
-    tried: tuple[Pair, ...] = ()
+    pairs: tuple[Combination, ...] = ()
+    tried: tuple[Combination, ...] = ()
     by_name: Mapping[str, Gate] = field(default_factory=dict)
 
     @property
@@ -280,7 +293,7 @@ class Gates:
 
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
-    """The model alone, then single effects, then pairs: of the likeliest single that passes, else of the best ones."""
+    """The model alone, then single effects, then all pairs, then triples where nothing else passes."""
     simulator = Simulator.of(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
@@ -303,17 +316,39 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
             break
         if passes(family.name, family.best):
             singles.append(family)
-    tried = score_pairs(problem, families, singles[:1] or families)
-    evidence = {f.name: f.log_evidence for f in families}
-    pairs = [
-        pair
-        for pair in tried[:TESTED]
-        if pair.log_evidence > max(evidence[member] for member in pair.names) + SURVIVES
-        and passes(pair.name, pair.score)
-    ]
+    evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
+    tried, search = search_pairs(problem, families, base)
+    pairs, tried = _standing(tried, evidence, fits, passes)
+    if not singles and not pairs:
+        evidence |= {pair.names: pair.log_evidence for pair in tried}
+        pairs, triples = _standing(search_triples(problem, search, base), evidence, fits, passes)
+        tried = [*tried, *triples]
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
     none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
     return Gates(alone, none_stands, tuple(f.name for f in singles), tuple(pairs), tuple(tried), by_name)
+
+
+def _standing(
+    found: Sequence[Combination],
+    evidence: Mapping[tuple[str, ...], float],
+    fits: Fits,
+    passes: Callable[[str, Fit], bool],
+) -> tuple[list[Combination], list[Combination]]:
+    """Those of the likeliest that beat each of their parts and pass; and all of them.
+
+    What two effects do to each other is not in their tables: the final fit says how much more likely it makes the data.
+    """
+    standing, tried = [], list(found)
+    for k, one in enumerate(found[:TESTED]):
+        parts = [log for names, log in evidence.items() if set(names) < set(one.names)]
+        if one.log_evidence <= max(parts) + SURVIVES:
+            continue
+        passed = passes(one.name, one.score)
+        more = fits.made[one.name].log_posterior - one.score.log_posterior
+        tried[k] = replace(one, log_evidence=one.log_evidence + more)
+        if passed:
+            standing.append(tried[k])
+    return standing, sorted(tried, key=lambda one: (-one.log_evidence, one.names))
 
 
 # -- probabilities -----------------------------------------------------------------------------------------------------
@@ -346,7 +381,7 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
         if evidence > outside:
             outside, form = evidence, words
     evidences = {OUTSIDE: outside} | {pair.name: pair.log_evidence for pair in gates.pairs}
-    prior = {OUTSIDE: PRIOR_OUTSIDE} | {pair.name: _pair_prior(families) for pair in gates.pairs}
+    prior = {OUTSIDE: PRIOR_OUTSIDE} | {pair.name: _prior(families, len(pair.names)) for pair in gates.pairs}
     found = probabilities(evidences, prior)
     if found[OUTSIDE] < STANDS and gates.pairs:  # ruled out
         del found[OUTSIDE]
@@ -359,7 +394,7 @@ def _posterior(
     candidates: Candidates,
     none: bool,
     names: Sequence[str],
-    pairs: Sequence[Pair] = (),
+    pairs: Sequence[Combination] = (),
 ) -> dict[str, float]:
     """Probabilities of the base model (if it stands), of single effects and of pairs; 0 for all others."""
     base, families = candidates.base, candidates.families
@@ -370,15 +405,15 @@ def _posterior(
     found = {f.name: evidence(f.log_evidence, f.best or base) for f in families}
     found |= {pair.name: evidence(pair.log_evidence, pair.score) for pair in pairs}
     prior = {name: PRIOR_SINGLES / max(len(families), 1) for name in names}
-    prior |= {pair.name: _pair_prior(families) for pair in pairs}
+    prior |= {pair.name: _prior(families, len(pair.names)) for pair in pairs}
     return probabilities(
         {NONE: evidence(base.log_evidence, base)} | found, prior | ({NONE: PRIOR_NONE} if none else {})
     )
 
 
-def _pair_prior(families: Sequence[Family]) -> float:
-    """Prior probability of one pair."""
-    return PRIOR_PAIRS / max(len(families) * (len(families) - 1) // 2, 1)
+def _prior(families: Sequence[Family], count: int) -> float:
+    """Prior probability of one pair or triple of effects."""
+    return {2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
 
 
 def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:

@@ -24,6 +24,7 @@ from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.covariances import Precision
 from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.inference.splines import Spline
 from toolpath_stiff.updating.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
@@ -208,10 +209,8 @@ class Table:
         return self._knots()
 
     @cached_property
-    def _splines(self) -> dict[float, Any]:
-        from scipy.interpolate import CubicSpline
-
-        return {sign: CubicSpline(logs, ratio) for sign, (logs, ratio) in self.knots.items()}
+    def _splines(self) -> dict[float, Spline]:
+        return {sign: Spline.through(logs, ratio) for sign, (logs, ratio) in self.knots.items()}
 
     def reach(self, sign: float) -> float:
         """Largest size tabulated in that direction."""

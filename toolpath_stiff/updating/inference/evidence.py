@@ -311,8 +311,8 @@ class Problem:
         """
         owners = [(t, j) for t in tables for j in range(len(t.candidate.components))]
         chosen = [owners[i] for i in free]
-        sizes = _starting_sizes(tables, start)
-        law, scatter = start.law.copy(), self.scatter
+        sizes = _starting_sizes(tables, start, chosen)
+        law, scatter = start.law.copy(), start.scatter if start.tables else self.scatter
         for last in range(MOST_ROUNDS, -1, -1):
             converged = self._gauss_newton(tables, chosen, sizes, law, scatter.precision)
             if converged is None:
@@ -458,11 +458,13 @@ class _Scan:
         return float(1.0 / np.sqrt(max(-curvature, 1e-2 / x[1] ** 2)))
 
 
-def _starting_sizes(tables: Sequence[Table], start: Fit) -> dict[int, FloatArray]:
-    """Id of a table -> its sizes where a fit begins: those of an earlier fit of the same table, else 0."""
+def _starting_sizes(tables: Sequence[Table], start: Fit, chosen: Sequence[tuple[Table, int]]) -> dict[int, FloatArray]:
+    """Id of a table -> its sizes where a fit begins: the chosen ones of an earlier fit of the same table, else 0."""
     sizes = {id(t): np.zeros(len(t.candidate.components)) for t in tables}
-    if len(start.free) > 0:
-        sizes |= {id(t): old.copy() for t, old in zip(start.tables, start.sizes, strict=True) if id(t) in sizes}
+    known = {id(t): old for t, old in zip(start.tables, start.sizes, strict=True)} if start.free else {}
+    for table, j in chosen:
+        if id(table) in known:
+            sizes[id(table)][j] = known[id(table)][j]
     return sizes
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
 from toolpath_stiff.updating.inference.covariances import Groups, Precision
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.updating.inference.minima import bounded_step
 from toolpath_stiff.updating.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
 
 FloatArray = NDArray[np.float64]
@@ -148,30 +149,18 @@ class _Search:
     def newton_step(self, flat: FloatArray, information: FloatArray, gradient: FloatArray) -> FloatArray:
         """Step (2 + free,) of law and free sizes to the least quadratic model within the bounds.
 
-        By bounded-variable least squares (Stark and Parker 1995, Computational Statistics 10, 129) where the plain
-        step would leave them: cutting that off leads uphill where sizes trade off against each other.
+        By bounded-variable least squares where the plain step would leave them: cutting that off leads uphill where
+        sizes trade off against each other.
         """
         step = _solve(information, gradient)
         low, high = (limit[list(self.free)] - flat[list(self.free)] for limit in self.limits())
         if ((step[2:] >= low) & (step[2:] <= high)).all():
             return step
-        from scipy.optimize import lsq_linear
-
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-        values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        kept = values > 1e-12 * values[-1]
-        root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
-        target = vectors[:, kept].T @ (gradient / scale) / np.sqrt(values[kept])
         free_law = np.full(2, np.inf)
-        bounds = (np.concatenate([-free_law, low * scale[2:]]), np.concatenate([free_law, high * scale[2:]]))
-        return np.asarray(lsq_linear(root, target, bounds, method="bvls").x / scale)
+        return bounded_step(information, gradient, np.concatenate([-free_law, low]), np.concatenate([free_law, high]))
 
     def jacobian(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> FloatArray:
-        columns = []
-        for j in range(2):
-            moved = law.copy()
-            moved[j] += 1e-4
-            columns.append((residual - self.residual(moved, flat)) / 1e-4)
+        columns = self._law_columns(law, flat, residual)
         components = [component for c in self.candidates for component in c.components]
         for index in self.free:
             size = flat[index]
@@ -182,6 +171,18 @@ class _Search:
             moved[index] += step
             columns.append((residual - self.residual(law, moved)) / step)
         return np.nan_to_num(np.stack(columns, axis=1))
+
+    def _law_columns(self, law: FloatArray, flat: FloatArray, residual: FloatArray) -> list[FloatArray]:
+        """Two (n,) d ln k / d law: in closed form where the struts carry what equilibrium says."""
+        predictor = self.problem.predictor
+        if np.isfinite(residual).all() and predictor.struts_carry_all(c.effect for c in self.candidates):
+            return list(predictor.law_columns(self.problem.observed - residual, law).T)
+        columns = []
+        for j in range(2):
+            moved = law.copy()
+            moved[j] += 1e-4
+            columns.append((residual - self.residual(moved, flat)) / 1e-4)
+        return columns
 
     def step(
         self, law: FloatArray, flat: FloatArray, residual: FloatArray, step: FloatArray, scatter: Scatter

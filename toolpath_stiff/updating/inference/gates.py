@@ -30,15 +30,16 @@ from toolpath_stiff.updating.inference.covariances import (
     same_kernel,
 )
 from toolpath_stiff.updating.inference.evidence import Problem
-from toolpath_stiff.updating.inference.noise import Noise
+from toolpath_stiff.updating.inference.noise import Noise, Scatter
 from toolpath_stiff.updating.inference.prediction import Predictor
 
 FloatArray = NDArray[np.float64]
 
 DRAWS = 400
 RIDGE = 1e-12  # on the diagonal where readings are set aside: two that a fit explains entirely are not told apart
-WILD_SQUARED = 11.3  # squared deleted residual beyond which a reading is set aside; pays the price of `scatter`
-MOST_WILD = 0.05
+# Squared deleted residual beyond which a reading is set aside, and share of readings that may be: what pays the price
+# of `scatter` where one reading in fifty is wild.
+WILD_SQUARED, MOST_WILD = 11.3, 0.05
 CHANCE = 0.05  # share of campaigns in which the best of all candidates gains as much by chance
 HOPELESS = 1.3  # times the largest simulated sum of squares
 
@@ -115,12 +116,13 @@ class Aside:
     count: FloatArray
 
 
-def set_wild_aside(pulls: FloatArray, projected: Precision) -> Aside:
-    """Set aside in pulls P r (s, n) the readings that are far off what all others say of them."""
+def set_wild_aside(pulls: FloatArray, projected: Precision, scatter: Scatter | None = None) -> Aside:
+    """Set aside in pulls P r (s, n) the readings that are far off what all others say of them, as `scatter` has it."""
+    beyond, share = (WILD_SQUARED, MOST_WILD) if scatter is None else (scatter.beyond, scatter.most)
     squared = pulls**2 / np.maximum(projected.diagonal, 1e-12)
-    most = max(1, int(MOST_WILD * pulls.shape[1]))
+    most = max(1, int(share * pulls.shape[1]))
     taken = np.zeros_like(pulls)
-    count = np.minimum((squared > WILD_SQUARED).sum(axis=1), most)
+    count = np.minimum((squared > beyond).sum(axis=1), most)
     furthest = np.argsort(-squared, axis=1, kind="stable")[:, : count.max(initial=0)]
     for size in np.unique(count[count > 0]).tolist():
         sets = np.flatnonzero(count == size)
@@ -224,8 +226,8 @@ def absolute_gate(
     """
     projected = problem.projected(jacobian)
     # What the linearised refit leaves of the data is their residual; the law's prior pulls as in the simulation.
-    observed = set_wild_aside(projected.times(residual[None]), projected)
-    drawn = set_wild_aside(projected.times(simulator.draws), projected)
+    observed = set_wild_aside(projected.times(residual[None]), projected, problem.scatter)
+    drawn = set_wild_aside(projected.times(simulator.draws), projected, problem.scatter)
     squares = _quadratic(problem, drawn)
     observed_squares = float(_quadratic(problem, observed)[0])
     structure = Structure(forms, projected)
@@ -261,7 +263,7 @@ def gain_threshold(
 ) -> float:
     """Twice-log-likelihood gain that the best of all candidates reaches by chance in one campaign of twenty."""
     projected = problem.projected(jacobian)
-    drawn = set_wild_aside(projected.times(simulator.draws), projected)
+    drawn = set_wild_aside(projected.times(simulator.draws), projected, problem.scatter)
     return float(np.quantile(largest_gain(drawn.pulls, projected, signatures), 1.0 - CHANCE))
 
 
@@ -270,7 +272,7 @@ def _quadratic(problem: Problem, aside: Aside) -> FloatArray:
 
     P V P = P but for the law's prior, which is next to nothing.
     """
-    return problem.scatter.covariance.squares(aside.pulls) + WILD_SQUARED * aside.count
+    return problem.scatter.covariance.squares(aside.pulls) + problem.scatter.beyond * aside.count
 
 
 def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
-from toolpath_stiff.updating.inference.candidates import Table, candidates_of, table_of, tabulate
-from toolpath_stiff.updating.inference.covariances import Precision
+from toolpath_stiff.updating.inference.candidates import Table, candidates_of, table_of
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import Forms, Structure, set_wild_aside
 
@@ -73,8 +72,14 @@ def _scores(problem: Problem, table: Table, base: Fit) -> list[tuple[Fit, float]
     if table.knots:
         return [(problem.score_single(table, base), 0.0)]
     subsets = list(table.candidate.subsets())
-    found = ((problem.score_subset([table], free, base), -float(np.log(len(subsets)))) for free in subsets)
-    return [(score, weight) for score, weight in found if score is not None]
+    weight, found, start = -float(np.log(len(subsets))), [], base
+    for free in subsets:
+        score = problem.score_subset([table], free, start)
+        if score is not None:
+            found.append((score, weight))
+            # The next subset begins where this one has ended, with the readings that it takes for wild.
+            start = score
+    return found
 
 
 def score_families(
@@ -183,101 +188,14 @@ def _quantile(
     return 0.0 if abs(high) <= 1e-12 * (bracket[1] - bracket[0]) else high
 
 
-# -- two effects at once -----------------------------------------------------------------------------------------------
+# -- the alternative to every explanation ------------------------------------------------------------------------------
 #
-# Two effects at once, and the alternative to every explanation: something that no effect of the catalogue describes.
-#
-# Pairs are tried only where no single effect will do: from each of the best singles, the partners that would gain most.
-# With some hundred pairs to choose from one of them fits many a strange machine tolerably, so that pairs compete with
-# the forms of discrepancy: only if the catalogue's physics explains more than a smooth unknown does it get the name.
+# Something that no effect of the catalogue describes: with some hundred pairs to choose from one of them fits many a
+# strange machine tolerably, so that pairs and triples compete with the forms of discrepancy. Only if the catalogue's
+# physics explains more than a smooth unknown does it get the name.
 
-STARTS = 5  # singles from which pairs are built
-PARTNERS = 6  # partners tried for each
 AMPLITUDES = np.geomspace(0.003, 0.3, 9)  # rms of a discrepancy of ln k; as wide as the effects' own prior
 FORMS = 5  # forms of discrepancy that are weighed, those that stick out most
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Two effects together."""
-
-    names: tuple[str, str]
-    score: Fit
-    log_evidence: float
-
-    @property
-    def name(self) -> str:
-        """Both effects: "a + b"."""
-        return " + ".join(self.names)
-
-
-def score_pairs(problem: Problem, families: Sequence[Family], starts: Sequence[Family]) -> list[Pair]:
-    """The pairs worth looking at that hold one of the first of `starts`, the most likely first; each pair once."""
-    best: dict[tuple[str, str], Pair] = {}
-    tables = [(family.name, table) for family in families for table in family.tables]
-    for first in [family for family in starts if family.best is not None][:STARTS]:
-        assert first.best is not None
-        projected = problem.projected(first.best.jacobian)
-        pulls = set_wild_aside(projected.times(first.best.residual[None]), projected).pulls
-        partners = [(name, table) for name, table in tables if name != first.name]
-        gains = [_gain(table, pulls[0], projected, problem) for _, table in partners]
-        for index in np.argsort(gains)[::-1][:PARTNERS]:
-            name, table = partners[int(index)]
-            found = _together(problem, first.best, _beside(problem, first.best, table))
-            if found is None:
-                continue
-            key = (first.name, name) if first.name < name else (name, first.name)
-            choices = len(first.tables) * sum(1 for other, _ in tables if other == name)
-            evidence = found.log_evidence - np.log(choices)
-            if key not in best or evidence > best[key].log_evidence:
-                best[key] = Pair(key, found, float(evidence))
-    return sorted(best.values(), key=lambda pair: (-pair.log_evidence, pair.names))
-
-
-def _beside(problem: Problem, first: Fit, table: Table) -> Table:
-    """The partner's table where the first effect is at work already, if one of the two is an instrument.
-
-    An instrument's factor acts on the whole compliance, the partner's included; mechanical effects add up as they are.
-    """
-    owner = first.candidates[0]
-    if not (owner.effect.is_instrument or table.candidate.effect.is_instrument):
-        return table
-    beside = [owner.active(first.sizes[0])]
-    return tabulate(table.candidate, problem.predictor, first.law, beside) or table
-
-
-def _gain(table: Table, pulls: FloatArray, projected: Precision, problem: Problem) -> float:
-    """Largest linear gain of a partner's components, signs respected one by one."""
-    columns = -table.columns / problem.base_compliance[:, None]
-    slopes = columns.T @ pulls
-    information = projected.squares(columns.T)
-    gains = []
-    for slope, own, component in zip(slopes, information, table.candidate.components, strict=True):
-        if own > 0.0 and np.sign(slope) in component.signs:
-            gains.append(slope**2 / own)
-    return float(sum(gains))
-
-
-def _together(problem: Problem, first: Fit, table: Table) -> Fit | None:
-    """The first effect's components refitted along with each subset of the partner's; the best."""
-    count = len(first.sizes[0])
-    found: Fit | None = None
-    subsets = list(table.candidate.subsets())
-    for subset in subsets:
-        free = (*first.free, *(count + j for j in subset))
-        score = problem.score_subset([first.tables[0], table], free, first)
-        if score is None or not score.possible:
-            continue
-        weighted = score.log_evidence - np.log(len(subsets)) - np.log(max(len(list(first.candidates[0].subsets())), 1))
-        if found is None or weighted > found.log_evidence:
-            found = _replace_evidence(score, float(weighted))
-    return found
-
-
-def _replace_evidence(score: Fit, log_evidence: float) -> Fit:
-    from dataclasses import replace
-
-    return replace(score, log_evidence=log_evidence)
 
 
 def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[float, str]:
@@ -290,7 +208,7 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
     averaged over amplitudes and forms.
     """
     projected = problem.projected(score.jacobian)
-    taken = set_wild_aside(projected.times(score.residual[None]), projected).taken
+    taken = set_wild_aside(projected.times(score.residual[None]), projected, problem.scatter).taken
     structure = Structure(forms, projected)
     loads = structure.loads(score.residual[None], taken)
     gains = []

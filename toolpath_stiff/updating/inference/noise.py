@@ -28,13 +28,19 @@ from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.inference.repeats import (
+    OUTLIER_WIDTH,
+    OUTLIERS,
+    Repeats,
+    copied,
+    from_repeats,
+)
 from toolpath_stiff.updating.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
 At = TypeVar("At")  # where a fit stands
 
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
-OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0  # share of wild readings, and how much wider they scatter; assumed
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
 LOW_GUESS, HIGH_GUESS = 0.02, 0.10
@@ -45,8 +51,7 @@ LEAST = 1e-3
 # Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
 # states it, within a third where it is guessed; assumed.
 STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
-FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
-WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
+CONTRADICTED = 3.3  # standard deviations of the logarithm of their ratio from which repeats overrule a stated noise
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,8 @@ class Noise:
         Degrees of freedom behind `repeat`: how far it is to be trusted.
     origin
         Where the figures come from, a sentence.
+    remark
+        That a stated noise is not what the repeats show; "" where nothing is to be said.
     """
 
     name: str
@@ -82,6 +89,7 @@ class Noise:
     outlier_width: float
     freedom: float
     origin: str
+    remark: str = ""
 
     @property
     def reading(self) -> FloatArray:
@@ -131,26 +139,38 @@ def noise_models(
         A stated noise that cannot be.
     """
 
-    def model(name: str, repeat: FloatArray, clamping: float, freedom: float, origin: str) -> Noise:
+    def model(
+        name: str, repeat: FloatArray, clamping: float, freedom: float, origin: str, wild: float = OUTLIERS,
+        remark: str = "",
+    ) -> Noise:  # fmt: skip
         if repeat.min() < LEAST:
             repeat = np.maximum(repeat, LEAST)
             origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
-        return Noise(name, repeat, clamping, strut_spread, joint_error, OUTLIERS, OUTLIER_WIDTH, freedom, origin)
+        return Noise(name, repeat, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark)
 
     n = len(data)
+    repeats = None if copied(data) else from_repeats(data)
+    remark = ""
     if stated is not None:
         both = stated if isinstance(stated, tuple) else _shared(stated)
         if not (0.0 < both[0] <= LARGEST and 0.0 <= both[1] <= LARGEST):
             raise InputError(f"a noise of {stated!r}", expected=f"more than 0 and at most {100 * LARGEST:g} %")
-        return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}"),)
-    repeats = None if copied(data) else estimate_from_repeats(data)
+        remark = "" if repeats is None else _disagreement(repeats, both[0], both[1], "noise stated with --noise")
+        if not remark:
+            wild = OUTLIERS if repeats is None else repeats.wild
+            return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}", wild),)
+    relative = data.sd / data.stiffness
+    column = stated is None and not np.isnan(relative).any()
     if repeats is not None:
-        repeat, clamping, freedom, clamps = repeats
-        origin = f"estimated from {freedom} differences between repeats: {_percent(repeat, clamping)}"
-        origin += "" if clamps else " (clamping assumed: no point was clamped twice)"
-        return (model("measured", np.full(n, repeat), clamping, float(freedom), origin),)
-    if not np.isnan(data.sd).any():
-        relative = data.sd / data.stiffness
+        if column:
+            total = float(np.sqrt(np.mean(relative**2)))
+            remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file")
+        origin = f"estimated from {repeats.freedom} differences between repeats: "
+        origin += _percent(repeats.repeat, repeats.clamping)
+        origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
+        repeat = np.full(n, repeats.repeat)
+        return (model("measured", repeat, repeats.clamping, float(repeats.freedom), origin, repeats.wild, remark),)
+    if column:
         clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
         repeat = np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2))
         origin = (
@@ -165,6 +185,25 @@ def noise_models(
         origin = f"a {name} guess, {_percent(*both)}: {why}"
         guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
     return tuple(guesses)
+
+
+def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -> str:
+    """That repeats contradict a stated noise, in a sentence; "" where they do not.
+
+    Both are estimates: the stated one to `STATED_FREEDOM`, the repeats' to theirs (sd of a ratio's logarithm).
+    """
+    told, found = repeat, repeats.repeat
+    if repeats.clamps:
+        told, found = float(np.hypot(repeat, clamping)), float(np.hypot(repeats.repeat, repeats.clamping))
+    ratio = found / told
+    sd = np.sqrt(0.5 / STATED_FREEDOM + 0.5 / repeats.freedom)
+    if abs(np.log(ratio)) < CONTRADICTED * sd:
+        return ""
+    small = ratio > 1.0
+    return (
+        f"the {what} is too {'small' if small else 'large'}: {100 * told:.2g} %, where {repeats.freedom} differences "
+        f"between repeats scatter {ratio:.2g} times as much; what the repeats show is used instead"
+    )
 
 
 def _shared(total: float) -> tuple[float, float]:
@@ -185,159 +224,12 @@ def covariance(noise: Noise, predictor: Predictor) -> Covariance:
     return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, shared)
 
 
-def repeat_groups(data: Measurements) -> NDArray[np.int64]:
-    """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop."""
-    columns = [np.round(data.position, 6), np.round(data.angles, 6), np.round(data.direction, 6)]
-    columns += [data.force[:, None], data.tool_extension[:, None]]
-    for labels in (data.setup, data.loop):
-        columns.append(np.unique(labels, return_inverse=True)[1].reshape(-1, 1).astype(float))
-    groups = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
-    return np.asarray(groups.reshape(-1), dtype=np.int64)
-
-
-def copied(data: Measurements) -> bool:
-    """Whether every repeat is the same number as the reading that it repeats: that tells nothing of any scatter."""
-    groups = repeat_groups(data)
-    _, first = np.unique(groups, return_index=True)
-    again = np.bincount(groups)[groups] > 1
-    return bool(again.any() and (data.stiffness == data.stiffness[first][groups])[again].all())
-
-
-def estimate_from_repeats(data: Measurements) -> tuple[float, float, int, bool] | None:
-    """(repeat, clamping, degrees of freedom, whether clamping was estimated) from repeats, or None without enough.
-
-    What differs between repeats beside chance, the time since zeroing and the order, is projected out first, so that
-    a drift is not taken for noise. Differences beyond `WILD` standard deviations are set aside as wild.
-    """
-    groups = repeat_groups(data)
-    kept = np.bincount(groups)[groups] > 1
-    result = None
-    for _ in range(4):
-        if not kept.any():
-            return result
-        contrasts = _Contrasts.of(data.select(kept), groups[kept])
-        if contrasts.count < FEWEST_CONTRASTS:
-            return result
-        repeat, clamping, found = _maximum_likelihood(contrasts)
-        result = (repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found)
-        wild = contrasts.deviations(*result[:2]) > WILD
-        if not wild.any():
-            return result
-        indices = np.flatnonzero(kept)
-        kept[indices[wild]] = False
-        kept &= np.bincount(groups, weights=kept, minlength=groups.max() + 1)[groups] > 1
-    return result
-
-
-@dataclass(frozen=True)
-class _Contrasts:
-    """Differences between repeats: what is left of n ln readings y beside group means, time and order, M y.
-
-    M takes least squares' residuals. Their covariance is M (repeat^2 + clamping^2 Z Z^T) M, Z with a column of ones and
-    noughts a clamping; all that a likelihood asks of it are the eigenvalues of Z^T M Z, as many as there are
-    clampings, and the shares of M y along its eigenvectors.
-
-    Attributes
-    ----------
-    left, own
-        (n,) M y; diagonal of M.
-    reached, values
-        (n, k) M Z E for eigenvectors E of Z^T M Z, and its eigenvalues (k,) that are not 0. None where every reading
-        was clamped by itself, which cannot be told from repeat noise.
-    count
-        Rank of M: degrees of freedom.
-    """
-
-    left: FloatArray
-    own: FloatArray
-    reached: FloatArray
-    values: FloatArray
-    count: int
-
-    @classmethod
-    def of(cls, data: Measurements, groups: NDArray[np.int64]) -> _Contrasts:
-        """Of readings in groups (n,) of repeats."""
-        means, clamps = Groups.by(groups), Groups.by(data.clamp)
-
-        def centred(columns: FloatArray) -> FloatArray:
-            sizes = np.bincount(means.of)
-            return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
-
-        axes, size, _ = np.linalg.svd(centred(_drifts(data)), full_matrices=False)
-        fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(np.bincount(means.of).max()))]
-
-        def left(columns: FloatArray) -> FloatArray:
-            found = centred(columns)
-            return np.asarray(found - fixed @ (fixed.T @ found))
-
-        n, count = len(groups), len(groups) - means.count - fixed.shape[1]
-        clamped = np.zeros((n, 0)) if clamps.alone else left((clamps.of[:, None] == np.arange(clamps.count)) * 1.0)
-        values, vectors = np.linalg.eigh(clamped.T @ clamped)
-        kept = values > values.max(initial=0.0) * n * np.finfo(float).eps
-        own = 1.0 - 1.0 / np.bincount(means.of)[means.of] - (fixed**2).sum(axis=1)
-        return cls(left(np.log(data.stiffness)[:, None])[:, 0], own, clamped @ vectors[:, kept], values[kept], count)
-
-    @property
-    def tells(self) -> bool:
-        """Whether the differences tell clamping from repeat noise."""
-        rank = len(self.values)
-        spread = float(np.ptp(self.values)) if rank == self.count else float(self.values.max(initial=0.0))
-        return spread > 1e-6 and rank >= 3
-
-    @property
-    def loads(self) -> FloatArray:
-        """(k,) squared shares of M y along the eigenvectors."""
-        return np.asarray((self.left @ self.reached) ** 2 / self.values)
-
-    def deviations(self, repeat: float, clamping: float) -> FloatArray:
-        """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
-        repeat, alone = max(repeat, 1e-12), self.reached.shape[1] == 0
-        ratio, own = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if alone else 0.0)
-        weights = ratio / (1.0 + ratio * self.values)
-        pull = (self.left - self.reached @ (weights * (self.left @ self.reached))) / own
-        scale = np.sqrt(np.maximum(self.own - self.reached**2 @ weights, 0.0) / own)
-        return np.asarray(np.abs(pull) / np.maximum(scale, 1e-12))
-
-
-def _drifts(data: Measurements) -> FloatArray:
-    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing."""
-    regressors = [np.linspace(-1.0, 1.0, len(data))]
-    if "time_min" not in data.missing:
-        # A drift adds rate * time to the deflection: to the logarithm, rate * time * k / F and its square.
-        drift = data.time * data.stiffness / data.force
-        drift = drift / max(float(np.abs(drift).max()), 1e-300)
-        regressors += [drift, drift**2, data.time / max(float(data.time.max()), 1e-300)]
-    return np.stack(regressors, axis=1)
-
-
-def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
-    """Repeat noise and clamping that make the contrasts most likely, and whether they tell of clamping at all."""
-    from scipy.optimize import minimize_scalar
-
-    values, loads = contrasts.values, contrasts.loads
-    rest = max(float(contrasts.left @ contrasts.left) - float(loads.sum()), 0.0)
-
-    def repeat_at(ratio: float) -> float:
-        return float(np.sqrt((rest + (loads / (1.0 + ratio * values)).sum()) / contrasts.count))
-
-    def minus_log_likelihood(root: float) -> float:
-        ratio = root**2
-        return contrasts.count * float(np.log(max(repeat_at(ratio), 1e-12))) + 0.5 * float(
-            np.log1p(ratio * values).sum()
-        )
-
-    if not contrasts.tells:
-        return repeat_at(0.0), 0.0, False
-    best = minimize_scalar(minus_log_likelihood, bounds=(0.0, 5.0), method="bounded")
-    root = float(best.x) if best.fun < minus_log_likelihood(0.0) else 0.0
-    return repeat_at(root**2), root * repeat_at(root**2), True
-
-
 # -- scatter with wild readings ----------------------------------------------------------------------------------------
 #
 # The scatter of the readings, with wild ones found out fit by fit.
 
-MOST_WILD = 0.05  # share of readings that may be taken for wild
+MOST_WILD = 0.05  # share of readings that may be taken for wild; more where more of them are
+OFTEN_WILD = 2.0  # times the expected share
 NEVER = 1e12  # price of a wild reading where there are none
 
 
@@ -355,19 +247,27 @@ class Scatter:
         Minus the log odds of a reading being wild.
     wild
         Readings taken for wild.
+    beyond
+        Squared deviation beyond which a reading's widening pays that price.
+    most
+        Share of readings that may be taken for wild.
     """
 
     covariance: Covariance
     widening: FloatArray
     price: float
     wild: tuple[int, ...] = ()
+    beyond: float = np.inf
+    most: float = MOST_WILD
 
     @classmethod
     def of(cls, noise: Noise, covariance: Covariance) -> Scatter:
         """From a noise model and its covariance."""
         widening = (noise.outlier_width**2 - 1.0) * noise.repeat**2
         price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
-        return cls(covariance, widening, float(price))
+        wide = noise.outlier_width**2
+        beyond = (2.0 * price + np.log(wide)) * wide / (wide - 1.0)
+        return cls(covariance, widening, float(price), (), float(beyond), max(MOST_WILD, OFTEN_WILD * noise.outliers))
 
     @property
     def precision(self) -> Precision:
@@ -382,7 +282,7 @@ class Scatter:
         """
         diagonal, wild = self.precision.diagonal, list(self.wild)
         pull = self.precision.times(residual)
-        most = int(MOST_WILD * len(residual)) + 1
+        most = int(self.most * len(residual)) + 1
         taken = np.zeros((most, len(residual)))  # the inverse falls by row^T row of each
         for k in range(most):
             own = 1.0 + self.widening * diagonal

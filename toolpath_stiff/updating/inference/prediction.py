@@ -7,7 +7,7 @@ least-squares fit of constants in N/m would stop at once, its gradient being tin
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.stiffness import exact
-from toolpath_stiff.stiffness.effects.contract import LoadPath
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
 from toolpath_stiff.updating.measurements import Measurements, measured_path
 
@@ -130,7 +130,10 @@ class Predictor:
             model.machine.platform_joints is self.base.machine.platform_joints
             and model.machine.frame_joints is self.base.machine.frame_joints
         )
-        path = replace(prepared.path, machine=model.machine) if same_geometry else measured_path(model, prepared.data)
+        if same_geometry:
+            path = replace(prepared.path, machine=model.machine)
+            return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction, prepared.forces))
+        path = measured_path(model, prepared.data)
         return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction))
 
     def full_path(self) -> LoadPath:
@@ -158,6 +161,14 @@ class Predictor:
         compliance = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
         share = prepared.forces**2 * compliance * np.exp(self._base_log())[prepared_first(prepared)][:, None]
         return np.asarray(share[prepared.which])
+
+    def struts_carry_all(self, effects: Iterable[Effect]) -> bool:
+        """Whether these effects and the machine file's leave geometry, equilibrium and readings as they are."""
+        hooks = ("geometry", "parallel_stiffness", "reading")
+        mine = (active.effect for active in (*self.base.effects, *self.base.instruments))
+        return not any(
+            getattr(type(effect), hook) is not getattr(Effect, hook) for effect in (*effects, *mine) for hook in hooks
+        )
 
     def law_columns(self, log_stiffness: FloatArray, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(n, 2) d ln k / d law where the model says `log_stiffness` (n,).

@@ -1,0 +1,87 @@
+"""What may be wrong with the data: slips in rows that were put there, noises that were stated wrongly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.stiffness.cases import nist
+from tests.updating.cases import campaign
+from toolpath_stiff.updating.inference.doubts import suspect_entries, suspect_rows
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.noise import noise_models
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.inference.repeats import from_repeats
+
+DATA = campaign(78, "tilted", "none")[0]
+
+
+def suspects(data):
+    (noise,) = noise_models(data)
+    problem = Problem.of(Predictor(nist(), data), noise)
+    return suspect_rows(problem, problem.score_base())
+
+
+def clamping(data, number):
+    return np.flatnonzero(data.clamp == np.unique(data.clamp)[number])
+
+
+def test_nothing_is_suspected_where_nothing_slipped() -> None:
+    assert suspects(DATA) == ()
+
+
+def test_a_stiffness_in_another_unit_is_named() -> None:
+    stiffness = DATA.stiffness.copy()
+    stiffness[40] *= 25.4 / 4.4482216152605
+    (found,) = suspects(replace(DATA, stiffness=stiffness))
+    assert found.rows == (40,) and found.clear and "lbf/in" in found.words
+    (entry,) = suspect_entries((found,), DATA, left_out=True)
+    assert entry["row"] == 41 and entry["lines"] == [42] and entry["left_out"] and "left out" in entry["words"]
+
+
+def test_exchanged_readings_are_named() -> None:
+    rows = clamping(DATA, 5)
+    alike = rows[DATA.force[rows] == DATA.force[rows[0]]]
+    spread = [abs(np.log(DATA.stiffness[a] / DATA.stiffness[b])) for a in alike for b in alike]
+    a, b = divmod(int(np.argmax(spread)), len(alike))
+    stiffness = DATA.stiffness.copy()
+    stiffness[[alike[a], alike[b]]] = stiffness[[alike[b], alike[a]]]
+    (found,) = suspects(replace(DATA, stiffness=stiffness))
+    assert set(found.rows) == {alike[a], alike[b]} and found.column == "direction"
+
+
+def test_a_wrong_sign_in_all_rows_of_a_clamping_is_named() -> None:
+    number = int(np.argmax([abs(DATA.angles[clamping(DATA, k)[0], 1]) for k in range(48)]))
+    rows = clamping(DATA, number)
+    angles = DATA.angles.copy()
+    angles[rows, 1] *= -1.0
+    (found,) = suspects(replace(DATA, angles=angles))
+    assert set(found.rows) == set(rows.tolist()) and found.column == "b_deg" and found.clear
+    assert float(found.meant) == pytest.approx(np.degrees(DATA.angles[rows[0], 1]))
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_repeats_overrule_a_stated_noise(factor: float) -> None:
+    told = from_repeats(DATA)
+    assert told is not None
+    (noise,) = noise_models(DATA, (factor * told.repeat, factor * told.clamping))
+    assert noise.name == "measured" and noise.typical_repeat == pytest.approx(told.repeat)
+    assert f"too {'small' if factor < 1.0 else 'large'}" in noise.remark
+    (noise,) = noise_models(DATA, (told.repeat, told.clamping))
+    assert noise.name == "stated" and noise.remark == ""
+
+
+def test_the_share_of_wild_readings_is_estimated() -> None:
+    """One reading in ten made wild, 4 times as wide: taken for noise they would make it 1.6 times as large."""
+    before, found = from_repeats(DATA), []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        wild = rng.choice(len(DATA), len(DATA) // 10, replace=False)
+        logs = np.log(DATA.stiffness)
+        logs[wild] += 0.08 * rng.standard_normal(len(wild))
+        found.append(from_repeats(replace(DATA, stiffness=np.exp(logs))))
+    assert before is not None
+    assert np.mean([one.wild for one in found if one]) > 0.045 > before.wild
+    assert np.mean([one.repeat for one in found if one]) < 1.35 * before.repeat

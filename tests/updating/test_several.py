@@ -1,0 +1,71 @@
+"""Several effects at once: the linear search against a general optimiser, and what the catalogue's pairs give back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from tests.stiffness.cases import nist
+from tests.updating.cases import active, campaign, make_problem, predictor_for, simple_noise
+from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.updating.inference.hypotheses import Family, tables_of
+from toolpath_stiff.updating.inference.several import LinearSearch, search_pairs, search_triples
+
+NAMES = ("weak_strut", "table_compliance", "spindle_compliance", "frame_compliance", "thermal_drift", "gauge_scale")
+DATA = campaign(77, "tilted", "none")[0]
+
+
+def families_of(problem):
+    """The effects of `NAMES` with their tables, not fitted one by one: the search does not ask."""
+    found = []
+    for name in NAMES:
+        effect = find_effect(name)
+        found.append(Family(effect, tuple(tables_of(problem, effect)), None, 0.0))
+    return found
+
+
+def problem_with(*effects, noise=1e-3, seed=3):
+    """Readings of the nist machine with these effects, and little scatter."""
+    rng = np.random.default_rng(seed)
+    logs = predictor_for(DATA).log_stiffness(effects=effects)
+    problem, _ = make_problem(nist(), DATA, simple_noise(len(DATA), noise))
+    problem.observed = logs + noise * rng.standard_normal(len(DATA))
+    return problem
+
+
+WEAK = active("weak_strut", {"strut": 4}, factor=0.85)
+TABLE = active("table_compliance", x=2e-9, z=1e-9)
+DRIFT = active("thermal_drift", rate=2e-9)
+
+
+def test_the_best_pair_and_its_components_are_found_among_all() -> None:
+    problem = problem_with(WEAK, TABLE)
+    pairs, search = search_pairs(problem, families_of(problem), problem.score_base())
+    assert pairs[0].names == ("table_compliance", "weak_strut")
+    sizes = {c.name: (dict(c.choice), s) for c, s in zip(pairs[0].score.candidates, pairs[0].score.sizes, strict=True)}
+    assert sizes["weak_strut"][0]["strut"] == 4
+    assert sizes["table_compliance"][1] == pytest.approx([2e-9, 0.0, 1e-9, 0.0], abs=1e-10)
+    assert len(search.ranked) == len(NAMES) * (len(NAMES) - 1) // 2  # every pair of effects, each once
+
+
+def test_triples_hold_one_of_the_best_pairs() -> None:
+    problem = problem_with(WEAK, TABLE, DRIFT)
+    base = problem.score_base()
+    _, search = search_pairs(problem, families_of(problem), base)
+    assert search_triples(problem, search, base)[0].names == ("table_compliance", "thermal_drift", "weak_strut")
+
+
+def test_sizes_within_bounds_are_those_of_least_squares() -> None:
+    problem = problem_with(WEAK, TABLE)
+    search = LinearSearch.of(problem, families_of(problem), problem.score_base())
+    rng = np.random.default_rng(1)
+    root = rng.standard_normal((60, search.columns.shape[0] * search.columns.shape[1]))
+    target = rng.standard_normal(60)
+    search.low, search.high = np.full_like(search.low, 0.0), np.full_like(search.high, 0.05)
+    at = rng.choice(root.shape[1], (20, 8), replace=True)
+    at = np.array([np.sort(rng.choice(root.shape[1], 8, replace=False)) for _ in at])
+    sizes, _ = search._bounded(at, root.T @ root, root.T @ target)
+    for columns, found in zip(at, sizes, strict=True):
+        wanted = lsq_linear(root[:, columns], target, (0.0, 0.05), method="bvls").x
+        assert found == pytest.approx(wanted, abs=1e-6)

@@ -1,0 +1,402 @@
+"""What may be wrong with the data instead of the machine: a stated noise, single rows.
+
+A stated noise is held against what the readings leave. A row or all rows of one clamping are held against the slips
+that people make when they write measurements down. Both are named; nothing is changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.stiffness.model import build_model
+from toolpath_stiff.units import n_per_mm_from_n_per_m, rad_from_deg
+from toolpath_stiff.updating.inference.covariances import Groups, Precision
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.noise import Noise, Scatter
+from toolpath_stiff.updating.inference.prediction import scaled_law
+from toolpath_stiff.updating.measurements import Measurements, model_stiffness
+
+FloatArray = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+# -- a stated noise that nothing but the misfit tells of ---------------------------------------------------------------
+
+TOO_QUIET = 0.005  # share of simulated campaigns that scatter as little or less
+ROUNDS = 3  # of the search for the noise that the readings show
+LARGEST_FACTOR = 10.0
+ENOUGH = 0.05  # probability of the base model's gate, as in the verdict
+
+
+def noise_doubt(problem: Problem, noise: Noise, gate: Gate, nothing_stands: bool, seed: int) -> str:
+    """That a stated noise does not fit the readings, in a sentence; "" where it may be right.
+
+    Too large where the model leaves less than such a noise would. Too small where no explanation stands, but the model
+    alone would under a larger noise: its residuals then have the size alone against them, and no pattern.
+    """
+    if noise.name != "stated":
+        return ""
+    told = 100.0 * noise.typical
+    if float((gate.simulated <= gate.squares).mean()) < TOO_QUIET:
+        factor = float(np.sqrt(gate.squares / np.median(gate.simulated)))
+        return (
+            f"the stated noise of {told:.2g} % is too large: what the model leaves is about {factor:.2g} times what "
+            f"such a noise would leave; {factor * told:.2g} % would fit, and small effects would show"
+        )
+    if not nothing_stands:
+        return ""
+    factor = 1.0
+    for _ in range(ROUNDS):
+        factor *= float(np.sqrt(gate.squares / np.median(gate.simulated)))
+        if not 1.0 < factor < LARGEST_FACTOR:
+            return ""
+        gate = _gate_at(problem, noise, factor, seed)
+    if gate.probability <= ENOUGH:
+        return ""
+    return (
+        f"the stated noise of {told:.2g} % may be too small: were it {factor:.2g} times as large, {factor * told:.2g} "
+        "%, the model alone would explain the readings; repeat a few readings, re-clamped, and leave it to them"
+    )
+
+
+def _gate_at(problem: Problem, noise: Noise, factor: float, seed: int) -> Gate:
+    """The absolute test of the model alone under a noise `factor` times as large."""
+    larger = replace(noise, repeat=factor * noise.repeat, clamping=factor * noise.clamping)
+    scaled = Problem.of(problem.predictor, larger)
+    base = scaled.score_base()
+    forms = Forms(discrepancy_forms(problem.predictor), scaled.scatter.precision)
+    simulator = Simulator.of(larger, scaled.scatter.covariance, seed)
+    return absolute_gate(scaled, base.residual, base.jacobian, simulator, forms)
+
+
+# -- rows that somebody wrote down wrongly -----------------------------------------------------------------------------
+#
+# A slip predicts by how much, d, the modelled ln k of its rows would change were it mended. With z = P r the pulls of
+# the residuals beside law and sizes, mending it gains d^T z - d^T P d / 2 of log likelihood, no size to be fitted. It
+# has to beat both that the rows are as they should be and that each of them is a wild reading, by more than what
+# looking at every kind of slip in every row costs.
+
+AS_WELL = 3.0  # log odds behind the best way of slipping within which another is said as well
+SLIPPED = 0.5  # chance that a campaign holds a slip; assumed
+CLEAR = float(np.log(1000.0))  # log odds from which its rows are left out of the judgement
+FAR_OFF = 16.0  # squared deviation of a row from which on it is looked at
+MOST_ROWS, MOST_CLAMPS, MOST_SLIPS = 12, 6, 3
+NEAR = 3.0  # standard deviations within which the mended rows must lie, root mean square
+STEP_MM, STEP_DEG = 10.0, 1.0
+LBF_PER_IN = 25.4 / 4.4482216152605  # of 1 N/mm; the inch is 25.4 mm, the pound-force 4.448... N, both exactly
+# What a stiffness may have been written in -> written over true.
+UNITS = {"lbf/in": LBF_PER_IN, "N/um": 1e-3}
+TINY = 1e-9
+SET_ASIDE = 1e2  # variance of ln k of a row that is left out
+AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+COORDINATES, ANGLES = ("x_mm", "y_mm", "z_mm"), ("a_deg", "b_deg", "c_deg")
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """Rows that look mistyped.
+
+    Attributes
+    ----------
+    rows
+        Indices.
+    column, stands, meant
+        What is wrong: a column, what stands there and what it would be (of the first row).
+    words
+        All of it in a sentence.
+    log_odds
+        Against the rows being as they should be, or wild.
+    """
+
+    rows: tuple[int, ...]
+    column: str
+    stands: str
+    meant: str
+    words: str
+    log_odds: float
+
+    @property
+    def clear(self) -> bool:
+        """Whether the rows are better left out."""
+        return self.log_odds > CLEAR
+
+
+class SuspectEntry(TypedDict):
+    """A suspect in a document: rows counted from 1 in their file, and its lines."""
+
+    file: str
+    row: int
+    rows: list[int]
+    lines: list[int]
+    column: str
+    stands: str
+    would_be: str
+    words: str
+    left_out: bool
+
+
+def suspect_entries(suspects: Sequence[Suspect], data: Measurements, left_out: bool) -> list[SuspectEntry]:
+    """Suspects for a document; `left_out`: whether the clear ones were left out of the judgement."""
+    found: list[SuspectEntry] = []
+    for one in suspects:
+        rows = [int((data.file[: row + 1] == data.file[row]).sum()) for row in one.rows]
+        found.append({
+            "file": str(data.file[one.rows[0]]),
+            "row": rows[0],
+            "rows": rows,
+            "lines": [int(data.line[row]) for row in one.rows],
+            "column": one.column,
+            "stands": one.stands,
+            "would_be": one.meant,
+            "words": said_of(one, left_out),
+            "left_out": left_out and one.clear,
+        })  # fmt: skip
+    return found
+
+
+def said_of(suspect: Suspect, left_out: bool) -> str:
+    """A suspect in a sentence, with what was done about it."""
+    if not left_out:
+        return suspect.words
+    if not suspect.clear:
+        return f"{suspect.words}; kept all the same, for it may be chance"
+    return f"{suspect.words}; {'they were' if len(suspect.rows) > 1 else 'it was'} left out of the judgement"
+
+
+@dataclass(frozen=True)
+class _Slip:
+    """A slip: (k,) rows, what it is, and where (k, 3) and along which direction (k, 3) they would be if mended.
+
+    `change`: (k,) of ln k where that is known without a model, of a unit.
+    """
+
+    rows: Rows
+    column: str
+    stands: str
+    meant: str
+    position: FloatArray
+    angles: FloatArray
+    direction: FloatArray
+    change: FloatArray | None = None
+
+    @classmethod
+    def of(cls, data: Measurements, rows: Rows, column: str, stands: str, meant: str, **mended: FloatArray) -> _Slip:
+        """Of rows that stay as they are but for what is given."""
+        as_they_are = {name: getattr(data, name)[rows] for name in ("position", "angles", "direction")}
+        return cls(rows, column, stands, meant, **(as_they_are | mended))
+
+
+def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
+    """Rows of which one typical slip, mended, brings the readings back into the noise; the clearest first.
+
+    Parameters
+    ----------
+    problem
+        Readings, model and scatter.
+    fit
+        The best explanation: what else the readings hold.
+    """
+    found: list[Suspect] = []
+    taken = np.zeros(len(problem.observed), dtype=bool)
+    data = problem.predictor.data
+    tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))
+    for _ in range(MOST_SLIPS):
+        slips = list(_slips(data, *_looked_at(problem, fit, taken)))
+        if not slips:
+            break
+        odds = _log_odds(problem, fit, slips, _changes(problem, fit, slips), taken) + np.log(SLIPPED / tried)
+        together: dict[tuple[int, ...], list[int]] = {}
+        for k in np.argsort(-odds, kind="stable").tolist():
+            if np.isfinite(odds[k]):
+                together.setdefault(tuple(slips[k].rows.tolist()), []).append(k)
+        # A row may have slipped in any way: what counts is all of them, what is said are those that fit about as well.
+        totals = {rows: float(np.logaddexp.reduce(odds[ways])) for rows, ways in together.items()}
+        rows = max(totals, key=lambda one: (totals[one], one), default=())
+        if not rows or totals[rows] <= 0.0:
+            break
+        ways = [slips[k] for k in together[rows] if odds[k] > odds[together[rows][0]] - AS_WELL]
+        found.append(_suspect(data, ways, totals[rows]))
+        taken[list(rows)] = True
+    return tuple(found)
+
+
+def _suspect(data: Measurements, ways: Sequence[_Slip], odds: float) -> Suspect:
+    first = ways[0]
+    several = len(first.rows) > 1
+    lines = ", ".join(str(int(data.line[row])) for row in first.rows)
+    where = f"line{'s' if several else ''} {lines} of {data.file[first.rows[0]]}"
+    said = " or ".join(f"{way.column} {way.meant} instead of {way.stands}" for way in ways)
+    words = f"{where} {'look' if several else 'looks'} mistyped: {said} would fit all other readings"
+    return Suspect(tuple(first.rows.tolist()), first.column, first.stands, first.meant, words, odds)
+
+
+def _looked_at(problem: Problem, fit: Fit, taken: NDArray[np.bool_]) -> tuple[list[Rows], list[Rows]]:
+    """Rows that are far off, and clampings whose rows together are; the furthest of them."""
+    projected = problem.scatter.precision.beside(fit.jacobian.T, _prior(fit))
+    pulls = projected.times(fit.residual)
+    inflated = _inflation(fit)
+    squared = np.where(taken, 0.0, pulls**2 / np.maximum(projected.diagonal, 1e-300)) / inflated
+    order = np.argsort(-squared, kind="stable")[:MOST_ROWS]
+    rows = [np.array([row]) for row in order.tolist() if squared[row] > FAR_OFF]
+    clampings = []
+    for members in Groups.by(problem.predictor.data.clamp).members():
+        if len(members) < 2 or taken[members].any():
+            continue
+        block = projected.block(members)
+        excess = float(pulls[members] @ np.linalg.lstsq(block, pulls[members], rcond=1e-10)[0]) / inflated
+        clampings.append(((excess - len(members)) / np.sqrt(2.0 * len(members)), members))
+    clampings.sort(key=lambda one: (-one[0], int(one[1][0])))
+    return rows, [members for far, members in clampings[:MOST_CLAMPS] if far > 2.0]
+
+
+def _prior(fit: Fit) -> FloatArray:
+    prior = np.zeros((fit.jacobian.shape[1],) * 2)
+    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+    return prior
+
+
+def _inflation(fit: Fit) -> float:
+    """By how much more than noise the fit leaves: where the machine is not understood, rows are not to blame."""
+    projected = fit.scatter.precision.beside(fit.jacobian.T, _prior(fit))
+    freedom = max(len(fit.residual) - fit.jacobian.shape[1], 1)
+    return float(max(1.0, projected.squares(fit.residual) / freedom))
+
+
+def _slips(data: Measurements, rows: Sequence[Rows], clampings: Sequence[Rows]) -> Iterator[_Slip]:
+    for row in rows:
+        yield from _slips_of_row(data, row)
+    for members in clampings:
+        yield from _slips_of_pose(data, members)
+        yield from _exchanges(data, members)
+
+
+def _slips_of_row(data: Measurements, row: Rows) -> Iterator[_Slip]:
+    yield from _slips_of_pose(data, row)
+    stands = _axis(data.direction[row[0]])
+    for name, vector in AXES.items():
+        if stands != name:
+            yield _Slip.of(data, row, "direction", stands or "oblique", name, direction=np.array([vector]))
+    value = float(n_per_mm_from_n_per_m(data.stiffness[row[0]]))
+    for unit, factor in UNITS.items():
+        meant = f"{value / factor:.6g}" + f" (the number stands in {unit})"
+        change = np.array([np.log(factor)])
+        yield _Slip.of(data, row, "stiffness_N_per_mm", f"{value:.6g}", meant, change=change)
+
+
+def _slips_of_pose(data: Measurements, rows: Rows) -> Iterator[_Slip]:
+    """A coordinate or an angle with the wrong sign, or off by 10 mm or 1 degree; the same in all rows."""
+    for names, field, step, si in (
+        (COORDINATES, "position", STEP_MM, 1e-3),
+        (ANGLES, "angles", STEP_DEG, float(rad_from_deg(1.0))),
+    ):
+        values = getattr(data, field)[rows]
+        for k, name in enumerate(names):
+            if float(np.ptp(values[:, k])) > TINY:
+                continue
+            stands = float(values[0, k]) / si
+            wrong_sign = [-stands] if abs(stands) > 0.5 * step and name != "z_mm" else []
+            for meant in (*wrong_sign, stands - step, stands + step):
+                changed = values.copy()
+                changed[:, k] = meant * si
+                yield _Slip.of(data, rows, name, _number(stands), _number(meant), **{field: changed})
+
+
+def _number(value: float) -> str:
+    return f"{round(value, 6):g}"
+
+
+def _exchanges(data: Measurements, members: Rows) -> Iterator[_Slip]:
+    """Two readings of a clamping under one load that stand under each other's direction."""
+    for a, first in enumerate(members):
+        for second in members[a + 1 :]:
+            apart = np.abs(data.direction[first] - data.direction[second]).max() > TINY
+            if apart and data.force[first] == data.force[second]:
+                rows = np.array([first, second])
+                names = [_axis(data.direction[row]) or "oblique" for row in rows]
+                yield _Slip.of(
+                    data, rows, "direction", " and ".join(names), f"{' and '.join(names[::-1])} (exchanged)",
+                    direction=data.direction[rows[::-1]],
+                )  # fmt: skip
+
+
+def _axis(direction: FloatArray) -> str:
+    """X, Y or Z where a unit vector lies along an axis, to either side; else ""."""
+    return next((name for name, v in AXES.items() if abs(abs(float(direction @ np.array(v))) - 1.0) < TINY), "")
+
+
+def _changes(problem: Problem, fit: Fit, slips: Sequence[_Slip]) -> list[FloatArray]:
+    """By how much the modelled ln k of its rows rises when a slip is mended; nan where the model has no answer.
+
+    A number in another unit is too large by a factor: that counts as a model that is too small by it.
+    """
+    predictor = problem.predictor
+    law = scaled_law(predictor.machine.strut_law, fit.law)
+    model = build_model(predictor.machine.with_changes(strut_law=law), predictor.effect_files, fit.effects)
+    rows = np.concatenate([slip.rows for slip in slips])
+    mended = replace(
+        predictor.data.select(rows),
+        position=np.concatenate([slip.position for slip in slips]),
+        angles=np.concatenate([slip.angles for slip in slips]),
+        direction=np.concatenate([slip.direction for slip in slips]),
+    )
+    try:
+        logs = np.log(model_stiffness(model, mended))
+    except InputError:  # one of the poses is none that the machine can take
+        logs = np.full(len(rows), np.nan)
+    modelled = problem.observed - fit.residual
+    ends = np.cumsum([0, *(len(slip.rows) for slip in slips)])
+    return [
+        logs[start:end] - modelled[slip.rows] if slip.change is None else slip.change
+        for slip, (start, end) in zip(slips, pairwise(ends.tolist()), strict=True)
+    ]
+
+
+def _log_odds(
+    problem: Problem, fit: Fit, slips: Sequence[_Slip], changes: Sequence[FloatArray], taken: NDArray[np.bool_]
+) -> FloatArray:
+    """(slips,) log likelihood of each slip over that of its rows as they stand, plain or wild; -inf for none."""
+    scatter, inflated = problem.scatter, _inflation(fit)
+    known: dict[tuple[int, ...], tuple[Precision, FloatArray]] = {}
+    found = np.full(len(slips), -np.inf)
+    for k, (slip, change) in enumerate(zip(slips, changes, strict=True)):
+        if not np.isfinite(change).all():
+            continue
+        others = tuple(sorted(set(fit.scatter.wild) - set(slip.rows.tolist())))
+        if others not in known:
+            known[others] = _without(scatter, fit, others, taken)
+        projected, pulls = known[others]
+        block, pull = projected.block(slip.rows) / inflated, pulls[slip.rows] / inflated
+        left = pull - block @ change
+        if float(left @ np.linalg.lstsq(block, left, rcond=1e-10)[0]) > NEAR**2 * len(change):
+            continue
+        gain = float(change @ pull - 0.5 * change @ block @ change)
+        found[k] = gain - max(0.0, _gain_of_wild(scatter, slip.rows, block, pull))
+    return found
+
+
+def _without(
+    scatter: Scatter, fit: Fit, wild: tuple[int, ...], taken: NDArray[np.bool_]
+) -> tuple[Precision, FloatArray]:
+    """Inverse covariance of what the fit leaves and its pulls, with wild rows widened and taken ones set aside."""
+    rows, gone = np.array(wild, dtype=np.int64), np.flatnonzero(taken)
+    wider = scatter.covariance.widened(rows, scatter.widening[rows]).widened(gone, np.full(len(gone), SET_ASIDE))
+    projected = wider.precision.beside(fit.jacobian.T, _prior(fit))
+    return projected, projected.times(fit.residual)
+
+
+def _gain_of_wild(scatter: Scatter, rows: Rows, block: FloatArray, pull: FloatArray) -> float:
+    """Log likelihood gained by taking those of the rows that are far off for wild, their price paid."""
+    far = pull**2 > scatter.beyond * np.diag(block)
+    if not far.any():
+        return 0.0
+    own, part, widening = block[np.ix_(far, far)], pull[far], scatter.widening[rows[far]]
+    gain = float(part @ np.linalg.solve(np.diag(1.0 / widening) + own, part))
+    volume = float(np.linalg.slogdet(np.eye(len(part)) + widening[:, None] * own)[1])
+    return 0.5 * (gain - volume) - len(part) * scatter.price
