@@ -171,7 +171,12 @@ def assumed_sd(compliance: FloatArray, force: FloatArray) -> FloatArray:
 
 
 def offsets(
-    columns: LoopColumns, read: FloatArray, sd: FloatArray, expected: FloatArray, tip: FloatArray
+    columns: LoopColumns,
+    read: FloatArray,
+    sd: FloatArray,
+    expected: FloatArray,
+    way: FloatArray,
+    tip: FloatArray,
 ) -> LoopColumns:
     """The same with offset and sign of every loop reading.
 
@@ -183,8 +188,10 @@ def offsets(
         (n,) m/N, readings and their scatter; nan where they are planned.
     expected, tip
         (n,) m/N that the plain machine gives: of each loop, of the tip at the same pose along the same load.
+    way
+        (n,) below 0 where what a loop holds gets shorter under the load.
     """
-    toward = np.where(expected < 0.0, -1.0, 1.0)
+    toward = np.where(way < 0.0, -1.0, 1.0)
     counted = np.where(np.isnan(read), expected, read) * toward
     wanted = np.maximum.reduce([OFFSET_SHARE * tip, sd / WIDEST - counted, -BACKWARDS * counted])
     kept = columns.straight

@@ -289,11 +289,15 @@ def with_offsets(data: Measurements, machine: Machine) -> Measurements:
     plain = StiffnessModel(machine)
     path = measured_path(plain, data)
     tip = exact.compliance_along(plain, path, data.direction)
-    expected = loop_compliance(plain, path, data.direction, data.beside.loops, data.beside.which)
+    # A joint moves the way its strut does, which the plain machine's joints, being rigid, do not say.
+    loops = [replace(one, kind="strut", where="") if one.kind == "joint" else one for one in data.beside.loops]
+    toward = loop_compliance(plain, path, data.direction, loops, data.beside.which)
+    joint = np.array([one.kind == "joint" for one in data.beside.loops])[data.beside.which]
+    expected = np.where(joint, 0.0, toward)
     usual = assumed_sd(np.where(np.isnan(read), expected, read), data.force)
     assumed = int((np.isnan(sd) & rows & ~np.isnan(read)).sum())
     sd = np.where(np.isnan(sd), usual, sd)
-    beside = offsets(data.beside, read, sd, expected, tip)
+    beside = offsets(data.beside, read, sd, expected, toward, tip)
     stiffness = 1.0 / beside.joined(np.where(rows, read, 1.0))
     # A loop's indicator is not clamped with the tip's gauge: its readings scatter each on its own.
     own = np.char.add("loop reading ", np.arange(len(data)).astype(str))

@@ -7,7 +7,7 @@ needs to judge it: fits with intervals, errors held out by point, what these dat
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from toolpath_stiff.stiffness.model import build_model, setup_of
 from toolpath_stiff.updating.inference import NONE, Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
-from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, refine
+from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, of_readings, refine
 from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
 from toolpath_stiff.updating.inference.noise import JOINT_ERROR, Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
@@ -34,6 +34,7 @@ from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
 
 if TYPE_CHECKING:
+    from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
     from toolpath_stiff.nc import Program
     from toolpath_stiff.units import Pose
 
@@ -70,6 +71,9 @@ class Diagnosis:
         Where the verdict is `ambiguous`: rows of a plan that would tell the explanations apart; what it cannot do.
     path
         How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
+    loops
+        Readings of indicators beside the tip against the likeliest explanation. Everything above with an entry a
+        reading is of those of the tip.
     """
 
     verdict: str
@@ -94,6 +98,7 @@ class Diagnosis:
     next_measurements: tuple[dict[str, Any], ...] = ()
     remarks: tuple[str, ...] = ()
     path: dict[str, Any] | None = None
+    loops: LoopsDocument = field(default_factory=lambda: {"by_loop": [], "readings": []})
 
     @property
     def noise(self) -> Noise:
@@ -234,9 +239,9 @@ def _examined(
     say: Callable[[str], None],
 ) -> Diagnosis:
     """From readings to verdict under each noise model, then what stands behind the verdict that they share."""
-    if len(data) < FEWEST or np.isnan(data.stiffness).any():
+    if len(data.of_tip) < FEWEST or np.isnan(data.stiffness).any():
         raise InputError(
-            f"{len(data)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
+            f"{len(data.of_tip)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
             expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
         )
     predictor = Predictor(machine, data, effect_files)
@@ -256,13 +261,32 @@ def _examined(
             fits[family.name] = refine(main.problem, family.best)
     tested = {family.name for family in main.families}
     cannot |= {effect.name: () for effect in effects if effect.name not in tested}
+    held = {name: held_out(fit, data.point) for name, fit in fits.items()}
+    tip = data.tip
     return Diagnosis(
-        verdict, plausible, judgements, main, data, machine, effects, cannot, baseline.as_given, baseline.refitted,
-        fits, held_out(baseline.refitted, data.point), {name: held_out(fit, data.point) for name, fit in fits.items()},
+        verdict, plausible, judgements, main, data.of_tip, machine, effects, cannot,
+        of_readings(baseline.as_given, tip), of_readings(baseline.refitted, tip),
+        {name: of_readings(fit, tip) for name, fit in fits.items()},
+        held_out(baseline.refitted, data.point).of_readings(tip),
+        {name: one.of_readings(tip) for name, one in held.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
         files or tuple(dict.fromkeys(data.file.tolist())), seed,
+        loops=_loops(main, fits),
     )  # fmt: skip
+
+
+def _loops(main: Judgement, fits: dict[str, Fit]) -> LoopsDocument:
+    """Readings of loops beside the tip against the likeliest explanation."""
+    problem = main.problem
+    if problem.predictor.data.beside is None:
+        return {"by_loop": [], "readings": []}
+    from toolpath_stiff.updating.comparison.loop_readings import loops_document
+
+    likeliest = max(main.probability, key=lambda name: main.probability[name], default=NONE)
+    fit = fits.get(likeliest)
+    residual = main.base.residual if fit is None else fit.residual
+    return loops_document(problem.predictor.data, problem.observed - residual, problem.scatter.covariance)
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
