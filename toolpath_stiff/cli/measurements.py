@@ -356,8 +356,12 @@ def plan_arguments(parser: argparse.ArgumentParser) -> None:
         "--setups", type=_names, metavar="NAME,...", help="the first is on the table (default: those of the data)"
     )
     group.add_argument(
+        "--indicators", action="store_true",
+        help="a second indicator across a link of the load path where that tells more (column loop of plan.csv)",
+    )  # fmt: skip
+    group.add_argument(
         "--cost", action="append", default=[], type=_cost, metavar="WHAT=MINUTES",
-        help="of a reading (default 1), a pose (15), another tool (10), another setup (45)",
+        help="of a reading (default 1), a pose (15), another tool (10), another setup (45), a second indicator (10)",
     )  # fmt: skip
     add_noise_arguments(parser, guess="a high guess, or 2 %% without data")
     add_output_arguments(parser, "plan", kept="plan.csv and plan.json", of="DATA, else machine")
@@ -407,6 +411,7 @@ def plan(args: argparse.Namespace) -> int:
         loads_N=args.loads,
         tool_extensions_mm=args.tools,
         setups=args.setups,
+        indicators=args.indicators,
         minutes=dict(args.cost),
         **noise_options(args),
     )

@@ -177,6 +177,7 @@ def offsets(
     expected: FloatArray,
     way: FloatArray,
     tip: FloatArray,
+    widest: float = WIDEST,
 ) -> LoopColumns:
     """The same with offset and sign of every loop reading.
 
@@ -190,10 +191,12 @@ def offsets(
         (n,) m/N that the plain machine gives: of each loop, of the tip at the same pose along the same load.
     way
         (n,) below 0 where what a loop holds gets shorter under the load.
+    widest
+        Relative sd that no reading with its offset has more of.
     """
     toward = np.where(way < 0.0, -1.0, 1.0)
     counted = np.where(np.isnan(read), expected, read) * toward
-    wanted = np.maximum.reduce([OFFSET_SHARE * tip, sd / WIDEST - counted, -BACKWARDS * counted])
+    wanted = np.maximum.reduce([OFFSET_SHARE * tip, sd / widest - counted, -BACKWARDS * counted])
     kept = columns.straight
     return LoopColumns(
         columns.loops, columns.which, np.where(kept, wanted, 0.0), np.where(kept, toward, 1.0), columns.length

@@ -23,7 +23,7 @@ from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table, read_table
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
-from toolpath_stiff.updating.loops import INDICATOR_SD, LOAD_SHARE, LoopColumns, assumed_sd, offsets
+from toolpath_stiff.updating.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
 from toolpath_stiff.updating.rows import (
     COLUMNS,
     LABELS,
@@ -280,8 +280,11 @@ def _beside(rows: list[Row]) -> tuple[FloatArray, FloatArray, LoopColumns | None
     return stiffness, sd, LoopColumns.of(names, length)
 
 
-def with_offsets(data: Measurements, machine: Machine) -> Measurements:
-    """The same with the readings of loops, until then m/N with their sd in m/N, as stiffnesses with offsets."""
+def with_offsets(data: Measurements, machine: Machine, widest: float = WIDEST) -> Measurements:
+    """The same with the readings of loops, until then m/N with their sd in m/N, as stiffnesses with offsets.
+
+    `widest`: relative sd that no loop reading with its offset has more of.
+    """
     if data.beside is None:
         return data
     rows = data.beside.beside
@@ -297,7 +300,7 @@ def with_offsets(data: Measurements, machine: Machine) -> Measurements:
     usual = assumed_sd(np.where(np.isnan(read), expected, read), data.force)
     assumed = int((np.isnan(sd) & rows & ~np.isnan(read)).sum())
     sd = np.where(np.isnan(sd), usual, sd)
-    beside = offsets(data.beside, read, sd, expected, toward, tip)
+    beside = offsets(data.beside, read, sd, expected, toward, tip, widest)
     stiffness = 1.0 / beside.joined(np.where(rows, read, 1.0))
     # A loop's indicator is not clamped with the tip's gauge: its readings scatter each on its own.
     own = np.char.add("loop reading ", np.arange(len(data)).astype(str))
