@@ -92,16 +92,16 @@ def test_a_loop_reads_what_the_assembled_elements_move(case, name, at_poses):
     model = model_of(effects)
     loop = measuring_loop(name)
     found = loop_compliance(model, measured_path(model, at_poses), DIRECTIONS, [loop], np.zeros(3, dtype=int))
-    true = true_displacements(
-        load_nominal("nist"), HiddenMachine(**hidden), rows(), [name] * 3, np.full(3, np.nan)
-    )
+    true = true_displacements(load_nominal("nist"), HiddenMachine(**hidden), rows(), [name] * 3, np.full(3, np.nan))
     # The rig's joints have unknowns of their own along each strut; secant iteration settles to 1e-11.
     assert found == pytest.approx(true, rel=1e-6, abs=2e-13)
 
 
 def test_loops_add_up_to_the_tip(at_poses):
     """Spindle and platform are the tip; struts and joints by the work of the strut forces are the rest by Castigliano."""
-    model = model_of([("spindle_compliance", {"radial": 7e-9, "axial": 4e-9}), ("joint_compliance", {"compliance": 8e-9})])
+    model = model_of(
+        [("spindle_compliance", {"radial": 7e-9, "axial": 4e-9}), ("joint_compliance", {"compliance": 8e-9})]
+    )
     path = measured_path(model, at_poses)
     which = np.zeros(3, dtype=int)
 

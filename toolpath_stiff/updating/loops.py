@@ -126,7 +126,8 @@ class LoopColumns:
     def select(self, rows: NDArray[Any]) -> LoopColumns:
         """Of some of the readings."""
         return LoopColumns(
-            self.loops, *(getattr(self, f.name)[rows] for f in fields(self)[1:])  # type: ignore[arg-type]
+            self.loops,
+            *(getattr(self, f.name)[rows] for f in fields(self)[1:]),  # type: ignore[arg-type]
         )
 
     @classmethod

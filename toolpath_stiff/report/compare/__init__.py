@@ -85,7 +85,11 @@ def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
         picture("machine.png", pictures, QUESTIONS),
         picture("strips.png", pictures, QUESTIONS),
         section("Readings far off", _far_off(document)),
-        *([section("Indicators beside the tip", loops_table(document["loops"]))] if document["loops"]["by_loop"] else []),
+        *(
+            [section("Indicators beside the tip", loops_table(document["loops"]))]
+            if document["loops"]["by_loop"]
+            else []
+        ),
         picture("variables.png", pictures, QUESTIONS),
         section("Checks without a model", _model_free(document)),
         picture("load_path.png", pictures, QUESTIONS),

@@ -134,6 +134,9 @@ class Plan:
         Repeat noise of a reading and scatter of a clamping, relative sd.
     notes
         What was assumed or left out.
+    forecasts, usable, scatter
+        What the choice was made from: of each rival for all readings; (v,) visits that all rivals have an answer to;
+        how readings and the machine scatter.
     """
 
     visits: Visits
@@ -150,6 +153,9 @@ class Plan:
     rivals: tuple[Rival, ...]
     noise: tuple[float, float]
     notes: tuple[str, ...]
+    forecasts: tuple[Forecast, ...]
+    usable: NDArray[np.bool_]
+    scatter: ReadingNoise
 
     @property
     def separable(self) -> bool:
@@ -243,6 +249,9 @@ def plan_measurements(
         rivals=ranked,
         noise=(repeat, clamping),
         notes=tuple(notes),
+        forecasts=tuple(forecasts),
+        usable=usable,
+        scatter=noise,
     )
 
 

@@ -177,7 +177,10 @@ class Costs:
     indicator: float = 10.0
 
     def __post_init__(self) -> None:
-        if not min(self.reading, self.pose, self.tool, self.setup, self.indicator) >= 0.0 or self.pose + self.reading <= 0.0:
+        if (
+            not min(self.reading, self.pose, self.tool, self.setup, self.indicator) >= 0.0
+            or self.pose + self.reading <= 0.0
+        ):
             raise InputError("costs of a plan", expected="minutes, 0 or more, and a pose that costs something")
 
 
@@ -357,6 +360,7 @@ def planned_readings(
     extension: FloatArray,
     setup: NDArray[np.str_],
     time: FloatArray,
+    loop: NDArray[np.str_] | None = None,
 ) -> Measurements:
     """Readings that have not been taken.
 
@@ -368,6 +372,8 @@ def planned_readings(
         (m,) directions, keys of `VECTORS`.
     force, extension, setup, time
         (m,) N, m, names, s.
+    loop
+        (m,) names of loops; None: of the tip.
     """
     m = len(pose)
     empty, nothing = np.full(m, ""), np.full(m, np.nan)
@@ -385,7 +391,7 @@ def planned_readings(
         time=time,
         temperature=nothing,
         setup=setup,
-        loop=empty,
+        loop=empty if loop is None else loop,
         repeat=empty,
         point=empty,
         clamp=empty,
