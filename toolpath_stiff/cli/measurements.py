@@ -347,7 +347,7 @@ def plan_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--n", type=int, metavar="N", help="poses (default: 6, or 24 of a first campaign)")
     parser.add_argument(
         "--next", metavar="FOLDER",
-        help="of a plan: the next pose after the readings so far (DATA; else its plan.csv and next_1.csv ... as filled)",
+        help="of a plan: the next pose after the readings so far (DATA; else its own files as filled in)",
     )  # fmt: skip
     group = parser.add_argument_group("what may vary")
     group.add_argument("--radius", type=positive_number("mm", 1e5), metavar="MM", help="about the axis (default: 300)")

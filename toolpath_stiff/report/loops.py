@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from toolpath_stiff.report.pages import markup, table
+from toolpath_stiff.report.pages import markup, section, table
 from toolpath_stiff.report.words import plain
 
 if TYPE_CHECKING:
@@ -15,7 +15,12 @@ if TYPE_CHECKING:
 MOST_ROWS = 40  # on a page; all are in the document
 
 
-def loops_table(loops: LoopsDocument) -> Markup:
+def loops_section(loops: LoopsDocument) -> list[Markup]:
+    """The section of a page; none without such readings."""
+    return [section("Indicators beside the tip", _table(loops))] if loops["by_loop"] else []
+
+
+def _table(loops: LoopsDocument) -> Markup:
     """By loop, then reading by reading."""
     head = ("loop", "readings", "read, nm/N", "modelled, nm/N", "off, nm/N", "standard deviations")
     rows = [
@@ -49,8 +54,8 @@ def loops_table(loops: LoopsDocument) -> Markup:
     ]
     titles = ("line", "loop", "direction", "point", "read, nm/N", "modelled, nm/N", "standard deviations")
     remark = (
-        "Displacement between the indicator's two points per load at the tip; of a strut alone, per force in it. By loop "
-        "in the mean, counted in the direction in which the struts of the machine file would move it."
+        "Displacement between the indicator's two points per load at the tip; of a strut alone, per force in it. By "
+        "loop in the mean, counted in the direction in which the struts of the machine file would move it."
     )
     return table(head, rows, range(1, 6)) + markup('<p class="muted">{}</p>', remark) + table(titles, single, (4, 5, 6))
 

@@ -33,7 +33,10 @@ PRINTED = 0.1  # um, resolution of the indicator; assumed
 def true_displacements(
     nominal: Nominal, hidden: HiddenMachine, rows: Rows, loops: list[str], lengths: FloatArray
 ) -> FloatArray:
-    """(n,) m per N at the tip, of a strut alone per N in it; `lengths` (n,) m of struts alone, nan: as the pose has it."""
+    """(n,) m per N at the tip, of a strut alone per N in it.
+
+    `lengths` (n,) m of struts measured alone; nan: as the pose has it.
+    """
     given = np.repeat(np.nan_to_num(lengths)[:, None], 6, axis=1)
     place, links = assembled(nominal, hidden, rows, given)
     found = solved(place, links, rows.direction, rows.force)

@@ -3,8 +3,8 @@
 A pair of equal and opposite unit forces at the indicator's two points is carried by what lies between them alone (the
 six struts are statically determinate, so that the pair loads nothing else). With the real loads u = [f; w] of strut
 forces and tip wrench, and those of the pair, v, the reading is the sum over the links inside the loop of v^T C u
-(principle of virtual forces; Przemieniecki 1968, Theory of Matrix Structural Analysis, chapter 3). The tip's own loop is
-the case v = u over all links.
+(principle of virtual forces; Przemieniecki 1968, Theory of Matrix Structural Analysis, chapter 3). The tip's own loop
+is the case v = u over all links.
 
 | loop | v |
 | --- | --- |

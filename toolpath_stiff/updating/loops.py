@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.measuring_loop import TIP, WORDS, MeasuringLoop, measuring_loop
 from toolpath_stiff.units import m_from_um
 
@@ -127,7 +126,7 @@ class LoopColumns:
         """Of some of the readings."""
         return LoopColumns(
             self.loops,
-            *(getattr(self, f.name)[rows] for f in fields(self)[1:]),  # type: ignore[arg-type]
+            *(getattr(self, f.name)[rows] for f in fields(self)[1:]),
         )
 
     @classmethod

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
+from toolpath_stiff.stiffness.effects.measuring_loop import TIP, MeasuringLoop
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
 from toolpath_stiff.updating import loops
@@ -223,11 +224,11 @@ def _all_numbers(table: Table, column: int) -> bool:
 def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, planned: bool) -> list[Row]:
     """The one reading of a long row, the three of a wide one."""
     loop = loops.loop_of(record.get("loop", ""))
-    labels = {name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == loops.TIP else str(loop)}
+    labels = {name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == TIP else str(loop)}
     on_bench = loop.kind == "alone" and bool(record.get("length_mm"))
     position, angles = _pose(record, on_bench)
     force, beside = optional_number(record, "force_N"), None
-    if loop == loops.TIP:
+    if loop == TIP:
         readings = _readings(record, force, planned)
     else:
         beside = _beside(record, loop, planned)
@@ -265,7 +266,7 @@ def _pose(record: Mapping[str, str], on_bench: bool) -> tuple[tuple[float, ...],
     return position, tuple(rad_from_deg(number(record, name)) if name in record else 0.0 for name in ANGLES)
 
 
-def _beside(record: Mapping[str, str], loop: loops.MeasuringLoop, planned: bool) -> LoopReading:
+def _beside(record: Mapping[str, str], loop: MeasuringLoop, planned: bool) -> LoopReading:
     """What an indicator beside the tip read."""
     if record.get("sd_N_per_mm"):
         raise MeasurementError(f"sd_N_per_mm in a row of loop {loop}", expected="sd_um, of displacement_um")

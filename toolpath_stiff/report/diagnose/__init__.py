@@ -35,8 +35,8 @@ from toolpath_stiff.report.explanations import (
     significant,
     text,
 )
+from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
-from toolpath_stiff.report.loops import loops_table
 from toolpath_stiff.report.residuals import before_after_png
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, number
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -97,7 +97,7 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
         picture("before_after.png", pictures, QUESTIONS),
         picture("confounding.png", pictures, QUESTIONS),
         picture("detectable.png", pictures, QUESTIONS),
-        *_loops(document),
+        *loops_section(document["loops"]),
         section("What to measure or do next", _next(document)),
         section("What these data cannot test", _cannot_test(document)),
         section("How much the choice matters on the tool path", _path(document)),
@@ -117,12 +117,6 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
         footer=markup("<code>{}</code> seed {}", document.get("command") or "", document.get("seed", "-")),
         verdict_class=verdict if verdict in HEADLINES else "",
     )
-
-
-def _loops(document: DiagnosisDocument) -> list[Markup]:
-    """What indicators beside the tip read, where there are any."""
-    loops = document.get("loops")
-    return [section("Indicators beside the tip", loops_table(loops))] if loops and loops["by_loop"] else []
 
 
 def _figures(document: DiagnosisDocument) -> list[tuple[str, str]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +34,9 @@ from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
     from toolpath_stiff.nc import Program
     from toolpath_stiff.units import Pose
+    from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 
 FloatArray = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ class Diagnosis:
     next_measurements: tuple[dict[str, Any], ...] = ()
     remarks: tuple[str, ...] = ()
     path: dict[str, Any] | None = None
-    loops: LoopsDocument = field(default_factory=lambda: {"by_loop": [], "readings": []})
+    loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
 
     @property
     def noise(self) -> Noise:

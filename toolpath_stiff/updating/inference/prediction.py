@@ -269,7 +269,7 @@ def _prepare(model: StiffnessModel, data: Measurements, timed: bool) -> _Prepare
         columns.append(np.nan_to_num(data.time, nan=-1.0)[:, None])
     beside = data.beside
     if beside is not None:
-        columns += [beside.which[:, None], beside.offset[:, None], beside.toward[:, None]]
+        columns += [beside.which[:, None].astype(float), beside.offset[:, None], beside.toward[:, None]]
         columns.append(np.nan_to_num(beside.length)[:, None])
     keys = np.concatenate(columns, axis=1)
     _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +116,7 @@ def _read_across(readings: Measurements, loop: str) -> Measurements:
 def _stacked(parts: Sequence[Measurements]) -> Measurements:
     """Planned readings one after the other; with the loops that they are of."""
     first = parts[0]
-    columns = {
+    columns: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
         for name, value in vars(first).items()
         if isinstance(value, np.ndarray)

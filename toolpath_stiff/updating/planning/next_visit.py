@@ -2,8 +2,9 @@
 
 A plan's rivals are linear about their fits: each expects ln k of every possible reading as a mean, with a factor of the
 covariance that its parameters and the machine's unknowns leave open. Readings then change all of it in closed form,
-by Bayes' rule: the probabilities of the rivals, their means, their factors (Gaussian conditioning; Rasmussen and Williams
-2006, Gaussian Processes for Machine Learning, appendix A.2). What a plan has worked out once serves every step.
+by Bayes' rule: the probabilities of the rivals, their means, their factors (Gaussian conditioning; Rasmussen and
+Williams 2006, Gaussian Processes for Machine Learning, appendix A.2). What a plan has worked out once
+serves every step.
 """
 
 from __future__ import annotations
@@ -123,7 +124,8 @@ def _tables(found: dict[str, Any], said: dict[str, Any]) -> Tables:
         for k, (name, weight) in enumerate(said["rivals"])
     )
     menu = Menu(setups=tuple(said["setups"]), tool_extensions=tuple(said["tools"]), waits=tuple(said["waits"]))
-    noise = ReadingNoise(*said["noise"], found["machine"])
+    repeat, clamping = said["noise"]
+    noise = ReadingNoise(repeat, clamping, found["machine"])
     return Tables(
         visits, found["usable"], forecasts, noise, Costs(**said["costs"]), menu, found["offset"], found["toward"],
     )  # fmt: skip
@@ -205,7 +207,7 @@ def next_visit(folder: str | Path, files: tuple[str, ...] = ()) -> NextVisit:
 
 def own_files(folder: str | Path) -> tuple[str, ...]:
     """A plan's own measurement files: plan.csv, and next_1.csv and so on as far as there are any."""
-    chosen = []
+    chosen: list[str] = []
     while (file := Path(folder) / f"next_{len(chosen) + 1}.csv").exists():
         chosen.append(str(file))
     return (str(Path(folder) / "plan.csv"), *chosen)
@@ -303,12 +305,12 @@ def _taken(tables: Tables, files: tuple[str, ...]) -> tuple[Taken, list[str]]:
     rows, logs, clamps, where, others = [], [], [], [], 0
     for name in files:
         for row in read_rows(read_table(name, "measurements", COLUMNS), planned=True).rows:
-            k = known.get(_of_row(row, tables.menu.setups[0]))
-            value = np.nan if k is None else _log(row, float(tables.offset[k]), float(tables.toward[k]))
-            if k is None:
+            own = known.get(_of_row(row, tables.menu.setups[0]))
+            value = np.nan if own is None else _log(row, float(tables.offset[own]), float(tables.toward[own]))
+            if own is None:
                 others += 1
             elif np.isfinite(value):
-                rows.append(k)
+                rows.append(own)
                 logs.append(value)
                 clamps.append(f"{name} {row.labels['clamp'] or row.position}")
                 where.append(f"{name}:{row.line}")
