@@ -27,7 +27,7 @@ from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import measured_path, model_stiffness, read_measurements
 from toolpath_stiff.updating.planning import plan
 from toolpath_stiff.updating.planning.document import plan_csv, plan_rows, rows_of
-from toolpath_stiff.updating.planning.next_visit import TABLES, Taken, Tables, conditioned, next_visit, tables_of
+from toolpath_stiff.updating.planning.next_visit import TABLES, Tables, Taken, conditioned, next_visit, tables_of
 
 POSES = np.array([[0.05, -0.1, 0.6, 0.1, -0.2, 0.05], [-0.2, 0.15, 1.1, -0.3, 0.1, 0.0], [0.0, 0.0, 0.8, 0, 0, 0]])
 DIRECTIONS = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, 0, 1.0]])
