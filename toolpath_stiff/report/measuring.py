@@ -326,7 +326,8 @@ def loops_text(entries: Sequence[Mapping[str, Any]]) -> str:
             cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")
         rows.append(tuple(cells))
     widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
-    return "\n".join(
+    lines = [
         "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
         for row in rows
-    )
+    ]
+    return "\n".join([*lines, *(f"{one['loop']}: {one['shape']['text']}" for one in entries if one["shape"]["text"])])
