@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
+    from toolpath_stiff.api.next_visits import NextVisit as NextVisit
+    from toolpath_stiff.api.next_visits import next_visit as next_visit
     from toolpath_stiff.api.placements import CaseStudy as CaseStudy
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
@@ -99,6 +101,7 @@ _PUBLIC = {
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
     "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "Preview", "compare", "diagnose", "preview"),
+    "api.next_visits": ("NextVisit", "next_visit"),
     "api.placements": (
         "CaseStudy", "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "case_study", "place", "rewrite",
         "try_placement",

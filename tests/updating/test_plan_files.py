@@ -205,7 +205,7 @@ def test_between_two_effects_fitted_to_the_data(tmp_path, capsys):
     document = json.loads(first)
     assert [rival["name"] for rival in document["rivals"]] == ["frame_compliance", "none"]
     assert document["poses"] == 3 == len(document["visits"])
-    assert sorted(f.name for f in tmp_path.glob("[!.]*")) == ["plan.csv", "plan.json"]
+    assert sorted(f.name for f in tmp_path.glob("[!.]*")) == ["plan.csv", "plan.json", "plan_tables.npz"]
     assert {row["stiffness_N_per_mm"] for row in read_csv(tmp_path / "plan.csv")} == {""}
     content = (tmp_path / "plan.csv").read_bytes()
     assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0

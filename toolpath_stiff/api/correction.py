@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.updating.raw import Reduction as Reduced
 
 STEEPEST_TILT_DEG = 90.0
-COSTS = ("reading", "pose", "tool", "setup")
+COSTS = ("reading", "pose", "tool", "setup", "indicator")
 
 
 class Reduction(Result):
@@ -336,6 +336,7 @@ def plan(
     loads_N: Sequence[float] | None = None,
     tool_extensions_mm: Sequence[float] | None = None,
     setups: Sequence[str] | None = None,
+    indicators: bool = False,
     minutes: Mapping[str, float] | None = None,
     noise_percent: Noise = None,
     strut_spread_percent: float = 1.0,
@@ -355,8 +356,11 @@ def plan(
     radius_mm, heights_mm, max_tilt_deg, loads_N, tool_extensions_mm, setups
         What may vary: how far from the axis, heights of the tool tip, tilt of the spindle, loads, tools longer than the
         reference tool by so much (the first is in the spindle), set-ups (the first is on the table).
+    indicators
+        Whether a second indicator may be set across a link of the load path, where that tells more.
     minutes
-        What work costs: of a "reading" (1), a "pose" (15), another "tool" (10), another "setup" (45).
+        What work costs: of a "reading" (1), a "pose" (15), another "tool" (10), another "setup" (45), a second
+        "indicator" (10).
     noise_percent, strut_spread_percent, seed
         As of `compare`.
     diagnosis
@@ -393,6 +397,7 @@ def plan(
         cost=[f"{name}={_word(value)}" for name, value in (minutes or {}).items()],
         seed=seed or None,
     )
+    own += ["--indicators"] if indicators else []
     found = plan_visits(
         asked.model,
         None if asked.data is None else asked.readings,
@@ -404,6 +409,7 @@ def plan(
         loads=loads_N,
         tool_extensions=_in_metres(tool_extensions_mm),
         setups=setups,
+        indicators=indicators,
         costs=Costs(**costs),
         judgement=None if diagnosis is None else diagnosis.diagnosed.main,
         files=asked.files,

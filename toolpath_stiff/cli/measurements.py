@@ -329,10 +329,12 @@ PLAN_EPILOG = """\
 examples:
   tps plan measurements.csv                       what would tell the plausible explanations apart
   tps plan measurements.csv --between frame_compliance,joint_moment_stiffness --n 4
+  tps plan --next FOLDER [READINGS.csv]           at the machine: where to go after the readings of that plan so far
   tps plan --machine nist                         a good first campaign
   tps plan --machine nist --between spindle_compliance,table_compliance
 
-Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png.
+Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png, and
+plan_tables.npz, from which --next chooses within a second or two; --next writes next_1.csv (2, 3 ...) beside them.
 """
 
 
@@ -343,6 +345,10 @@ def plan_arguments(parser: argparse.ArgumentParser) -> None:
     add_data_arguments(parser, nargs="*", otherwise="; none: a first campaign")
     parser.add_argument("--between", type=_names, metavar="A,B", help="tell these effects apart (or `none`)")
     parser.add_argument("--n", type=int, metavar="N", help="poses (default: 6, or 24 of a first campaign)")
+    parser.add_argument(
+        "--next", metavar="FOLDER",
+        help="of a plan: the next pose after the readings so far (DATA; else its own files as filled in)",
+    )  # fmt: skip
     group = parser.add_argument_group("what may vary")
     group.add_argument("--radius", type=positive_number("mm", 1e5), metavar="MM", help="about the axis (default: 300)")
     group.add_argument("--heights", type=_numbers, metavar="Z,Z,...", help="of the tool tip, mm (default: five levels)")
@@ -356,8 +362,12 @@ def plan_arguments(parser: argparse.ArgumentParser) -> None:
         "--setups", type=_names, metavar="NAME,...", help="the first is on the table (default: those of the data)"
     )
     group.add_argument(
+        "--indicators", action="store_true",
+        help="a second indicator across a link of the load path where that tells more (column loop of plan.csv)",
+    )  # fmt: skip
+    group.add_argument(
         "--cost", action="append", default=[], type=_cost, metavar="WHAT=MINUTES",
-        help="of a reading (default 1), a pose (15), another tool (10), another setup (45)",
+        help="of a reading (default 1), a pose (15), another tool (10), another setup (45), a second indicator (10)",
     )  # fmt: skip
     add_noise_arguments(parser, guess="a high guess, or 2 %% without data")
     add_output_arguments(parser, "plan", kept="plan.csv and plan.json", of="DATA, else machine")
@@ -389,7 +399,9 @@ def _cost(text: str) -> tuple[str, float]:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """Plan, write the files, say what the plan promises."""
+    """Plan, write the files, say what the plan promises; or the next pose of a plan."""
+    if args.next is not None:
+        return _next(args)
     from toolpath_stiff.report.measuring import names
 
     target = destination(args, "plan", args.data or [args.machine], "-plan").check(names(not args.no_plots))
@@ -407,10 +419,24 @@ def plan(args: argparse.Namespace) -> int:
         loads_N=args.loads,
         tool_extensions_mm=args.tools,
         setups=args.setups,
+        indicators=args.indicators,
         minutes=dict(args.cost),
         **noise_options(args),
     )
     return show(args, found, target)
+
+
+def _next(args: argparse.Namespace) -> int:
+    """The next visit of a plan: say where, write its rows."""
+    from toolpath_stiff.api.next_visits import next_visit
+
+    found = next_visit(args.next, args.data)
+    written = found.save()
+    if args.json:
+        sys.stdout.write(found.to_json())
+    else:
+        print("\n".join([str(found), *([written_text(written)] if written else [])]))
+    return 0
 
 
 # Command -> what declares its arguments, what runs it.

@@ -279,6 +279,7 @@ def text(document: DiagnosisDocument) -> str:
         "",
         *_entry("plausible", plausible_text(explanations(document))),
         *_by_noise(document),
+        *_listed("beside the tip", [str(one["text"]) for one in entries(document.get("loops", {}), "by_loop")]),
         *_listed("cannot test", ["; ".join(missing_text(e) for e in entries(document, "cannot_test"))]),
         *_listed("would show", [_detectable(document)]),
         *_listed("path", [path_text(document)]),

@@ -27,6 +27,7 @@ from toolpath_stiff.updating.planning.document import (
     plan_csv,
     rows_of,
 )
+from toolpath_stiff.updating.planning.next_visit import TABLES, tables_of
 from toolpath_stiff.updating.planning.visits import Visits
 from toolpath_stiff.updating.raw import measurement_csv
 
@@ -227,7 +228,7 @@ def picture_arguments(proposal: Proposal) -> tuple[Any, ...]:
 
 def names(plots: bool = True) -> tuple[str, ...]:
     """Names of the files that `files` makes."""
-    return ("plan.csv", "plan.json", *(("plan.png",) if plots else ()))
+    return ("plan.csv", "plan.json", TABLES, *(("plan.png",) if plots else ()))
 
 
 def files(proposal: Proposal, document: PlanDocument, *, plots: bool = True) -> dict[str, Content]:
@@ -236,6 +237,8 @@ def files(proposal: Proposal, document: PlanDocument, *, plots: bool = True) -> 
         "plan.csv": plan_csv(rows_of(proposal)),
         "plan.json": json.dumps(document, indent=2, ensure_ascii=False) + "\n",
     }
+    if isinstance(proposal.plan, Plan):
+        contents[TABLES] = tables_of(proposal)
     return contents | ({"plan.png": plan_picture(*picture_arguments(proposal))} if plots else {})
 
 
@@ -323,7 +326,8 @@ def loops_text(entries: Sequence[Mapping[str, Any]]) -> str:
             cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")
         rows.append(tuple(cells))
     widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
-    return "\n".join(
+    lines = [
         "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
         for row in rows
-    )
+    ]
+    return "\n".join([*lines, *(f"{one['loop']}: {one['shape']['text']}" for one in entries if one["shape"]["text"])])

@@ -31,6 +31,7 @@ from toolpath_stiff.rig.hidden import (
     reading_sd,
     readings,
 )
+from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, reachable
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.unknowns import UNKNOWNS
@@ -332,7 +333,7 @@ def measure(
             measured["stiffness_N_per_mm"] = n_per_mm_from_n_per_m(stiffness)
             if stated_sd and max(nuisances.repeat, nuisances.clamping) > 0.0:
                 measured["sd_N_per_mm"] = np.round(n_per_mm_from_n_per_m(reading_sd(stiffness, nuisances)))
-    return measured
+    return with_loops(nominal, machine, measured, rows, nuisances, rng) if "loop" in measured else measured
 
 
 def again(

@@ -27,6 +27,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.errors import FileError, InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
+from toolpath_stiff.rig import loops
 from toolpath_stiff.rig.case import AXES, DEFAULT_SETUP, POSE, Case, Table, again, clamp_of, draw_case
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.hidden import OUTSIDE, HiddenMachine, Nuisances, Oddity
@@ -48,12 +49,12 @@ NUMBERS: dict[str, tuple[float, float, float | None]] = {
     "time_min": (0.0, 1e5, 0.0),
     "tool_extension_mm": (-1e4, 1e4, 0.0),
     "temperature_C": (-50.0, 100.0, 20.0),
+    "length_mm": (1.0, 1e5, np.nan),
 }
 WHOLE = ("clamp",)
 LABELS = ("repeat", "point")  # any text
 WORDS = ("setup", "loop")
-RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm")
-TIP_LOOPS = ("", "tip")  # the rig's only indicator: tool tip against workpiece
+RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm", "displacement_um")
 
 MEASUREMENTS, MACHINE, SEALED = FILES = "measurements.csv", "machine.toml", "sealed.bin"
 NO_OTHER = Rules(fresh=True)
@@ -176,7 +177,6 @@ def read_plan(file: str, nominal: Nominal) -> Table:
     if errors:
         raise InputErrors(errors)
     _check_rows(table, [line for line, _ in body], nominal, file)
-    table.pop("loop", None)
     return table
 
 
@@ -210,8 +210,8 @@ def _value(name: str, cell: str) -> float | int | str:
             raise ValueError("X, Y or Z")
         return cell
     if name == "loop":
-        if cell not in TIP_LOOPS:
-            raise ValueError("an empty cell or 'tip': the rig has its indicator at the tool tip alone")
+        if not loops.LOOPS.fullmatch(cell):
+            raise ValueError(loops.WORDS)
         return cell
     if name in LABELS:
         return cell

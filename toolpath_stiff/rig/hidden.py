@@ -226,11 +226,19 @@ def _distinct(hidden: HiddenMachine, rows: Rows) -> tuple[IntArray, IntArray]:
 
 
 def _stiffness_row_by_row(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
+    place, links = assembled(nominal, hidden, rows)
+    return np.asarray(1.0 / secant_compliance(place, links, rows.direction, rows.force))
+
+
+def assembled(
+    nominal: Nominal, hidden: HiddenMachine, rows: Rows, struts: FloatArray | None = None
+) -> tuple[Geometry, Links]:
+    """Where everything is, and how it gives way; `struts` (n, 6) m where they are not as long as the pose has them."""
     turned = rotations(rows.angles)
     lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
     place = _true_geometry(nominal, hidden, rows, turned, lengths)
     links = Links(
-        struts=_struts(nominal, hidden, rows, lengths),
+        struts=_struts(nominal, hidden, rows, lengths if struts is None else np.where(struts > 0.0, struts, lengths)),
         joints=_joint_law(hidden),
         moment=hidden.moment,
         bars=hidden.bars,
@@ -242,7 +250,7 @@ def _stiffness_row_by_row(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -
     )
     if hidden.unknown is not None and (act := UNKNOWNS[hidden.unknown.kind].act) is not None:
         links = act(links, State(nominal, rows, lengths, place), hidden.unknown)
-    return np.asarray(1.0 / secant_compliance(place, links, rows.direction, rows.force))
+    return place, links
 
 
 def _true_geometry(

@@ -92,8 +92,35 @@ class Links:
     ends: tuple[tuple[FloatArray, FloatArray], ...] = ()
 
 
+@dataclass(frozen=True)
+class Solved:
+    """The machine under its loads, per unit load.
+
+    Attributes
+    ----------
+    compliance
+        (n,) m/N between tool and workpiece.
+    moved
+        (n, N) the unknowns: the platform's own, then six joints, the vertices, spindle, table, set-up (`_give`).
+    stretch
+        (n, 6, N) what turns them into the elongation of each strut, its joints left out.
+    platform_dofs
+        How many unknowns are the platform's.
+    """
+
+    compliance: FloatArray
+    moved: FloatArray
+    stretch: FloatArray
+    platform_dofs: int
+
+
 def secant_compliance(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> FloatArray:
     """(n,) m/N between tool and workpiece along unit vectors `direction` (n, 3) under loads `force` (n,) N."""
+    return solved(place, links, direction, force).compliance
+
+
+def solved(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> Solved:
+    """The machine under loads `force` (n,) N along unit vectors `direction` (n, 3)."""
     stretch, platform_springs, platform_dofs = _struts(place, links)
     load = _load_vector(place, links, direction, platform_dofs)
     give = _give(place, links)
@@ -119,7 +146,7 @@ def secant_compliance(place: Geometry, links: Links, direction: FloatArray, forc
         before, compliance = compliance, np.einsum("ni,ni->n", pull, moved)
         forces = force[:, None] * np.einsum("nab,nbj,nj->na", links.struts, stretch * held[:, None, :], moved)
         if np.abs(compliance - before).max() <= SECANT_TOLERANCE * compliance.max():
-            return np.asarray(compliance)
+            return Solved(compliance, moved * held, stretch, platform_dofs)
     raise RuntimeError("the secant stiffnesses of the joints did not settle")
 
 

@@ -19,9 +19,11 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
-from toolpath_stiff.stiffness.model import StiffnessModel, load_path
+from toolpath_stiff.stiffness.loop_response import loop_compliance
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table, read_table
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.updating.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
 from toolpath_stiff.updating.rows import (
     COLUMNS,
     LABELS,
@@ -61,7 +63,8 @@ class Measurements:
     direction
         (n, 3) unit vectors of force and displacement.
     stiffness
-        (n,) N/m; nan where a plan leaves it empty.
+        (n,) N/m; nan where a plan leaves it empty. Of a loop beside the tip that of the loop in series with its offset
+        (`updating.loops`): what is compared.
     force
         (n,) N, `defaults.FORCE` where not given.
     sd
@@ -84,6 +87,8 @@ class Measurements:
         Optional columns that are absent, or empty in some row, so that nothing can be told from them.
     notes, warnings
         What was assumed or not used; what is doubtful. For the report.
+    beside
+        Which readings are of loops beside the tip, and how these are compared; None where there are none.
     """
 
     position: FloatArray
@@ -106,9 +111,26 @@ class Measurements:
     missing: tuple[str, ...]
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    beside: LoopColumns | None = None
 
     def __len__(self) -> int:
         return len(self.position)
+
+    @property
+    def tip(self) -> NDArray[np.bool_]:
+        """(n,) readings of the tool tip against the work."""
+        return np.ones(len(self), dtype=bool) if self.beside is None else ~self.beside.beside
+
+    @property
+    def of_tip(self) -> Measurements:
+        """The readings of the tip alone."""
+        return self if self.beside is None else self.select(self.tip)
+
+    @property
+    def compliance(self) -> FloatArray:
+        """(n,) m/N as read: displacement over load, whatever the loop."""
+        joined = 1.0 / self.stiffness
+        return joined if self.beside is None else self.beside.alone(joined)
 
     @property
     def rotation(self) -> FloatArray:
@@ -121,7 +143,8 @@ class Measurements:
             f.name: getattr(self, f.name)[rows] for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)
         }
         extra = {name: values[rows] for name, values in self.extra.items()}
-        return replace(self, **chosen, extra=extra)
+        beside = None if self.beside is None else self.beside.select(rows)
+        return replace(self, **chosen, extra=extra, beside=beside if beside and beside.beside.any() else None)
 
     def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
         """Effects that these data cannot test -> the columns that they lack."""
@@ -168,7 +191,7 @@ def read_measurements(
     errors = errors or duplicates([row for parsed in good for row in parsed.rows], across_files=True)
     if errors:
         raise InputErrors(errors)
-    return _checked(_columns(good), machine)
+    return with_offsets(_checked(_columns(good, machine), machine), machine)
 
 
 def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
@@ -188,8 +211,8 @@ def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
         return bad
 
 
-def _columns(files: list[RowFile]) -> Measurements:
-    rows = [row for file in files for row in file.rows]
+def _columns(files: list[RowFile], machine: Machine) -> Measurements:
+    rows = [_placed(row, machine) for file in files for row in file.rows]
 
     def numbers(name: str) -> FloatArray:
         return np.array([getattr(row, name) for row in rows], dtype=float)
@@ -208,14 +231,15 @@ def _columns(files: list[RowFile]) -> Measurements:
         **{name: texts(name) != "" for name in LABELS},
     }
     setup, point = texts("setup"), _points(rows, texts("point"))
+    stiffness, sd, beside = _beside(rows)
     extra, dropped = _extra_columns(rows)
     return Measurements(
         position=numbers("position"),
         angles=numbers("angles"),
         direction=numbers("direction"),
-        stiffness=numbers("stiffness"),
+        stiffness=stiffness,
         force=np.where(given["force_N"], force, defaults.FORCE),
-        sd=numbers("sd"),
+        sd=sd,
         tool_extension=np.where(given["tool_extension_mm"], extension, 0.0),
         time=time,
         temperature=temperature,
@@ -230,6 +254,67 @@ def _columns(files: list[RowFile]) -> Measurements:
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
         notes=(*(note for file in files for note in file.notes), *_incomplete(given), *dropped),
+        beside=beside,
+    )
+
+
+def _placed(row: Row, machine: Machine) -> Row:
+    """A strut on a bench has no pose: it is given the machine's neutral one, which its length overrules."""
+    if row.beside is None or not np.isnan(row.position).all():
+        return row
+    neutral = machine.limits.neutral_pose
+    return replace(row, position=tuple(neutral[:3]), angles=tuple(neutral[3:]))
+
+
+def _beside(rows: list[Row]) -> tuple[FloatArray, FloatArray, LoopColumns | None]:
+    """Stiffness and its sd, N/m, of loops without their offsets; the loops."""
+    stiffness = np.array([row.stiffness for row in rows])
+    sd = np.array([row.sd for row in rows])
+    if all(row.beside is None for row in rows):
+        return stiffness, sd, None
+    names, length = [row.labels["loop"] for row in rows], np.full(len(rows), np.nan)
+    for i, row in enumerate(rows):
+        if row.beside is not None:
+            length[i] = row.beside.length
+            stiffness[i], sd[i] = row.beside.compliance, row.beside.sd  # m/N until `with_offsets`
+    return stiffness, sd, LoopColumns.of(names, length)
+
+
+def with_offsets(data: Measurements, machine: Machine, widest: float = WIDEST) -> Measurements:
+    """The same with the readings of loops, until then m/N with their sd in m/N, as stiffnesses with offsets.
+
+    `widest`: relative sd that no loop reading with its offset has more of.
+    """
+    if data.beside is None:
+        return data
+    rows = data.beside.beside
+    read, sd = np.where(rows, data.stiffness, np.nan), np.where(rows, data.sd, np.nan)
+    plain = StiffnessModel(machine)
+    path = measured_path(plain, data)
+    tip = exact.compliance_along(plain, path, data.direction)
+    # A joint moves the way its strut does, which the plain machine's joints, being rigid, do not say.
+    loops = [replace(one, kind="strut", where="") if one.kind == "joint" else one for one in data.beside.loops]
+    toward = loop_compliance(plain, path, data.direction, loops, data.beside.which)
+    joint = np.array([one.kind == "joint" for one in data.beside.loops])[data.beside.which]
+    expected = np.where(joint, 0.0, toward)
+    usual = assumed_sd(np.where(np.isnan(read), expected, read), data.force)
+    assumed = int((np.isnan(sd) & rows & ~np.isnan(read)).sum())
+    sd = np.where(np.isnan(sd), usual, sd)
+    beside = offsets(data.beside, read, sd, expected, toward, tip, widest)
+    stiffness = 1.0 / beside.joined(np.where(rows, read, 1.0))
+    # A loop's indicator is not clamped with the tip's gauge: its readings scatter each on its own.
+    own = np.char.add("loop reading ", np.arange(len(data)).astype(str))
+    note = (
+        f"{assumed} readings of loops beside the tip do not say how far they scatter (sd_um): "
+        f"{1e6 * INDICATOR_SD:g} um and {100 * LOAD_SHARE:g} % assumed"
+    )
+    return replace(
+        data,
+        beside=beside,
+        stiffness=np.where(rows, stiffness, data.stiffness),
+        sd=np.where(rows, sd * stiffness**2, data.sd),
+        clamp=np.where(rows, own, data.clamp),
+        notes=(*data.notes, note) if assumed else data.notes,
     )
 
 
@@ -332,7 +417,9 @@ def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:
     columns: dict[str, NDArray[Any]] = {"file": data.file, "line": data.line, "point": data.point}
     columns |= {name: pose[:, i] for i, name in enumerate(("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"))}
     columns |= {f"d{axis}": data.direction[:, i] for i, axis in enumerate("xyz")}
-    columns |= {"stiffness_N_per_mm": n_per_mm_from_n_per_m(data.stiffness), "force_N": data.force}
+    with np.errstate(divide="ignore"):
+        shown = data.stiffness if data.beside is None else 1.0 / data.compliance
+    columns |= {"stiffness_N_per_mm": n_per_mm_from_n_per_m(shown), "force_N": data.force}
     others = {
         "sd_N_per_mm": n_per_mm_from_n_per_m(data.sd),
         "tool_extension_mm": mm_from_m(data.tool_extension),
@@ -352,6 +439,8 @@ def measured_path(model: StiffnessModel, data: Measurements) -> LoadPath:
     _, first, which = np.unique(poses, axis=0, return_index=True, return_inverse=True)
     length = data.tool_extension + model.machine.reference_tool_length
     path = load_path(model, data.position[first], data.rotation[first], length[first]).take(which.reshape(-1))
+    if data.beside is not None:
+        path = replace(path, struts=data.beside.on_lengths(path.struts))
 
     def unless_missing(name: str, values: Any) -> Any:
         return None if name in data.missing else values
@@ -375,7 +464,26 @@ def model_stiffness(model: StiffnessModel, data: Measurements) -> FloatArray:
         The strut law leaves a strut no stiffness at a measured pose.
     """
     path = measured_path(model, data)
-    stiffness = 1.0 / exact.compliance_along(model, path, data.direction)
+    stiffness = mechanical_stiffness(model, path, data)
     for active in model.instruments:
-        stiffness = active.reading(stiffness, path)
+        stiffness = shown_by(active, stiffness, path, data)
     return np.asarray(stiffness)
+
+
+def mechanical_stiffness(
+    model: StiffnessModel, path: LoadPath, data: Measurements, equilibrium: FloatArray | None = None
+) -> FloatArray:
+    """(n,) N/m of the machine alone; of loops beside the tip with their offsets, nan where that is no stiffness.
+
+    `equilibrium`: strut forces as of `exact.compliance_along`.
+    """
+    if data.beside is None:
+        return np.asarray(1.0 / exact.compliance_along(model, path, data.direction, equilibrium))
+    found = loop_compliance(model, path, data.direction, data.beside.loops, data.beside.which)
+    joined = data.beside.joined(found)
+    return np.asarray(1.0 / np.where(joined > 0.0, joined, np.nan))
+
+
+def shown_by(active: ActiveEffect, stiffness: FloatArray, path: LoadPath, data: Measurements) -> FloatArray:
+    """(n,) N/m that an instrument shows; the indicator of a loop beside the tip is another one."""
+    return np.where(data.tip, active.reading(stiffness, path), stiffness)

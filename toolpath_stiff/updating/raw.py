@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.tables import Columns, Table, read_table
-from toolpath_stiff.units import m_from_um, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import certain, m_from_um, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.updating.raw_shape import Shape, shape_of
 from toolpath_stiff.updating.rows import (
     ANGLES,
     LABELS,
@@ -106,6 +107,8 @@ class LoopFigures:
         deflection between them.
     closure
         m, deflection at the end less that at the beginning.
+    shape
+        Kinks, two slopes, work lost.
     """
 
     stiffness: float
@@ -115,6 +118,7 @@ class LoopFigures:
     loop_width: float
     linearity: float
     closure: float
+    shape: Shape
 
 
 def read_raw(table: Table) -> list[Loop]:
@@ -234,6 +238,7 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
         loop_width=_loop_width(loop),
         linearity=_linearity(loop, deflection),
         closure=float(loop.deflection[-1] - loop.deflection[0]),
+        shape=shape_of(loop.force, loop.deflection, _main_pass(loop)),
     )
 
 
@@ -326,8 +331,30 @@ def document(reduction: Reduction) -> list[LoopEntry]:
             **shop_figures(one),
         }
         shown = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
-        found.append(cast(LoopEntry, {"loop": loop.title, "line": loop.line, **shown}))
+        found.append(cast(LoopEntry, {"loop": loop.title, "line": loop.line, **shown, "shape": _shape(one.shape)}))
     return found
+
+
+def _shape(shape: Shape) -> ShapeEntry:
+    numbers = {
+        "force_N": shape.force,
+        "first_N_per_mm": n_per_mm_from_n_per_m(shape.first),
+        "second_N_per_mm": n_per_mm_from_n_per_m(shape.second),
+        "work_lost_mJ": 1e3 * shape.lost,
+    }
+    shown = {name: certain(value) if math.isfinite(value) else None for name, value in numbers.items()}
+    return cast(ShapeEntry, {"kind": shape.kind, **shown, "text": str(shape)})
+
+
+class ShapeEntry(TypedDict):
+    """What stands out of a straight line; see `raw_shape.Shape`."""
+
+    kind: str
+    force_N: float | None
+    first_N_per_mm: float | None
+    second_N_per_mm: float | None
+    work_lost_mJ: float | None
+    text: str
 
 
 class LoopEntry(TypedDict):
@@ -342,6 +369,7 @@ class LoopEntry(TypedDict):
     loop_width_um: float | None
     linearity_percent: float | None
     closure_um: float | None
+    shape: ShapeEntry
 
 
 def reduce_loops(loops: Iterable[Loop], file: str = "") -> list[LoopFigures]:

@@ -13,8 +13,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
+from toolpath_stiff.stiffness.effects.measuring_loop import TIP, MeasuringLoop
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
+from toolpath_stiff.updating import loops
+from toolpath_stiff.updating.loops import LoopReading
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 POSITION = ("x_mm", "y_mm", "z_mm")
@@ -27,11 +30,13 @@ OPTIONAL = ("force_N", "sd_N_per_mm", *LABELS, "time_min", "tool_extension_mm", 
 COLUMNS = Columns(
     numbers=(
         *POSITION, *ANGLES, *VECTOR, "stiffness_N_per_mm", "displacement_um", "force_N", "sd_N_per_mm", "time_min",
-        "tool_extension_mm", "temperature_C", *WIDE, *WIDE_MODEL,
+        "tool_extension_mm", "temperature_C", *loops.COLUMNS, *WIDE, *WIDE_MODEL,
     ),
     texts=("direction", *LABELS),
 )  # fmt: skip
-KNOWN = (*POSITION, *ANGLES, "direction", *VECTOR, "stiffness_N_per_mm", "displacement_um", *OPTIONAL)
+KNOWN = (
+    *POSITION, *ANGLES, "direction", *VECTOR, "stiffness_N_per_mm", "displacement_um", *OPTIONAL, *loops.COLUMNS,
+)  # fmt: skip
 
 # N/mm: no machine is softer than 0.1 N/um or stiffer than 10 kN/um; beyond, the unit is not N/mm.
 SOFTEST, STIFFEST = 1e2, 1e7
@@ -44,7 +49,12 @@ BOUNDS = {
     "displacement_um": (1e-3, 1e6),
     "time_min": (0.0, 1e6),
     "temperature_C": (-50.0, 200.0),
+    "sd_um": (1e-4, 1e4),
+    "strut_force_N": (1e-3, 1e7),
+    "length_mm": (1.0, 1e5),
 }
+# Of a loop beside the tip, which may read nothing, or backwards.
+LOOP_BOUNDS = {"stiffness_N_per_mm": (-1e12, 1e12), "displacement_um": (-loops.LARGEST_UM, loops.LARGEST_UM)}
 DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be their quotient, rounding allowed
 
@@ -66,7 +76,9 @@ class Row:
     time, temperature, tool_extension
         s, degrees C, m.
     labels
-        `LABELS` -> text.
+        `LABELS` -> text; `loop` by its own name, "" for the tip's.
+    beside
+        What an indicator beside the tip read; `stiffness` is nan then. None for readings of the tip.
     extra
         Further numeric columns, as they stand.
     file, line
@@ -86,6 +98,7 @@ class Row:
     file: str
     line: int
     extra: Mapping[str, float] = field(default_factory=dict)
+    beside: LoopReading | None = None
 
 
 @dataclass(frozen=True)
@@ -195,7 +208,8 @@ def _check_long(heading: list[str], planned: bool) -> Wrong | None:
     if ("direction" in heading) == (VECTOR[0] in heading):
         found = "no direction" if "direction" not in heading else "two directions"
         return found, "direction, or dx,dy,dz", ""
-    if not planned and "stiffness_N_per_mm" not in heading and not {"force_N", "displacement_um"} <= set(heading):
+    loaded = "displacement_um" in heading and ("force_N" in heading or "strut_force_N" in heading)
+    if not planned and "stiffness_N_per_mm" not in heading and not loaded:
         return "no measured stiffness", "stiffness_N_per_mm, or force_N with displacement_um", ""
     return None
 
@@ -209,12 +223,20 @@ def _all_numbers(table: Table, column: int) -> bool:
 
 def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, planned: bool) -> list[Row]:
     """The one reading of a long row, the three of a wide one."""
-    position = tuple(m_from_mm(number(record, name)) for name in POSITION)
-    angles = tuple(rad_from_deg(number(record, name)) if name in record else 0.0 for name in ANGLES)
-    labels = {name: record.get(name, "") for name in LABELS}
-    force = optional_number(record, "force_N")
+    loop = loops.loop_of(record.get("loop", ""))
+    labels = {name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == TIP else str(loop)}
+    on_bench = loop.kind == "alone" and bool(record.get("length_mm"))
+    position, angles = _pose(record, on_bench)
+    force, beside = optional_number(record, "force_N"), None
+    if loop == TIP:
+        readings = _readings(record, force, planned)
+    else:
+        beside = _beside(record, loop, planned)
+        force = beside.force
+        absent = on_bench and not record.get("direction", "Z" if VECTOR[0] in record else "")
+        readings = [(AXES["Z"] if absent else direction_of(record), math.nan)]
     rows = []
-    for direction, stiffness in _readings(record, force, planned):
+    for direction, stiffness in readings:
         rows.append(
             Row(
                 position=position,
@@ -230,9 +252,30 @@ def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, p
                 file=file,
                 line=line,
                 extra={name: float(record[name]) for name in more},
+                beside=beside,
             )
         )
     return rows
+
+
+def _pose(record: Mapping[str, str], on_bench: bool) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Position and angles; of a strut on a bench, which has no pose, nan."""
+    if on_bench and not any(record.get(name) for name in (*POSITION, *ANGLES)):
+        return (math.nan,) * 3, (math.nan,) * 3
+    position = tuple(m_from_mm(number(record, name)) for name in POSITION)
+    return position, tuple(rad_from_deg(number(record, name)) if name in record else 0.0 for name in ANGLES)
+
+
+def _beside(record: Mapping[str, str], loop: MeasuringLoop, planned: bool) -> LoopReading:
+    """What an indicator beside the tip read."""
+    if record.get("sd_N_per_mm"):
+        raise MeasurementError(f"sd_N_per_mm in a row of loop {loop}", expected="sd_um, of displacement_um")
+    numbers = {name: optional_number(record, name) for name in ("force_N", *loops.COLUMNS)}
+    for name, bounds in LOOP_BOUNDS.items():
+        numbers[name] = number(record, name, bounds) if record.get(name) else math.nan
+    if numbers["stiffness_N_per_mm"] == 0.0:
+        raise MeasurementError("stiffness_N_per_mm = 0", expected="displacement_um, where a loop reads it")
+    return loops.loop_reading(record, numbers, loop, planned)
 
 
 def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tuple[tuple[float, ...], float]]:
@@ -271,8 +314,8 @@ def direction_of(record: Mapping[str, str]) -> tuple[float, ...]:
     return tuple(component / size for component in vector)
 
 
-def number(record: Mapping[str, str], name: str) -> float:
-    """A cell that must hold a finite number within `BOUNDS`."""
+def number(record: Mapping[str, str], name: str, bounds: tuple[float, float] | None = None) -> float:
+    """A cell that must hold a finite number within `BOUNDS`, or within these."""
     text = record[name]
     try:
         value = math.nan if "_" in text else float(text)  # Python's own "1_000" is no number of an office
@@ -281,7 +324,7 @@ def number(record: Mapping[str, str], name: str) -> float:
     if not math.isfinite(value):
         dated = "the spreadsheet has made a date of it" if DATE.match(text) else ""
         raise MeasurementError(f"{name} = {text!r}", expected="a finite number", hint=dated)
-    low, high = BOUNDS.get(name, (-math.inf, math.inf))
+    low, high = bounds or BOUNDS.get(name, (-math.inf, math.inf))
     if not low <= value <= high:
         doubt = "; is the unit right?" if value > 0.0 else ""
         raise MeasurementError(f"{name} = {text}", expected=f"{low:g} to {high:g}{doubt}")
@@ -299,7 +342,7 @@ def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
     errors: list[InputError] = []
     for row in rows:
         # repr: nan differs from itself, its text does not.
-        at = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels)
+        at = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels, row.beside)
         numbered = bool(row.labels["repeat"]) and not across_files
         key = tuple(repr(part) for part in (at if numbered else (*at, row.stiffness)))
         seen = first.setdefault(key, row)

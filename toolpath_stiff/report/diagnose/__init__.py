@@ -36,6 +36,7 @@ from toolpath_stiff.report.explanations import (
     significant,
     text,
 )
+from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
 from toolpath_stiff.report.residuals import before_after_png
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, machine_text, number
@@ -104,6 +105,7 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
         picture("before_after.png", pictures, QUESTIONS),
         picture("confounding.png", pictures, QUESTIONS),
         picture("detectable.png", pictures, QUESTIONS),
+        *loops_section(document["loops"]),
         section("What to measure or do next", _next(document)),
         section("What these data cannot test", _cannot_test(document)),
         section("How much the choice matters on the tool path", _path(document)),

@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 ENTRY_POINTS = "toolpath_stiff.effects"
-NOT_EFFECTS = ("contract", "guard", "trial")
+NOT_EFFECTS = ("contract", "guard", "trial", "measuring_loop")
 
 
 @cache

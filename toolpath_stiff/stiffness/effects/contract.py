@@ -23,6 +23,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
+from toolpath_stiff.stiffness.effects.measuring_loop import MeasuringLoop
 
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
@@ -251,6 +252,25 @@ class Effect:
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
         """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m."""
         return stiffness
+
+    def seen_by(self, loop: MeasuringLoop) -> float:
+        """Share of what it gives way that an indicator across part of the load path sees: all where its link is inside.
+
+        Of a joint's two ends each is taken to give half.
+        """
+        if self.link not in loop.links:
+            return 0.0
+        return 0.5 if loop.kind == "joint" and loop.where else 1.0
+
+    def vertex_displacement(
+        self, path: LoadPath, p: Mapping[str, float], forces: FloatArray, vertex: int
+    ) -> FloatArray | None:
+        """(n, 3) m, base axes: how far a vertex of the frame (1 to 3) moves under strut forces (n, 6) N.
+
+        Of effects with `link = "frame"`: energy alone does not say which way a vertex moves. Without it an indicator
+        between a vertex and the floor is taken to see nothing of the effect.
+        """
+        return None
 
     def conditions(self, p: Mapping[str, Any]) -> tuple[str, ...]:
         """Which of `CONDITIONS` it waits for with these values: those of `needs`, and those that a value names.

@@ -69,6 +69,18 @@ class FrameCompliance(Effect):
             form[np.ix_(range(len(path)), pair, pair)] += own
         return form
 
+    def vertex_displacement(
+        self, path: LoadPath, p: Mapping[str, float], forces: FloatArray, vertex: int
+    ) -> FloatArray | None:
+        """By its own two springs under the pull of its two struts."""
+        if p["vertex"] not in (0, vertex):
+            return None
+        struts, radial = frame_vertices(path.machine.frame_joints)[vertex - 1]
+        pull = np.einsum("nk,nki->ni", forces[:, struts], path.struts.directions[:, struts])
+        moved = p["radial"] * (pull @ radial)[:, None] * radial
+        moved[:, 2] += p["vertical"] * pull[:, 2]
+        return np.asarray(moved)
+
     def finding(self, p: Mapping[str, Any]) -> str:
         """Which part gives way, by how much."""
         sizes = sizes_in_words([(p["radial"], "nm/N radially"), (p["vertical"], "nm/N vertically")])

@@ -20,6 +20,7 @@ from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import read_parameters
 from toolpath_stiff.updating.comparison.document import Answer, ComparisonDocument, document_of
+from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument, loops_document
 from toolpath_stiff.updating.comparison.principles import LinkShares, assess, load_path_shares, model_free_checks
 from toolpath_stiff.updating.comparison.residuals import (
     Label,
@@ -50,7 +51,7 @@ TELLS_LAW = 0.01  # smallest over largest singular value from which data tell th
 
 @dataclass(frozen=True)
 class Comparison:
-    """A comparison of n readings with a model.
+    """A comparison of n readings of the tip with a model; those of other loops are in the document.
 
     Attributes
     ----------
@@ -141,6 +142,9 @@ def compare(
     >>> round(found.document["baseline"]["mean_abs_error_percent"], 2)
     9.62
     """
+    every, data = data, data.of_tip
+    if not len(data):
+        raise InputError("no reading of the tip", expected="readings of tool against work beside those of other loops")
     predictor = Predictor(machine, data, effect_files)
     log_model = predictor.log_stiffness()
     bad = np.flatnonzero(~np.isfinite(log_model))
@@ -180,12 +184,21 @@ def compare(
         predictor, answers, residual, looked_for, numbers, cannot, notes, seed,
         [hint("which effect would explain it", asked.command("diagnose"))],
         suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=False),
+        _loops(machine, every, effect_files, noise_models(every, noise, strut_spread)[-1]),
     )  # fmt: skip
     return Comparison(
         predictor, data, noises, log_model, residual, np.sqrt(last.scattering.square), last.scattering.covariance,
         last.scattering.places, last.structure.excess, tuple(numbers), tuple(names),
         load_path_shares(predictor.base, data), document,
     )  # fmt: skip
+
+
+def _loops(machine: Machine, data: Measurements, effect_files: Sequence[str | Path], noise: Noise) -> LoopsDocument:
+    """Readings of loops beside the tip against the machine as its file has it."""
+    if data.beside is None:
+        return {"by_loop": [], "readings": []}
+    predictor = Predictor(machine, data, effect_files)
+    return loops_document(data, predictor.log_stiffness(), covariance(noise, predictor))
 
 
 def _places(data: Measurements) -> NDArray[np.int64]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.units import certain, mm_from_m
+from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 from toolpath_stiff.updating.comparison.principles import (
     CheckEntry,
 )
@@ -156,6 +157,7 @@ class ComparisonDocument(TypedDict):
     by_noise: dict[str, list[FindingEntry]]
     tests: list[PatternTest]
     far_off: list[FarOffEntry]
+    loops: LoopsDocument
     model_free: ModelFree
     noise: list[NoiseEntry]
     not_tested: list[str]
@@ -214,6 +216,7 @@ def document_of(
     seed: int,
     following: list[str],
     suspects: list[SuspectEntry],
+    loops: LoopsDocument,
 ) -> ComparisonDocument:
     """The content of compare.json; `following` are the commands that go on from here."""
     data, asked = predictor.data, question(predictor)
@@ -246,6 +249,7 @@ def document_of(
         "by_noise": by_noise,
         "tests": tests,
         "far_off": _far_off_entries(residual, answers[-1], looked_for, data),
+        "loops": loops,
         "model_free": {"checks": _checks(answers), "cannot_check": cannot},
         "noise": noises,
         "not_tested": [*(f"no column {name}" for name in data.missing), *notes],
@@ -384,7 +388,7 @@ def _refit_figures(predictor: Predictor, one: Answer) -> RefitFigures | None:
 def _noise(noise: Noise) -> NoiseEntry:
     return {
         "name": noise.name,
-        "repeat_percent": float(100.0 * np.sqrt(np.mean(noise.repeat**2))),
+        "repeat_percent": 100.0 * noise.typical_repeat,
         "clamping_percent": 100.0 * noise.clamping,
         "strut_spread_percent": 100.0 * noise.strut_spread,
         "origin": noise.origin,

@@ -118,8 +118,8 @@ def update(
     if objective == MEAN_ERROR:
         check_mean_error(add, strut_law, auto)
         found, search = update_by_mean_error(
-            machine, data, force=force, noise=noise, strut_spread=strut_spread, effect_files=effect_files, seed=seed,
-            progress=progress,
+            machine, data.of_tip, force=force, noise=noise, strut_spread=strut_spread, effect_files=effect_files,
+            seed=seed, progress=progress,
         )  # fmt: skip
     else:
         found = build_ladder(

@@ -342,7 +342,7 @@ def _assumptions(update: Update) -> list[str]:
 
 
 def residuals_csv(update: Update) -> str:
-    """One row a reading: measured, modelled as given and after, deviations, that where its point was left out."""
+    """One row a reading of the tip: measured, modelled as given and after, deviations, that with its point left out."""
     data, before, after = update.data, update.steps[0].fit.residual, update.last.fit.residual
     held = update.last.held.residual
     head = [
@@ -352,7 +352,7 @@ def residuals_csv(update: Update) -> str:
     ]  # fmt: skip
     rows = []
     along = directions(data)
-    for i in range(len(data)):
+    for i in np.flatnonzero(data.tip).tolist():
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
         modelled = [measured * float(np.exp(-residual[i])) for residual in (before, after)]

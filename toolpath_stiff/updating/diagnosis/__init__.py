@@ -7,9 +7,9 @@ needs to judge it: fits with intervals, errors held out by point, what these dat
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, Judgement, judg
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.doubts import SuspectEntry, suspect_entries, suspect_rows
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
-from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, refine
+from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, of_readings, refine
 from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
 from toolpath_stiff.updating.inference.noise import JOINT_ERROR, Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
@@ -38,6 +38,7 @@ from toolpath_stiff.updating.portrait import Portrait, draw_portrait
 if TYPE_CHECKING:
     from toolpath_stiff.nc import Program
     from toolpath_stiff.units import Pose
+    from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 
 FloatArray = NDArray[np.float64]
 
@@ -76,6 +77,9 @@ class Diagnosis:
         What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
     suspects
         Rows that look mistyped; `data` no longer holds those that are clear.
+    loops
+        Readings of indicators beside the tip against the likeliest explanation. Everything above with an entry a
+        reading is of those of the tip.
     """
 
     verdict: str
@@ -102,6 +106,7 @@ class Diagnosis:
     path: dict[str, Any] | None = None
     portrait: Portrait | None = None
     suspects: tuple[SuspectEntry, ...] = ()
+    loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
 
     @property
     def noise(self) -> Noise:
@@ -242,9 +247,9 @@ def _examined(
     say: Callable[[str], None],
 ) -> Diagnosis:
     """From readings to verdict under each noise model, then what stands behind the verdict that they share."""
-    if len(data) < FEWEST or np.isnan(data.stiffness).any():
+    if len(data.of_tip) < FEWEST or np.isnan(data.stiffness).any():
         raise InputError(
-            f"{len(data)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
+            f"{len(data.of_tip)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
             expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
         )
 
@@ -258,7 +263,7 @@ def _examined(
         return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
 
     judgements, main = judged(data)
-    suspects = () if main.question else suspect_rows(main.problem, main.likeliest)
+    suspects = () if main.question or data.beside is not None else suspect_rows(main.problem, main.likeliest)
     entries = suspect_entries(suspects, data, left_out=True)
     kept = np.ones(len(data), dtype=bool)
     kept[[row for one in suspects if one.clear for row in one.rows]] = False
@@ -276,13 +281,31 @@ def _examined(
             fits[family.name] = refine(main.problem, family.best)
     tested = {family.name for family in main.families}
     cannot |= {effect.name: () for effect in effects if effect.name not in tested}
+    held = {name: held_out(fit, data.point) for name, fit in fits.items()}
+    tip = data.tip
     return Diagnosis(
-        verdict, plausible, judgements, main, data, machine, effects, cannot, baseline.as_given, baseline.refitted,
-        fits, held_out(baseline.refitted, data.point), {name: held_out(fit, data.point) for name, fit in fits.items()},
+        verdict, plausible, judgements, main, data.of_tip, machine, effects, cannot,
+        of_readings(baseline.as_given, tip), of_readings(baseline.refitted, tip),
+        {name: of_readings(fit, tip) for name, fit in fits.items()},
+        held_out(baseline.refitted, data.point).of_readings(tip),
+        {name: one.of_readings(tip) for name, one in held.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
-        files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
+        files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries), loops=_loops(main, fits),
     )  # fmt: skip
+
+
+def _loops(main: Judgement, fits: dict[str, Fit]) -> LoopsDocument:
+    """Readings of loops beside the tip against the likeliest explanation."""
+    problem = main.problem
+    if problem.predictor.data.beside is None:
+        return {"by_loop": [], "readings": []}
+    from toolpath_stiff.updating.comparison.loop_readings import loops_document
+
+    likeliest = max(main.probability, key=lambda name: main.probability[name], default=NONE)
+    fit = fits.get(likeliest)
+    residual = main.base.residual if fit is None else fit.residual
+    return loops_document(problem.predictor.data, problem.observed - residual, problem.scatter.covariance)
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
@@ -311,8 +334,15 @@ def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | 
         if diagnosis.best is None or gate is None or gate.probability > FALSE_ALARM:
             return None
         base = diagnosis.fits[diagnosis.best]
+    problem, noise = main.problem, diagnosis.noise
+    if noise.tip is not None:  # its terms are compliances at the tip: other loops are left out
+        if verdict != "unexplained":
+            return None
+        noise = noise.select(noise.tip)
+        problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
+        base = problem.score_base()
     say("describing what is missing")
-    found = draw_portrait(main.problem, base, diagnosis.noise, diagnosis.seed, main.base_gate.worst)
+    found = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
     return found if found.terms or verdict == "unexplained" else None
 
 

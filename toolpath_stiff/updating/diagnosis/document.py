@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.units import json_number, mm_from_m
+from toolpath_stiff.units import certain, json_number, mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.diagnosis.words import assumptions, doubts, next_steps, row_words, verdict_text, why
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
@@ -20,6 +20,9 @@ from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
 from toolpath_stiff.updating.portrait.document import PortraitEntry, portrait_entry
+
+if TYPE_CHECKING:
+    from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 
 FloatArray = NDArray[np.float64]
 
@@ -217,6 +220,7 @@ class DiagnosisDocument(TypedDict):
     effects: list[str]
     data: list[str]
     readings: int
+    loops: LoopsDocument
     command: str
 
 
@@ -270,6 +274,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "effects": diagnosis.predictor.effects_that_act,
         "data": list(diagnosis.files),
         "readings": len(diagnosis.data),
+        "loops": certain(diagnosis.loops),
         "command": diagnosis.command,
     }
 
@@ -466,7 +471,7 @@ def _noise(judgement: Judgement) -> NoiseEntry:
     noise = judgement.noise
     return {
         "name": noise.name,
-        "repeat_percent": json_number(100.0 * float(np.sqrt(np.mean(noise.repeat**2))), 4),
+        "repeat_percent": json_number(100.0 * noise.typical_repeat, 4),
         "clamping_percent": json_number(100.0 * noise.clamping, 4),
         "strut_spread_percent": json_number(100.0 * noise.strut_spread, 4),
         "joint_error_mm": json_number(float(mm_from_m(noise.joint_error)), 4),

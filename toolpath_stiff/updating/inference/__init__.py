@@ -180,8 +180,9 @@ def question(predictor: Predictor) -> str:
 
 def _unlike(predictor: Predictor) -> str:
     """In what the readings are unlike the model's, a sentence without its full stop; "" where they may be its own."""
-    model, which = predictor.log_stiffness(), predictor.distinct
-    residual = np.log(predictor.data.stiffness) - model
+    tip = predictor.data.tip
+    model, which = predictor.log_stiffness()[tip], np.unique(predictor.distinct[tip], return_inverse=True)[1]
+    residual = np.log(predictor.data.stiffness[tip]) - model
     if not np.isfinite(residual).all():
         return ""
     ratio = float(np.exp(np.median(residual)))

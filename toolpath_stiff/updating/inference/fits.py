@@ -392,6 +392,10 @@ class HeldOut:
         """(n,) |modelled - measured| / measured."""
         return np.abs(np.expm1(-self.residual))
 
+    def of_readings(self, rows: NDArray[np.bool_]) -> HeldOut:
+        """Of some of the readings."""
+        return HeldOut(self.residual[rows], self.moves, self.point[rows])
+
     @property
     def mean_error(self) -> float:
         """Mean of `errors`."""
@@ -401,6 +405,11 @@ class HeldOut:
     def rms(self) -> float:
         """Root mean square of (modelled - measured) / measured."""
         return float(np.sqrt(np.mean(np.expm1(-self.residual) ** 2)))
+
+
+def of_readings(fit: Fit, rows: NDArray[np.bool_]) -> Fit:
+    """A fit with the residuals of some of its readings alone: for counting errors, no longer for fitting."""
+    return fit if rows.all() else replace(fit, residual=fit.residual[rows], jacobian=fit.jacobian[rows])
 
 
 def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:

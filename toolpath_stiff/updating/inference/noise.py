@@ -78,6 +78,8 @@ class Noise:
         Where the figures come from, a sentence.
     remark
         That a stated noise is not what the repeats show; "" where nothing is to be said.
+    tip
+        (n,) readings of the tip among those of other loops, which are what is told of; None: all.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Noise:
     freedom: float
     origin: str
     remark: str = ""
+    tip: NDArray[np.bool_] | None = None
 
     @property
     def reading(self) -> FloatArray:
@@ -104,16 +107,19 @@ class Noise:
     @property
     def typical_repeat(self) -> float:
         """Root mean square of `repeat`."""
-        return float(np.sqrt(np.mean(self.repeat**2)))
+        return float(np.sqrt(np.mean(self._of_tip(self.repeat) ** 2)))
 
     @property
     def typical(self) -> float:
         """Root mean square of `reading`."""
-        return float(np.sqrt(np.mean(self.reading**2)))
+        return float(np.sqrt(np.mean(self._of_tip(self.reading) ** 2)))
+
+    def _of_tip(self, values: FloatArray) -> FloatArray:
+        return values if self.tip is None or not self.tip.any() else values[self.tip]
 
     def select(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Noise:
         """The noise of some of the readings."""
-        return replace(self, repeat=self.repeat[rows])
+        return replace(self, repeat=self.repeat[rows], tip=None if self.tip is None else self.tip[rows])
 
 
 def noise_models(
@@ -127,7 +133,7 @@ def noise_models(
     Parameters
     ----------
     data
-        n readings.
+        n readings; those of loops beside the tip have a noise of their own, `Measurements.sd`.
     stated
         Relative sd of one reading, re-clamping included; or (repeat, clamping). Wins over the data.
     strut_spread, joint_error
@@ -138,7 +144,28 @@ def noise_models(
     InputError
         A stated noise that cannot be.
     """
+    found = _noise_of_tip(data.of_tip, stated, strut_spread, joint_error)
+    if data.beside is None:
+        return found
+    return tuple(_with_loops(noise, data) for noise in found)
 
+
+def _with_loops(noise: Noise, data: Measurements) -> Noise:
+    """The noise of the tip's readings, and that of the loops beside it: each scatters on its own."""
+    repeat = np.empty(len(data))
+    repeat[data.tip] = noise.repeat
+    relative = data.sd[~data.tip] / data.stiffness[~data.tip]
+    # A loop reading is a clamping of its own (`measurements.with_offsets`), whose scatter is counted beside this one.
+    repeat[~data.tip] = np.sqrt(np.maximum(relative**2 - noise.clamping**2, LEAST**2))
+    return replace(noise, repeat=repeat, tip=data.tip)
+
+
+def _noise_of_tip(
+    data: Measurements,
+    stated: float | tuple[float, float] | None,
+    strut_spread: float,
+    joint_error: float,
+) -> tuple[Noise, ...]:
     def model(
         name: str, repeat: FloatArray, clamping: float, freedom: float, origin: str, wild: float = OUTLIERS,
         remark: str = "",

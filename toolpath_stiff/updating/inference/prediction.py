@@ -20,8 +20,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
+from toolpath_stiff.stiffness.loop_response import law_products
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
-from toolpath_stiff.updating.measurements import Measurements, measured_path
+from toolpath_stiff.updating.measurements import Measurements, measured_path, mechanical_stiffness, shown_by
 
 FloatArray = NDArray[np.float64]
 
@@ -38,12 +39,16 @@ def scaled_law(law: StrutLaw, logs: ArrayLike) -> StrutLaw:
 
 @dataclass(frozen=True)
 class _Prepared:
-    """Rows without those that are mechanically the same, what effects see of them, the strut forces per unit load."""
+    """Rows without those that are mechanically the same, what effects see of them, the strut forces per unit load.
+
+    `products` (m, 6): what each strut's own compliance counts in a reading, at the tip the squared force.
+    """
 
     data: Measurements
     which: NDArray[np.int64]
     path: LoadPath
     forces: FloatArray
+    products: FloatArray
 
 
 class Predictor:
@@ -120,7 +125,7 @@ class Predictor:
         if model.instruments:
             path = replace(self.full_path(), machine=model.machine)
             for active in model.instruments:
-                stiffness = active.reading(stiffness, path)
+                stiffness = shown_by(active, stiffness, path, self.data)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(np.where(stiffness > 0.0, np.log(stiffness), np.nan))
 
@@ -132,9 +137,8 @@ class Predictor:
         )
         if same_geometry:
             path = replace(prepared.path, machine=model.machine)
-            return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction, prepared.forces))
-        path = measured_path(model, prepared.data)
-        return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction))
+            return mechanical_stiffness(model, path, prepared.data, prepared.forces)
+        return mechanical_stiffness(model, measured_path(model, prepared.data), prepared.data)
 
     def full_path(self) -> LoadPath:
         """What instruments see of every row."""
@@ -159,7 +163,7 @@ class Predictor:
         """(n, 6) d ln k / d ln(stiffness of strut i) at the machine file's strut law: its share of the compliance."""
         prepared = self._timeless
         compliance = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
-        share = prepared.forces**2 * compliance * np.exp(self._base_log())[prepared_first(prepared)][:, None]
+        share = prepared.products * compliance * np.exp(self._base_log())[prepared_first(prepared)][:, None]
         return np.asarray(share[prepared.which])
 
     def struts_carry_all(self, effects: Iterable[Effect]) -> bool:
@@ -181,7 +185,7 @@ class Predictor:
         lengths = prepared.path.struts.lengths
         second = (lengths - rule.length_1) / (rule.length_2 - rule.length_1)
         stiffness = rule.stiffness(lengths)
-        energy = prepared.forces**2 / stiffness**2
+        energy = prepared.products / stiffness**2
         columns = [
             (energy * rule.stiffness_1 * (1.0 - second)).sum(axis=1),
             (energy * rule.stiffness_2 * second).sum(axis=1),
@@ -222,8 +226,8 @@ class Predictor:
 
     @cached_property
     def _squared_forces(self) -> FloatArray:
-        """(6, m) squared strut forces per unit load."""
-        return np.ascontiguousarray(self._timeless.forces.T**2)
+        """(6, m) squared strut forces per unit load; of loops beside the tip, products of real and virtual ones."""
+        return np.ascontiguousarray(self._timeless.products.T)
 
     def joint_columns(self) -> FloatArray:
         """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
@@ -244,7 +248,7 @@ class Predictor:
                     moved = replace(self.base, machine=true, control=self.base.control or self.base.machine)
                     prepared = self._timeless
                     path = measured_path(moved, prepared.data)
-                    stiffness = 1.0 / exact.compliance_along(moved, path, prepared.data.direction)
+                    stiffness = mechanical_stiffness(moved, path, prepared.data)
                     columns.append((np.log(stiffness)[prepared.which] - base) / JOINT_STEP)
         return np.stack(columns, axis=1)
 
@@ -273,6 +277,10 @@ def _prepare(model: StiffnessModel, data: Measurements, timed: bool) -> _Prepare
     columns += [setups[:, None], np.nan_to_num(data.temperature, nan=-1e3)[:, None]]
     if timed:
         columns.append(np.nan_to_num(data.time, nan=-1.0)[:, None])
+    beside = data.beside
+    if beside is not None:
+        columns += [beside.which[:, None].astype(float), beside.offset[:, None], beside.toward[:, None]]
+        columns.append(np.nan_to_num(beside.length)[:, None])
     keys = np.concatenate(columns, axis=1)
     _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     distinct = data.select(first)
@@ -280,4 +288,8 @@ def _prepare(model: StiffnessModel, data: Measurements, timed: bool) -> _Prepare
     wrenches = np.zeros((len(distinct), 6, 1))
     wrenches[:, :3, 0] = distinct.direction
     _, forces = exact.respond(path, exact.assemble_links(model, path), wrenches)
-    return _Prepared(distinct, which.reshape(-1).astype(np.int64), path, forces[..., 0])
+    products = forces[..., 0] ** 2
+    if distinct.beside is not None:
+        few = distinct.beside
+        products = law_products(forces[..., 0], few.loops, few.which) * few.toward[:, None]
+    return _Prepared(distinct, which.reshape(-1).astype(np.int64), path, forces[..., 0], products)

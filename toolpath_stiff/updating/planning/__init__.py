@@ -48,6 +48,7 @@ from toolpath_stiff.updating.planning.gaps import (
     same_place,
     why_of,
 )
+from toolpath_stiff.updating.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.updating.planning.rivals import (
     Forecast,
     Rival,
@@ -133,6 +134,9 @@ class Plan:
         Repeat noise of a reading and scatter of a clamping, relative sd.
     notes
         What was assumed or left out.
+    forecasts, usable, scatter
+        What the choice was made from: of each rival for all readings; (v,) visits that all rivals have an answer to;
+        how readings and the machine scatter.
     """
 
     visits: Visits
@@ -149,6 +153,9 @@ class Plan:
     rivals: tuple[Rival, ...]
     noise: tuple[float, float]
     notes: tuple[str, ...]
+    forecasts: tuple[Forecast, ...]
+    usable: NDArray[np.bool_]
+    scatter: ReadingNoise
 
     @property
     def separable(self) -> bool:
@@ -203,6 +210,8 @@ def plan_measurements(
         notes.append(f"planned for a noise of {100 * LEAST:g} % a reading: nobody measures better")
     menu, costs = menu or Menu(), costs or Costs()
     visits = possible_visits(machine, menu, matters(ranked), np.random.default_rng(seed))
+    if menu.indicators:
+        visits = with_indicators(machine, visits, loops_between(ranked), repeat)
     forecasts, good, scatter = forecast_all(machine, ranked, visits.readings, effect_files, strut_spread)
     usable = np.logical_and.reduceat(good[visits.members], visits.starts)
     if not usable.any():
@@ -240,6 +249,9 @@ def plan_measurements(
         rivals=ranked,
         noise=(repeat, clamping),
         notes=tuple(notes),
+        forecasts=tuple(forecasts),
+        usable=usable,
+        scatter=noise,
     )
 
 
@@ -367,6 +379,7 @@ def plan(
     loads: Sequence[float] | None = None,
     tool_extensions: Sequence[float] | None = None,
     setups: Sequence[str] | None = None,
+    indicators: bool = False,
     costs: Costs | None = None,
     noise: float | tuple[float, float] | None = None,
     strut_spread: float = STRUT_SPREAD,
@@ -387,6 +400,8 @@ def plan(
         Poses; None: 6, or 24 of a first campaign.
     radius, heights, max_tilt, loads, tool_extensions, setups
         What may vary, as in `Menu`: m, m, rad, N, m, names; None: the usual, and what the data have.
+    indicators
+        Whether a second indicator may be set across a link of the load path.
     costs
         Minutes of work.
     noise, strut_spread, effect_files, seed
@@ -411,7 +426,7 @@ def plan(
     costs = costs or Costs()
     menu = with_options(
         Menu(setups=(TABLE, RISER)) if data is None else Menu.of(data), radius=radius, heights=heights,
-        max_tilt=max_tilt, loads=loads, tool_extensions=tool_extensions, setups=setups,
+        max_tilt=max_tilt, loads=loads, tool_extensions=tool_extensions, setups=setups, indicators=indicators,
     )  # fmt: skip
     record = (tuple(effect_files), tuple(files), seed)
     effects = known_effects(effect_files)

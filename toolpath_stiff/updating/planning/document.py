@@ -74,6 +74,7 @@ class VisitEntry(TypedDict):
     setup: str
     forces_N: list[float]
     directions: list[str]
+    loops: list[str]
     kind: str
     why: str
 
@@ -121,7 +122,7 @@ class PlanDocument(_Promise):
     command: str
 
 
-COSTS = ("reading", "pose", "tool", "setup")
+COSTS = ("reading", "pose", "tool", "setup", "indicator")
 SHOWS = 3.0  # standard deviations from which on an effect is said to show
 
 
@@ -214,6 +215,7 @@ def _visits_of(rows: list[dict[str, Any]], kinds: Sequence[str], why: Sequence[s
                 "setup": first.get("setup", ""),
                 "forces_N": sorted({row["force_N"] for row in own}),
                 "directions": list(dict.fromkeys(_direction(row) for row in own)),
+                "loops": list(dict.fromkeys(row["loop"] for row in own if row.get("loop"))),
                 "kind": kind,
                 "why": reason,
             }
@@ -323,6 +325,8 @@ def plan_rows(
             else:
                 entry |= zip(VECTOR, _whole(name), strict=True)
             entry["stiffness_N_per_mm"] = ""
+            entry["loop"] = str(visits.readings.loop[row])
+            entry["displacement_um"] = ""
             entry["force_N"] = _round(visits.readings.force[row])
             entry["setup"] = str(visits.setup[visit])
             entry["clamp"] = clamp
@@ -332,6 +336,9 @@ def plan_rows(
                 entry["time_min"] = _round(visits.readings.time[row] / 60.0)
             entry["tool_extension_mm"] = _round(mm_from_m(visits.extension[visit]))
             found.append(entry)
+    if not any(entry["loop"] for entry in found):
+        for entry in found:
+            del entry["loop"], entry["displacement_um"]
     if not (visits.setup[list(chosen)] != "").any():
         for entry in found:
             del entry["setup"]

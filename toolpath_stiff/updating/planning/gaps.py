@@ -258,6 +258,8 @@ def further_minutes(visits: Visits, chosen: Sequence[int], costs: Costs, menu: M
     equipped = {(menu.setups[0], menu.tool_extensions[0])}
     equipped |= {(str(visits.setup[v]), float(visits.extension[v])) for v in chosen}
     minutes = costs.pose + costs.reading * visits.counts + visits.wait / 60.0
+    if visits.loop is not None:
+        minutes = minutes + costs.indicator * (visits.loop != "")
     minutes = minutes + costs.setup * ~np.isin(visits.setup, list(setups))
     tools: dict[str, set[float]] = {}
     for setup, tool in equipped:
@@ -292,6 +294,8 @@ def kind_of(visits: Visits, visit: int, menu: Menu) -> str:
     """What the visit changes, the dearest thing first."""
     if visits.setup[visit] != menu.setups[0]:
         return "another set-up"
+    if visits.across(visit):
+        return "an indicator"
     if visits.wait[visit] > menu.waits[0]:
         return "waiting"
     if visits.extension[visit] != menu.tool_extensions[0]:
@@ -314,5 +318,7 @@ def why_of(visits: Visits, visit: int, shares: dict[tuple[str, str], GapShares],
         what.append(f"{visits.wait[visit] / 60.0:.3g} minutes after zeroing")
     if visits.rounds[visits.rows(visit)].max() > 1:
         what.append("each reading twice" if visits.rounds[visits.rows(visit)].max() == 2 else "readings repeated")
+    if visits.across(visit):
+        what.append(f"a second indicator: {visits.across(visit)}")
     gap = shares[pair].gap([visit])
     return f"{', '.join(what)}: {gap:.1f} sigma between {pair[0]} and {pair[1]}"

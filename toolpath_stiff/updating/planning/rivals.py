@@ -115,7 +115,9 @@ def forecast_all(
     predictor = Predictor(machine, readings, effect_files)
     forecasts = [_forecast(rival, predictor) for rival in rivals]
     good = np.all([np.isfinite(f.mean) & np.isfinite(f.factor).all(axis=1) for f in forecasts], axis=0)
-    joints = joint_columns(predictor.base, readings) * joint_error
+    # What a loop beside the tip reads hangs on the joints' places too little to count them.
+    joints = np.zeros((len(readings), 36))
+    joints[readings.tip] = joint_columns(predictor.base, readings.of_tip) * joint_error
     return forecasts, good, principal(np.concatenate([strut_spread * predictor.strut_columns(), joints], axis=1))
 
 

@@ -84,6 +84,8 @@ class Menu:
         Whether readings carry a time.
     usual_load
         N, where the load does not matter.
+    indicators
+        Whether a second indicator may be set across a link.
     """
 
     heights: tuple[float, ...] = ()
@@ -100,6 +102,7 @@ class Menu:
     floors: Mapping[str, float] = field(default_factory=dict)
     timed: bool = True
     usual_load: float = defaults.FORCE
+    indicators: bool = False
 
     def __post_init__(self) -> None:
         if self.rounds < 1:
@@ -163,15 +166,21 @@ class Costs:
         Another tool.
     setup
         Another set-up: a riser on or off.
+    indicator
+        A second indicator across a link of the load path.
     """
 
     reading: float = 1.0
     pose: float = 15.0
     tool: float = 10.0
     setup: float = 45.0
+    indicator: float = 10.0
 
     def __post_init__(self) -> None:
-        if not min(self.reading, self.pose, self.tool, self.setup) >= 0.0 or self.pose + self.reading <= 0.0:
+        if (
+            not min(self.reading, self.pose, self.tool, self.setup, self.indicator) >= 0.0
+            or self.pose + self.reading <= 0.0
+        ):
             raise InputError("costs of a plan", expected="minutes, 0 or more, and a pose that costs something")
 
 
@@ -195,6 +204,8 @@ class Visits:
         Indices into `readings`, visit after visit.
     starts
         (v,) where each visit's members begin.
+    loop
+        (v,) what a second indicator is set across, "" where there is none; None: nowhere.
     """
 
     pose: FloatArray
@@ -207,6 +218,7 @@ class Visits:
     rounds: IntArray
     members: IntArray
     starts: IntArray
+    loop: NDArray[np.str_] | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -220,6 +232,10 @@ class Visits:
         """Indices of a visit's readings, in measuring order."""
         own = self.members[self.starts[visit] : self.starts[visit] + self.counts[visit]]
         return own[np.argsort(np.nan_to_num(self.readings.time[own]), kind="stable")]
+
+    def across(self, visit: int) -> str:
+        """What a second indicator is set across at a visit; "" where there is none."""
+        return "" if self.loop is None else str(self.loop[visit])
 
     def tilt(self, visit: int) -> float:
         """Angle of the spindle from the vertical, rad."""
@@ -344,6 +360,7 @@ def planned_readings(
     extension: FloatArray,
     setup: NDArray[np.str_],
     time: FloatArray,
+    loop: NDArray[np.str_] | None = None,
 ) -> Measurements:
     """Readings that have not been taken.
 
@@ -355,6 +372,8 @@ def planned_readings(
         (m,) directions, keys of `VECTORS`.
     force, extension, setup, time
         (m,) N, m, names, s.
+    loop
+        (m,) names of loops; None: of the tip.
     """
     m = len(pose)
     empty, nothing = np.full(m, ""), np.full(m, np.nan)
@@ -372,7 +391,7 @@ def planned_readings(
         time=time,
         temperature=nothing,
         setup=setup,
-        loop=empty,
+        loop=empty if loop is None else loop,
         repeat=empty,
         point=empty,
         clamp=empty,

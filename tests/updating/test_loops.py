@@ -1,0 +1,333 @@
+"""Indicators beside the tip: the model's virtual work against the rig's assembled elements, and by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from tests.stiffness.cases import nist
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.report.compare import text
+from toolpath_stiff.rig.case import again, draw_case
+from toolpath_stiff.rig.exercise import csv_text
+from toolpath_stiff.rig.hidden import HiddenMachine, Rows
+from toolpath_stiff.rig.loops import true_displacements
+from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.stiffness.effects.measuring_loop import MeasuringLoop, measuring_loop
+from toolpath_stiff.stiffness.loop_response import loop_compliance
+from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.updating.comparison import compare
+from toolpath_stiff.updating.diagnosis import diagnose
+from toolpath_stiff.updating.diagnosis.document import document
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.measurements import measured_path, model_stiffness, read_measurements
+from toolpath_stiff.updating.planning import plan
+from toolpath_stiff.updating.planning.document import plan_csv, plan_rows, rows_of
+from toolpath_stiff.updating.planning.next_visit import TABLES, Tables, Taken, conditioned, next_visit, tables_of
+
+POSES = np.array([[0.05, -0.1, 0.6, 0.1, -0.2, 0.05], [-0.2, 0.15, 1.1, -0.3, 0.1, 0.0], [0.0, 0.0, 0.8, 0, 0, 0]])
+DIRECTIONS = np.array([[1.0, 0, 0], [0, 0.6, 0.8], [0, 0, 1.0]])
+NAMES = (
+    "tip", "spindle", "platform", "table", "strut 2", "strut 5 alone", "joint 4", "joint 4 frame", "frame 1",
+    "frame 2 radial", "frame 3 vertical",
+)  # fmt: skip
+# What gives way: the model's effects with SI values, and the same of the rig's hidden machine.
+CASES = {
+    "nothing": ([], {}),
+    "all of it": (
+        [
+            ("spindle_compliance", {"radial": 7e-9, "axial": 4e-9}),
+            ("table_compliance", {"x": 3e-9, "y": 4e-9, "z": 5e-9, "rocking": 6e-9}),
+            ("frame_compliance", {"vertex": 0, "radial": 6e-9, "vertical": 9e-9}),
+            ("joint_compliance", {"compliance": 8e-9}),
+            ("strut_law", {"curvature": 0.1}),
+        ],
+        {
+            "spindle": (7e-9, 4e-9),
+            "table": np.array([3e-9, 4e-9, 5e-9]),
+            "rocking": 6e-9,
+            "vertices": np.tile([6e-9, 9e-9], (6, 1)),
+            "joint": 8e-9,
+            "curvature": 0.1,
+        },
+    ),
+    "load and moments": (
+        [
+            ("contact_nonlinearity", {"compliance": 6e-9}),
+            ("joint_moment_stiffness", {"stiffness": 1e5}),
+            ("setup_compliance", {"setup": "riser", "x": 2e-9, "y": 3e-9, "z": 4e-9}),
+        ],
+        {"hertz": 6e-9, "moment": 1e5, "setup": "riser", "setup_compliance": np.array([2e-9, 3e-9, 4e-9])},
+    ),
+    "platform bars": ([("platform_flexibility", {"bar_stiffness": 5e8})], {"bars": 5e8}),
+}
+
+
+def rows(setup: str = "riser") -> Rows:
+    n = len(POSES)
+    return Rows(
+        POSES[:, :3], POSES[:, 3:], DIRECTIONS, np.full(n, 2000.0), np.zeros(n), np.zeros(n), np.zeros(n),
+        np.full(n, setup),
+    )  # fmt: skip
+
+
+def model_of(effects):
+    return build_model(nist(), extra=[ActiveEffect(find_effect(name), values) for name, values in effects])
+
+
+def file_of(tmp_path, lines: list[str], heading: str) -> str:
+    path = tmp_path / "loops.csv"
+    path.write_text("\n".join([heading, *lines]) + "\n")
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def at_poses(tmp_path_factory):
+    """The path of the three poses under 2000 N in set-up riser."""
+    heading = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,dx,dy,dz,force_N,stiffness_N_per_mm,setup"
+    lines = []
+    for pose, d in zip(POSES, DIRECTIONS, strict=True):
+        cells = [*(1e3 * pose[:3]), *np.degrees(pose[3:]), *d, 2000, 30000]
+        lines.append(",".join(f"{v:.12g}" for v in cells) + ",riser")
+    return read_measurements(file_of(tmp_path_factory.mktemp("loops"), lines, heading), nist())
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_loop_reads_what_the_assembled_elements_move(case, name, at_poses):
+    effects, hidden = CASES[case]
+    model = model_of(effects)
+    loop = measuring_loop(name)
+    found = loop_compliance(model, measured_path(model, at_poses), DIRECTIONS, [loop], np.zeros(3, dtype=int))
+    true = true_displacements(load_nominal("nist"), HiddenMachine(**hidden), rows(), [name] * 3, np.full(3, np.nan))
+    # The rig's joints have unknowns of their own along each strut; secant iteration settles to 1e-11.
+    assert found == pytest.approx(true, rel=1e-6, abs=2e-13)
+
+
+def test_loops_add_up_to_the_tip(at_poses):
+    """Spindle and platform are the tip; by Castigliano struts and joints, times their forces, are the rest."""
+    model = model_of(
+        [("spindle_compliance", {"radial": 7e-9, "axial": 4e-9}), ("joint_compliance", {"compliance": 8e-9})]
+    )
+    path = measured_path(model, at_poses)
+    which = np.zeros(3, dtype=int)
+
+    def read(name: str):
+        return loop_compliance(model, path, DIRECTIONS, [measuring_loop(name)], which)
+
+    assert read("spindle") + read("platform") == pytest.approx(read("tip"), rel=1e-12)
+    forces = exact.under_load(model, path, DIRECTIONS).forces
+    of_struts = sum(forces[:, i] * (read(f"strut {i + 1}") + read(f"joint {i + 1}")) for i in range(6))
+    assert of_struts == pytest.approx(read("platform"), rel=1e-12)
+    assert read("joint 2 platform") + read("joint 2 frame") == pytest.approx(read("joint 2"), rel=1e-12)
+    assert read("strut 3 alone") == pytest.approx(1.0 / nist().strut_law.stiffness(path.struts.lengths[:, 2]))
+
+
+def test_words_of_the_column():
+    assert str(measuring_loop(" Strut 3  Alone")) == "strut 3 alone"
+    assert measuring_loop("") == measuring_loop("tip") == MeasuringLoop()
+    for wrong in ("strut", "strut 7", "frame 4", "spindle 1", "joint 2 radial", "floor"):
+        assert measuring_loop(wrong) is None
+    for name in NAMES:
+        assert str(measuring_loop(name)) == name
+
+
+HEADING = "x_mm,y_mm,z_mm,direction,loop,stiffness_N_per_mm,displacement_um,force_N,sd_um,strut_force_N,length_mm"
+LINES = [
+    "0,0,800,X,,40000,,1000,,,",
+    "0,0,800,X,table,,0,1000,0.2,,",
+    "0,0,800,-X,strut 2,,-12.5,1000,,,",
+    "0,0,800,Z,spindle,2e5,,1000,,,",
+    ",,,,strut 3 alone,,25,,,1000,2500",
+]
+
+
+def test_loop_readings_arrive_as_compliances(tmp_path):
+    data = read_measurements(file_of(tmp_path, LINES, HEADING), nist())
+    assert data.loop.tolist() == ["", "table", "strut 2", "spindle", "strut 3 alone"]
+    assert data.tip.tolist() == [True, False, False, False, False] and len(data.of_tip) == 1
+    # Under -X the strut got shorter: under X it would get longer.
+    assert data.compliance == pytest.approx([1 / 4e7, 0.0, 12.5e-9, 5e-9, 25e-9], abs=1e-20)
+    assert data.force[4] == 1000.0 and data.beside.length[4] == 2.5
+    assert (data.stiffness > 0.0).all() and len(set(data.clamp)) == 5
+    # Scatter as stated: 0.2 um under 1000 N; on the scale of the logarithm by the offset.
+    relative = data.sd[1] / data.stiffness[1]
+    assert relative == pytest.approx(0.2e-9 / data.beside.offset[1])
+    assert any("3 readings of loops beside the tip" in note for note in data.notes)
+    modelled = data.beside.alone(1.0 / model_stiffness(model_of([]), data))
+    law = nist().strut_law
+    assert modelled[1] == pytest.approx(0.0, abs=1e-18) and modelled[3] == pytest.approx(0.0, abs=1e-18)
+    assert modelled[4] == pytest.approx(1.0 / law.stiffness(np.array(2.5)), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("0,0,800,X,floor,,5,1000,,,", "loop 'floor'"),
+        ("0,0,800,X,table,,,1000,,,", "neither displacement_um nor"),
+        ("0,0,800,X,table,5e4,20,1000,,,", "displacement_um and"),
+        ("0,0,800,X,table,,5,,,,", "without its load"),
+        ("0,0,800,X,table,,5,1000,,700,", "strut_force_N or length_mm"),
+        ("0,0,800,X,strut 1 alone,,-20,1000,,,", "-20 nm/N"),
+        (",,,X,strut 1,,-20,1000,,,", "x_mm"),
+    ],
+)
+def test_bad_loop_rows_are_named(tmp_path, line, message):
+    with pytest.raises((InputError, InputErrors), match=message.replace("(", "\\(")):
+        read_measurements(file_of(tmp_path, [LINES[0], line], HEADING), nist())
+
+
+def test_the_law_enters_loops_as_by_differences(tmp_path):
+    """Columns of strut law and struts on loops against central differences of the model itself."""
+    lines = [LINES[0], *(f"100,-50,900,X,{name},,{5 if 'alone' not in name else 25},1000,,," for name in NAMES[1:])]
+    predictor = Predictor(nist(), read_measurements(file_of(tmp_path, lines, HEADING), nist()))
+    base = predictor.log_stiffness()
+    step = 1e-5
+    for k in range(2):
+        law = np.zeros(2)
+        law[k] = step
+        slope = (predictor.log_stiffness(law) - predictor.log_stiffness(-law)) / (2 * step)
+        assert predictor.law_columns(base)[:, k] == pytest.approx(slope, abs=1e-7)
+    part, slopes = predictor.strut_part_and_slopes()
+    assert predictor.strut_columns().sum(axis=1) == pytest.approx(part * np.exp(base), rel=1e-12)
+    assert -slopes.sum(axis=0) == pytest.approx(part, rel=1e-12)
+
+
+# -- compare, diagnose, plan -------------------------------------------------------------------------------------------
+
+
+def measured_again(case, file, loops, seed: int = 1):
+    """Readings of loops on the rig's hidden machine, X, Y, Z at two poses, written to a file."""
+    poses = ((0.0, 0.0, 800.0), (150.0, -100.0, 600.0))
+    rows = [(*pose, d, loop, 1000.0) for loop in loops for d in "XYZ" for pose in poses]
+    x, y, z, direction, loop, force = zip(*rows, strict=True)
+    plan = {"x_mm": np.array(x), "y_mm": np.array(y), "z_mm": np.array(z), "direction": list(direction)}
+    plan |= {"loop": list(loop), "force_N": np.array(force)}
+    table = again(case.nominal, case.machine, case.nuisances, plan, np.random.default_rng(seed))
+    file.write_text(csv_text(table))
+    return str(file)
+
+
+@pytest.fixture(scope="module")
+def joints(tmp_path_factory):
+    """The paper's layout on a machine whose joints give way, then indicators across a joint, a strut, the table."""
+    folder = tmp_path_factory.mktemp("joints")
+    case = draw_case(3, "paper", "joint_compliance", 0.02)
+    (folder / "tip.csv").write_text(csv_text(case.rows))
+    loops = measured_again(case, folder / "loops.csv", ["joint 1", "strut 1", "table"])
+    return str(folder / "tip.csv"), loops
+
+
+def test_what_the_tip_cannot_tell_an_indicator_names(joints):
+    """A constant compliance in series with every strut is a strut law to the tip; across a joint it is nothing else."""
+    alone = diagnose(nist(), read_measurements(joints[0], nist()), plan_next=False)
+    assert alone.verdict == "adequate" and "joint_compliance" in alone.plausible
+    found = diagnose(nist(), read_measurements(list(joints), nist()), plan_next=False)
+    assert (found.verdict, found.plausible) == ("identified", ("joint_compliance",))
+    written = document(found)
+    # Errors are those of the tip's readings; the loops stand beside them.
+    assert written["readings"] == 42 == len(found.before)
+    assert [one["loop"] for one in written["loops"]["by_loop"]] == ["joint 1", "strut 1", "table"]
+    assert all(abs(one["standard_deviations"]) < 4.0 for one in written["loops"]["by_loop"])
+
+
+def test_compare_shows_loops_in_a_section_of_their_own(joints):
+    data = read_measurements(list(joints), nist())
+    found = compare(nist(), data, draws=200).document
+    alone = compare(nist(), read_measurements(joints[0], nist()), draws=200).document
+    assert found["baseline"] == alone["baseline"] and alone["loops"] == {"by_loop": [], "readings": []}
+    across = {one["loop"]: one for one in found["loops"]["by_loop"]}
+    assert across["joint 1"]["standard_deviations"] > 4.0 and abs(across["table"]["standard_deviations"]) < 4.0
+    one = found["loops"]["readings"][0]
+    assert one["read_nm_per_N"] == pytest.approx(1e9 * data.compliance[42], rel=1e-6)
+    assert one["off_nm_per_N"] == pytest.approx(one["read_nm_per_N"] - one["model_nm_per_N"], abs=1e-6)
+    assert "indicators beside the tip" in text(found)
+
+
+def test_a_plan_sets_an_indicator_where_the_tip_tells_less():
+    found = plan(nist(), between=("joint_compliance", "none"), n=3, noise=0.02, indicators=True)
+    loops = {found.plan.visits.across(visit) for visit in found.plan.chosen}
+    # A size that is known to half of itself keeps any gap near two.
+    assert loops == {"joint 1"} and found.plan.pairs[0].gap > 2.0
+    rows = rows_of(found)
+    assert {row["loop"] for row in rows} == {"", "joint 1"}
+    assert [row["direction"] for row in rows if row["clamp"] == 1 and row["loop"]] == [
+        row["direction"] for row in rows if row["clamp"] == 1 and not row["loop"]
+    ]
+    without = plan(nist(), between=("joint_compliance", "none"), n=3, noise=0.02)
+    assert not any(without.plan.visits.across(visit) for visit in without.plan.chosen)
+    assert without.plan.pairs[0].gap < 0.7 * found.plan.pairs[0].gap
+
+
+# -- one pose after another --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def step_by_step(tmp_path_factory):
+    """A plan's folder."""
+    folder = tmp_path_factory.mktemp("next")
+    found = plan(nist(), between=("spindle_compliance", "table_compliance", "none"), n=2, noise=0.02)
+    (folder / TABLES).write_bytes(tables_of(found))
+    (folder / "plan.csv").write_text(plan_csv(rows_of(found)))
+    return found, folder
+
+
+def test_readings_change_rivals_as_bayes_rule_says(step_by_step):
+    """Against the dense formula: each rival's readings are normal with its own covariance."""
+    found, folder = step_by_step
+    tables = Tables.read(folder)
+    rows = np.concatenate([tables.visits.rows(v) for v in found.plan.chosen])
+    clamp = np.repeat(["1", "2"], [len(tables.visits.rows(v)) for v in found.plan.chosen])
+    truth = tables.forecasts[0]
+    rng = np.random.default_rng(3)
+    logs = truth.mean[rows] + 0.02 * rng.standard_normal(len(rows))
+    after, far = conditioned(tables, Taken(rows, logs, clamp, ("",) * len(rows)))
+    same = clamp[:, None] == clamp[None, :]
+    noise = tables.noise.repeat**2 * np.eye(len(rows)) + tables.noise.clamping**2 * same
+    likelihood = []
+    for before, one in zip(tables.forecasts, after, strict=True):
+        own = np.concatenate([before.factor, tables.noise.machine], axis=1)
+        some = rows[:3]
+        whole = own[rows] @ own[rows].T + noise
+        gain = own[some] @ own[rows].T @ np.linalg.inv(whole)
+        assert one.mean[some] == pytest.approx(before.mean[some] + gain @ (logs - before.mean[rows]), rel=1e-9)
+        left = own[some] @ own[some].T - gain @ own[rows] @ own[some].T
+        assert one.factor[some] @ one.factor[some].T == pytest.approx(left, abs=2e-6)
+        likelihood.append(multivariate_normal(before.mean[rows], whole).logpdf(logs) + np.log(before.weight))
+    weights = np.exp(np.array(likelihood) - max(likelihood))
+    assert [one.weight for one in after] == pytest.approx(weights / weights.sum(), rel=1e-6)
+    assert not far
+
+
+def test_the_next_pose_is_another_one_until_it_is_settled(step_by_step, tmp_path):
+    _, folder = step_by_step
+    first = next_visit(folder)
+    assert first.visit is not None and not len(first.taken.rows) and not first.settled
+    tables = first.tables
+    truth = tables.forecasts[0]
+    files, last = [], first
+    for step in range(8):
+        rows = plan_rows(tables.visits, [last.visit])
+        for row, k in zip(rows, tables.visits.rows(last.visit), strict=True):
+            row["stiffness_N_per_mm"] = f"{1e-3 * np.exp(truth.mean[k]):.6g}"
+        file = tmp_path / f"{step}.csv"
+        file.write_text(plan_csv(rows))
+        files.append(str(file))
+        last = next_visit(folder, tuple(files))
+        if last.visit is None:
+            break
+        been = tables.visits.readings.position[last.taken.rows]
+        assert not (np.abs(been - tables.visits.pose[last.visit, :3]) < 1e-9).all(axis=1).any()
+    assert last.settled and next(iter(last.probability)) == truth.name
+
+
+def test_next_says_what_it_needs(tmp_path, capsys):
+    assert main(["plan", "--next", str(tmp_path)]) == 2
+    assert "folder of a plan" in capsys.readouterr().err
+    (tmp_path / TABLES).write_bytes(b"nothing")
+    assert main(["plan", "--next", str(tmp_path)]) == 2
+    assert "no table of a plan" in capsys.readouterr().err

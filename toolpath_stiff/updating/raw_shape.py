@@ -1,0 +1,148 @@
+"""The shape of a loop of raw records: kinks with their force and two slopes, tension against compression, work lost.
+
+Looked at is the way from extreme to extreme, deflection y over force F from F_0 on. Three shapes are tried beside the
+straight line, each with two compliances c and c':
+
+    sticking      y = a + c d + (c' - c) max(d - 2 F_b, 0), d = |F - F_0|: joints stick after the load has turned,
+                  until friction breaks away, at twice the breakaway force F_b on the way back (Masing 1926,
+                  Proceedings of the 2nd International Congress of Applied Mechanics, 332)
+    kink          y = a + c F + (c' - c) sign(F) max(|F| - F_b, 0): contacts that close (stiffer beyond) or slip
+    sides         y = a + c max(F, 0) + c' min(F, 0): tension against compression, as a strut that has lost its preload
+
+One of them stands where it fits better than the straight line by an F test (Seber and Lee 2003, Linear Regression
+Analysis, 4.2), its probability multiplied by the number of shapes and forces tried (Bonferroni).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+FEWEST = 7  # records on the way from extreme to extreme from which a shape is looked for
+A_SIDE = 3  # records on each side of a kink
+POSITIONS = 4  # of a kink tried between two records
+RESOLUTION = 0.05e-6  # m, rms that no line is believed to fit better than; assumed: half a step of 0.1 um
+SURE = 0.01  # probability below which chance alone is ruled out
+TELLING = 1.15  # ratio of two slopes from which they are told of
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What stands out of a straight line. SI; nan where nothing does.
+
+    Attributes
+    ----------
+    kind
+        "sticking", "kink", "sides", or "" where a straight line will do.
+    force
+        N, the breakaway force, or where the kink is; nan of sides.
+    first, second
+        N/m: below and above that force; under tension (positive force) and compression.
+    lost
+        J, the work that the loop takes and does not give back: the area that its records enclose.
+    """
+
+    kind: str = ""
+    force: float = np.nan
+    first: float = np.nan
+    second: float = np.nan
+    lost: float = np.nan
+
+    def __str__(self) -> str:
+        """A sentence with N and N/mm; "" where a straight line will do."""
+        one, other = (f"{1e-3 * slope:,.0f} N/mm" for slope in (self.first, self.second))
+        if self.kind == "sticking":
+            return (
+                f"sticks after the load has turned and breaks away at {self.force:.3g} N: {one} before, {other} after"
+            )
+        if self.kind == "kink":
+            what = "closes" if self.first < self.second else "slips"
+            return f"{what} at {self.force:.3g} N: {one} below, {other} above"
+        if self.kind == "sides":
+            side = "softer" if self.first < self.second else "stiffer"
+            return f"{side} in tension than in compression: {one} against {other}"
+        return ""
+
+
+def shape_of(force: FloatArray, deflection: FloatArray, main: slice) -> Shape:
+    """The shape of a loop.
+
+    Parameters
+    ----------
+    force, deflection
+        (m,) N and m, the records in their order; tension is positive.
+    main
+        The way from extreme to extreme.
+    """
+    lost = _work_lost(force, deflection)
+    f, y = force[main], deflection[main]
+    if len(f) < FEWEST or f.max() <= 0.0 or f.min() >= 0.0:
+        return Shape(lost=lost)
+    tried = [*_sticking(f), *_kinks(f), ("sides", np.nan, np.maximum(f, 0.0), np.minimum(f, 0.0))]
+    straight = _left([f], y)[0]
+    best, chance = Shape(lost=lost), SURE
+    for kind, at, one, other in tried:
+        left, (_, first, second) = _left([one, other], y)
+        # A kink's force is fitted, too: one more figure than its two slopes.
+        more = 1 if kind == "sides" else 2
+        found = _chance(straight, left, more, len(f) - 2 - more) * len(tried)
+        slopes = (abs(1.0 / first), abs(1.0 / second)) if first * second > 0.0 else (0.0, 0.0)
+        if found < chance and max(slopes) >= TELLING * min(slopes) > 0.0:
+            best, chance = Shape(kind, at, slopes[0], slopes[1], lost), found
+    return best
+
+
+Tried = tuple[str, float, FloatArray, FloatArray]
+
+
+def _sticking(force: FloatArray) -> list[Tried]:
+    """Kinks on the way back from the first extreme: what lies before them, and after them."""
+    way = np.abs(force - force[0])
+    steps = np.sort(way)
+    forces = _between(steps[A_SIDE - 1 : 1 - A_SIDE])
+    return [("sticking", 0.5 * at, np.minimum(way, at), np.maximum(way - at, 0.0)) for at in forces]
+
+
+def _kinks(force: FloatArray) -> list[Tried]:
+    """Kinks alike on both sides of zero: what lies below them, and above them."""
+    found: list[Tried] = []
+    for at in _between(np.unique(np.abs(force))):
+        below = np.clip(force, -at, at)
+        if min((np.abs(force) < at).sum(), (np.abs(force) > at).sum()) >= A_SIDE:
+            found.append(("kink", at, below, force - below))
+    return found
+
+
+def _between(steps: FloatArray) -> list[float]:
+    """Forces between rising steps, `POSITIONS` in each gap: a kink seldom lies where a record was taken."""
+    shares = (np.arange(POSITIONS) + 0.5) / POSITIONS
+    return sorted({float(at) for at in (steps[:-1, None] + np.diff(steps)[:, None] * shares).ravel()})
+
+
+def _left(columns: list[FloatArray], y: FloatArray) -> tuple[float, FloatArray]:
+    """Squares that least squares leave beside a constant, and the coefficients."""
+    design = np.stack([np.ones_like(y), *columns], axis=1)
+    scale = np.abs(design).max(axis=0)
+    found = np.linalg.lstsq(design / scale, y, rcond=None)[0] / scale
+    return float(((y - design @ found) ** 2).sum()), found
+
+
+def _chance(before: float, after: float, more: int, freedom: int) -> float:
+    """Probability that so large a fall of the squares is chance."""
+    from scipy.stats import f as distribution
+
+    if freedom < 1 or before <= after:
+        return 1.0
+    after = max(after, freedom * RESOLUTION**2)
+    return float(distribution.sf(max(before - after, 0.0) / more / (after / freedom), more, freedom))
+
+
+def _work_lost(force: FloatArray, deflection: FloatArray) -> float:
+    """Area that the records enclose, the last joined to the first (Gauss's formula)."""
+    if len(force) < 4:
+        return float("nan")
+    return float(abs(0.5 * (force * np.roll(deflection, -1) - np.roll(force, -1) * deflection).sum()))
