@@ -345,7 +345,12 @@ def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:
 
 
 MARK = 10  # hexadecimal digits of a reading's mark: among 5,000 readings two differ in it but for one time in 90,000
-DIGITS = {"mm": 2, "deg": 3, "direction": 3, "stiffness": 5}  # to which readings are told apart: decimals; of N/m, digits
+DIGITS = {
+    "mm": 2,
+    "deg": 3,
+    "direction": 3,
+    "stiffness": 5,
+}  # to which readings are told apart: decimals; of N/m, digits
 
 
 def reading_marks(data: Measurements) -> TextArray:

@@ -68,8 +68,8 @@ class Diagnosis:
     files, seed, command, asked
         For the record, and for the commands that go on from here.
     next_measurements, remarks
-        Where the verdict is `ambiguous`: rows of a plan that would tell the explanations apart; what it cannot do. Where
-        it is `described`: of a plan that would confirm it.
+        Where the verdict is `ambiguous`: rows of a plan that would tell the explanations apart; what it cannot do.
+        Where it is `described`: of a plan that would confirm it.
     path
         How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
     """

@@ -7,20 +7,23 @@ effect than by any explanation without it that was tested, `none` among them: ea
 sizes and strut law are fitted to all the rest, and the log probability of what was left out, added up over the points,
 must be higher by more than `CONFIRMS`.
 
-A form that says nothing true of new readings, sized by the old ones, loses with them on average; that it gains `CONFIRMS`
-all the same has a chance below 1 %: its gain is normal of mean -s^2 / 2 and variance s^2, and (3 + s^2 / 2) / s is never
-less than sqrt(6). Where none of the readings is among those that it was drawn from, it is an effect like any other.
+A form that says nothing true of new readings, sized by the old ones, loses with them on average; that it gains
+`CONFIRMS` all the same has a chance below 1 %: its gain is normal of mean -s^2 / 2 and variance s^2, and
+(3 + s^2 / 2) / s is never less than sqrt(6). Where none of the readings is among those that it was drawn from, it is an
+effect like any other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.stiffness.effects.contract import Effect
+from toolpath_stiff.stiffness.effects.contract import Effect, joined
+from toolpath_stiff.units import json_number
 from toolpath_stiff.updating.inference.covariances import Groups
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import held_out
@@ -32,6 +35,17 @@ BoolArray = NDArray[np.bool_]
 
 CONFIRMS = 3.0  # log probability that new readings must gain: odds of 20 to 1, strong evidence (Kass and Raftery 1995)
 FEWEST_POINTS = 2  # of new readings: one pose alone cannot confirm a form
+
+
+class DrawnEntry(TypedDict):
+    """Effects whose form was read off some of the readings, and what the others say of them."""
+
+    effects: list[str]
+    readings_seen: int
+    readings_new: int
+    gain: float | None
+    rival: str
+    confirmed: bool
 
 
 @dataclass(frozen=True)
@@ -59,6 +73,32 @@ class Drawn:
     def confirmed(self) -> bool:
         """Whether the new readings confirm them."""
         return self.gain > CONFIRMS
+
+    @property
+    def document(self) -> DrawnEntry:
+        """The same for `diagnose.json`."""
+        return {
+            "effects": list(self.names),
+            "readings_seen": self.seen,
+            "readings_new": self.new,
+            "gain": json_number(self.gain, 4),
+            "rival": self.rival,
+            "confirmed": self.confirmed,
+        }
+
+    @property
+    def reason(self) -> str:
+        """Why it is confirmed or not, a sentence without its full stop."""
+        said = f"the form of {joined(self.names)} was read off "
+        if not self.new:
+            return f"{said}these very readings: that it fits them says nothing of others"
+        said += f"{self.seen} of these {self.seen + self.new} readings"
+        if np.isnan(self.gain):
+            return f"{said}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
+        against = f"{self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms)"
+        if self.confirmed:
+            return f"{said}; the {self.new} others confirm it: their log probability, foretold, is {against}"
+        return f"{said}; the {self.new} others do not confirm it: their log probability, foretold, is {against}"
 
 
 def seen_readings(effects: Sequence[Effect], data: Measurements) -> BoolArray:
@@ -100,7 +140,7 @@ def drawn(fit: Fit, others: Mapping[str, Fit], data: Measurements) -> Drawn | No
 
 
 def foretold(fit: Fit, data: Measurements, seen: BoolArray, scatter: Scatter) -> float:
-    """Log probability of the readings that are not `seen`, up to a constant of the scatter, each point left out in turn.
+    """Log probability of the readings that are not `seen`, each point left out in turn; up to a constant of the scatter.
 
     Given all other readings r_s, the left-out ones are normal: with A the inverse covariance of all residuals r, their
     weighted squares are (A r)_o^T A_oo^-1 (A r)_o (Rasmussen and Williams 2006, Gaussian Processes, A.6).
