@@ -140,7 +140,7 @@ def drawn(fit: Fit, others: Mapping[str, Fit], data: Measurements) -> Drawn | No
 
 
 def foretold(fit: Fit, data: Measurements, seen: BoolArray, scatter: Scatter) -> float:
-    """Log probability of the readings that are not `seen`, each point left out in turn; up to a constant of the scatter.
+    """Log probability of the readings that are not `seen`, each point left out in turn, up to a constant.
 
     Given all other readings r_s, the left-out ones are normal: with A the inverse covariance of all residuals r, their
     weighted squares are (A r)_o^T A_oo^-1 (A r)_o (Rasmussen and Williams 2006, Gaussian Processes, A.6).
