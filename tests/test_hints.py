@@ -94,7 +94,7 @@ def test_what_nothing_explains_is_written_and_tried(here, capsys):
     for line in lines:
         run(line, capsys)
     again = Asked(("data.csv",), effects=("my_effect.py",))
-    assert again.new_effect == "my_effect_2.py"
+    assert again.new_effect() == "my_effect_2.py"
 
 
 def test_templates_and_imports(here, capsys):

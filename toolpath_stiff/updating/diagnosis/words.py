@@ -214,7 +214,7 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
             hint("see which readings are how far off", asked.command("compare")),
         ]
     if diagnosis.verdict == "unexplained":
-        file = asked.new_effect
+        file = asked.new_effect()
         return [
             hint("look where the residuals lie", asked.command("compare")),
             hint("write the effect that you suspect as one file", command_line("effects", "new", file)),

@@ -13,10 +13,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
+from toolpath_stiff.hints import Asked, command_line, options
 from toolpath_stiff.stiffness.effects.contract import joined
+from toolpath_stiff.updating.correction.machines import data_hash
+from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.drafting.source import GEOMETRY, INSTRUMENT, STRUCTURE, Piece, pieces_of
+from toolpath_stiff.updating.measurements import reading_marks
 from toolpath_stiff.updating.portrait.terms import Term
 
 if TYPE_CHECKING:
@@ -27,6 +32,25 @@ LONGEST_TEXT = 96  # of a string on a line of a class
 MARKS_A_LINE = 10
 REPEATED = "stiffness = path."  # what several statements use, and one line says
 KINDS = {STRUCTURE: "", GEOMETRY: "_geometry", INSTRUMENT: "_reading"}  # what an effect's name ends with
+
+
+@dataclass(frozen=True)
+class Draft:
+    """An effect file, or why there is none.
+
+    Attributes
+    ----------
+    text
+        The file; "" where there is nothing to be described.
+    effects
+        Names of its effects.
+    reason
+        Why there is none, a sentence; "" where there is one.
+    """
+
+    text: str = ""
+    effects: tuple[str, ...] = ()
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -64,6 +88,71 @@ class Description:
     terms: tuple[Term, ...]
     words: tuple[str, ...]
     alike: tuple[str, ...] = ()
+
+
+def draft(diagnosis: Diagnosis, file: str) -> Draft:
+    """What a diagnosis leaves unexplained, as an effect file.
+
+    Parameters
+    ----------
+    diagnosis
+        With what it was asked.
+    file
+        Where it is to be written: the effect is named after it, and the commands in the file read it there.
+    """
+    reason = _nothing_to_describe(diagnosis)
+    if reason:
+        return Draft(reason=reason)
+    asked = diagnosis.asked or Asked(diagnosis.files, diagnosis.machine.name)
+    origin = Origin(
+        files=diagnosis.files,
+        sha256=data_hash(diagnosis.files),
+        readings=len(diagnosis.data),
+        machine=diagnosis.machine.name,
+        marks=tuple(sorted(set(reading_marks(diagnosis.data).tolist()))),
+        command=asked.command("effects draft", "-o", file, *options(seed=diagnosis.seed or None)),
+        next=(
+            command_line("effects", "check", file),
+            asked.command("diagnose", effects=[file]),
+            asked.command("plan", effects=[file]),
+        ),
+    )
+    name, description = PurePath(file).stem, description_of(diagnosis)
+    return Draft(draft_source(name, description, origin), tuple(effect_names(name, description.terms)))
+
+
+def description_of(diagnosis: Diagnosis) -> Description:
+    """The part of a portrait that an effect can say: terms of variables that effects see."""
+    portrait = diagnosis.portrait
+    assert portrait is not None
+    said = portrait.document
+    seen = [k for k, term in enumerate(portrait.terms) if term.acts]
+    return Description(
+        said["text"],
+        tuple(portrait.terms[k] for k in seen),
+        tuple(said["terms"][k]["words"] for k in seen),
+        tuple(one["words"] for one in said["alike"]),
+    )
+
+
+def _nothing_to_describe(diagnosis: Diagnosis) -> str:
+    """Why there is nothing that an effect could describe, a sentence; "" where there is something."""
+    names = joined(list(diagnosis.explanations))
+    if diagnosis.main.question:
+        return f"{diagnosis.main.question} Nothing is drafted from readings that may be of another machine."
+    if diagnosis.verdict == "adequate":
+        return "Nothing is missing that these data could show: there is nothing to describe."
+    if diagnosis.verdict == "described":
+        return f"{names} describes these readings already: measure others, and see whether it foretells them."
+    if diagnosis.portrait is None and diagnosis.verdict == "unexplained":
+        return "Something is missing, but no simple form of it stands out from chance: there is nothing to write down."
+    if diagnosis.portrait is None:
+        word = "explains" if diagnosis.verdict == "identified" else "may explain"
+        return f"{names} {word} these readings and leaves nothing that stands out: there is nothing to describe."
+    unseen = [term.variable for term in diagnosis.portrait.terms if not term.acts]
+    if len(unseen) == len(diagnosis.portrait.terms):
+        return f"What is missing varies with {joined(unseen)}, which no effect of a machine sees: nothing is drafted."
+    return ""
 
 
 def draft_source(name: str, description: Description, origin: Origin) -> str:
