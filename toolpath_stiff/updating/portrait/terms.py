@@ -242,7 +242,7 @@ def _axes(link: str, action: str, direction: str, path: LoadPath) -> FloatArray:
     if direction in ("radial", "tangential"):
         reach = np.maximum(np.hypot(x, y), 1e-9)
         ends = (x, y, none) if direction == "radial" else (-y, x, none)
-        return (np.stack(ends, axis=1) / reach[:, None])[:, None]
+        return np.asarray((np.stack(ends, axis=1) / reach[:, None])[:, None])
     own = [0, 1, 2] if direction == "all" else [AXES[direction]]
     return np.broadcast_to(np.eye(3)[own], (n, len(own), 3))
 

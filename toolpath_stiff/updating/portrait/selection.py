@@ -1,0 +1,445 @@
+"""Which terms of the dictionary describe what is missing: few, chosen by likelihood, held to left-out points.
+
+Terms are added one by one. Every term's gain is first its score beside what is fitted already (Rao's score test, the
+sizes on their allowed side); the best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j,
+which is exact for whatever gives way in series. A term joins where its gain is more than the best of the whole dictionary
+would reach by chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.updating.inference.covariances import Precision
+from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.updating.inference.fits import HeldOut, held_out
+from toolpath_stiff.updating.inference.gates import Simulator, set_wild_aside
+from toolpath_stiff.updating.inference.noise import Noise, Scatter, scaled_inverse
+from toolpath_stiff.updating.portrait.dictionary import Dictionary, Ground, dictionary_of, shapes_near
+from toolpath_stiff.updating.portrait.terms import Term
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MOST_TERMS = 3
+DRAWS = 200  # simulated campaigns
+LEADS = 0.01  # probability by chance below which the first term is taken for something
+JOINS = 0.02  # and a further one
+BETTER = 0.98  # share of the rms at left-out points to which a further term must bring it
+FINALISTS, EACH = 60, 2  # terms that are fitted in full: the best of all, and of every link and variable
+STEPS = 6
+ROUNDS = 2  # searches for wild readings
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Fits of G sets of p terms each beside the law.
+
+    Attributes
+    ----------
+    law, size
+        (G, 2), (G, p) in rms change of compliance.
+    residual, gain
+        (G, n); (G,) log posterior.
+    """
+
+    law: FloatArray
+    size: FloatArray
+    residual: FloatArray
+    posterior: FloatArray
+
+
+@dataclass(frozen=True)
+class Description:
+    """Terms fitted together.
+
+    Attributes
+    ----------
+    terms
+        With their sizes.
+    columns, scale
+        (p, n) change of compliance over the base model's for an rms change of 1; (p,) that of an SI unit of size.
+    fit
+        Law, residual and so on; its jacobian (n, 2 + p) and covariance are those of the law and the scaled sizes.
+    posterior
+        Log posterior with the price of wild readings.
+    """
+
+    terms: tuple[Term, ...]
+    columns: FloatArray
+    scale: FloatArray
+    fit: Fit
+    posterior: float
+
+    @cached_property
+    def deviations(self) -> FloatArray:
+        """(p,) standard deviations of the sizes, SI."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.fit.covariance)[2:], 0.0)) / self.scale)
+
+
+@dataclass
+class Selection:
+    """The search on one set of readings, beside a base fit.
+
+    Parameters
+    ----------
+    problem, base
+        Readings, model and scatter; the fit that leaves something.
+    noise, seed
+        Of the simulated campaigns.
+    """
+
+    problem: Problem
+    base: Fit
+    noise: Noise
+    seed: int
+    compliance: FloatArray = field(init=False)
+    rest: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.compliance = np.exp(self.base.residual - self.problem.observed)
+        self.rest = self.compliance - self.problem.predictor.strut_part(self.base.law)
+        self.ground = Ground(self.problem.predictor, self.compliance, self.base.law)
+
+    @cached_property
+    def dictionary(self) -> Dictionary:
+        """All terms."""
+        return dictionary_of(self.ground)
+
+    @cached_property
+    def _draws(self) -> FloatArray:
+        return Simulator.of(self.noise, self.problem.scatter.covariance, self.seed, DRAWS).draws
+
+    @property
+    def start(self) -> Description:
+        """Nothing but the base fit."""
+        none = np.zeros((0, len(self.compliance)))
+        return self.described((), none, np.zeros(0), self.base.law, self.base.scatter)
+
+    # -- fits ----------------------------------------------------------------------------------------------------------
+
+    def fitted(
+        self, columns: FloatArray, low: FloatArray, high: FloatArray, law: FloatArray, precision: Precision
+    ) -> Sizes:
+        """Gauss-Newton for G sets at once: columns (G, p, n), bounds (G, p) on their sizes."""
+        sets, count, n = columns.shape
+        laws, size = np.repeat(law[None], sets, axis=0), np.zeros((sets, count))
+        prior = np.zeros((2 + count, 2 + count))
+        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        for _ in range(STEPS):
+            residual, jacobian = self._linearised(laws, size, columns)
+            flat = jacobian.reshape(-1, n)
+            weighted = precision.times(flat).reshape(jacobian.shape)
+            information = weighted @ np.swapaxes(jacobian, 1, 2) + prior
+            gradient = (weighted @ residual[..., None])[..., 0]
+            gradient[:, :2] -= laws / LAW_PRIOR**2
+            step = _bounded_step(information, gradient, size, low, high)
+            reach = np.abs(np.einsum("gp,gpn->gn", step, jacobian)).max(axis=1)
+            step *= np.minimum(1.0, 0.5 / np.maximum(reach, 1e-12))[:, None]
+            laws, size = laws + step[:, :2], np.clip(size + step[:, 2:], low, high)
+        residual = self._linearised(laws, size, columns)[0]
+        posterior = -0.5 * precision.squares(residual) - 0.5 * (laws**2).sum(axis=1) / LAW_PRIOR**2
+        return Sizes(laws, size, residual, posterior)
+
+    def _linearised(self, laws: FloatArray, size: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residuals (G, n) and jacobian (G, 2 + p, n) of ln stiffness."""
+        part, slopes = self.problem.predictor.strut_part_and_slopes(laws)
+        added = np.einsum("gp,gpn->gn", size, columns) * self.compliance
+        compliance = np.maximum(part + self.rest + added, 0.1 * self.compliance)
+        own = -columns * (self.compliance / compliance)[:, None]
+        return self.problem.observed + np.log(compliance), np.concatenate([-slopes / compliance[:, None], own], axis=1)
+
+    def limits(self, terms: Sequence[Term], scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(p,) each, of scaled sizes."""
+        bounds = np.array([[bound * term.si for bound in term.bounds] for term in terms]).reshape(-1, 2)
+        return bounds[:, 0] * scale, bounds[:, 1] * scale
+
+    def described(
+        self, terms: Sequence[Term], columns: FloatArray, scale: FloatArray, law: FloatArray, scatter: Scatter
+    ) -> Description:
+        """Terms fitted together, with the readings that this fit takes for wild."""
+        low, high = self.limits(terms, scale)
+        for _ in range(ROUNDS):
+            found = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
+            law, again = found.law[0], self.problem.scatter.with_wild(found.residual[0], scatter)
+            if again is scatter:
+                break
+            scatter = again
+        found = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
+        jacobian = self._linearised(found.law, found.size, columns[None])[1][0]
+        information = scatter.precision.times(jacobian) @ jacobian.T
+        information[:2, :2] += np.eye(2) / LAW_PRIOR**2
+        sized = tuple(t.sized(float(u / s)) for t, u, s in zip(terms, found.size[0], scale, strict=True))
+        fit = replace(
+            self.base, law=found.law[0], residual=found.residual[0], jacobian=jacobian.T,
+            covariance=np.asarray(scaled_inverse(information)), scatter=scatter,
+        )  # fmt: skip
+        price = -0.5 * scatter.covariance.log_determinant - len(scatter.wild) * scatter.price
+        return Description(sized, columns, scale, fit, float(found.posterior[0]) + price)
+
+    # -- search --------------------------------------------------------------------------------------------------------
+
+    def scores(self, before: Description) -> FloatArray:
+        """(N,) twice the gain in log likelihood of each term beside a description, linearised."""
+        columns = self._beside(before)
+        projected = before.fit.scatter.precision.beside(before.fit.jacobian.T, self._prior(before))
+        slope = columns @ projected.times(before.fit.residual)
+        return self._gains(slope, projected.squares(columns))
+
+    def chance(self, before: Description, gain: float) -> tuple[float, float]:
+        """How often the best of all terms gains as much by chance; the gain of one campaign in twenty."""
+        columns = self._beside(before)
+        projected = before.fit.scatter.precision.beside(before.fit.jacobian.T, self._prior(before))
+        aside = set_wild_aside(projected.times(self._draws), projected)
+        best = self._gains((aside.pulls @ columns.T), projected.squares(columns)).max(axis=-1)
+        return float((1.0 + (best >= gain).sum()) / (1.0 + len(best))), float(np.quantile(best, 1.0 - JOINS))
+
+    def _beside(self, before: Description) -> FloatArray:
+        """(N, n) d ln stiffness of all terms where a description is at work already."""
+        modelled = np.exp(before.fit.residual - self.problem.observed)
+        return -self.dictionary.columns * (self.compliance / modelled)
+
+    def _prior(self, before: Description) -> FloatArray:
+        prior = np.zeros((before.fit.jacobian.shape[1],) * 2)
+        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+        return prior
+
+    def _gains(self, slope: FloatArray, information: FloatArray) -> FloatArray:
+        """(..., N) of slopes (..., N), where the size goes to an allowed side."""
+        allowed = self.dictionary.signed | (slope > 0.0)
+        return np.where(allowed & (information > 1e-9), slope**2 / np.maximum(information, 1e-9), 0.0)
+
+    def finalists(self, gains: FloatArray) -> IntArray:
+        """The best of all terms, and of every link and variable."""
+        order = np.argsort(-gains, kind="stable")
+        count: dict[tuple[str, str], int] = {}
+        chosen = []
+        for rank, i in enumerate(order[gains[order] > 0.0].tolist()):
+            term = self.dictionary.terms[i]
+            seen = count.get((term.link, term.variable), 0)
+            if rank < FINALISTS or seen < EACH:
+                chosen.append(i)
+                count[term.link, term.variable] = seen + 1
+        return np.array(chosen, dtype=np.int64)
+
+    def together(self, before: Description, indices: IntArray) -> Sizes:
+        """Each of some terms refitted along with a description."""
+        terms = [self.dictionary.terms[i] for i in indices.tolist()]
+        columns = self.dictionary.columns[indices]
+        scale = self.dictionary.scale[indices]
+        return self._along(before, terms, columns, scale)
+
+    def _along(self, before: Description, terms: Sequence[Term], columns: FloatArray, scale: FloatArray) -> Sizes:
+        own = np.stack(self.limits(terms, scale))  # (2, G)
+        shared = np.stack(self.limits(before.terms, before.scale))  # (2, p)
+        count = len(terms)
+        both = np.concatenate([np.repeat(before.columns[None], count, axis=0), columns[:, None]], axis=1)
+        low, high = (
+            np.concatenate([np.repeat(shared[k][None], count, axis=0), own[k][:, None]], axis=1) for k in (0, 1)
+        )
+        return self.fitted(both, low, high, before.fit.law, before.fit.scatter.precision)
+
+    def grown(self, before: Description, indices: IntArray) -> Description | None:
+        """A description with the best of some terms more, its constants settled; None where none has a size."""
+        if not len(indices):
+            return None
+        found = self.together(before, indices)
+        best = int(np.argmax(found.posterior))
+        chosen = int(indices[best])
+        grown = self._with(before, self.dictionary.terms[chosen])
+        return self._settled(before, grown)
+
+    def _with(self, before: Description, term: Term) -> Description:
+        column = self.ground.column(term) / self.compliance
+        scale = float(np.sqrt(np.mean(column**2)))
+        return self.described(
+            (*before.terms, term),
+            np.concatenate([before.columns, column[None] / scale]),
+            np.append(before.scale, scale),
+            before.fit.law,
+            before.fit.scatter,
+        )
+
+    def _settled(self, before: Description, grown: Description) -> Description:
+        """With finer constants of the last term's shape."""
+        for finer in (1.0, 0.4):
+            near = shapes_near(grown.terms[-1], self.ground, finer)
+            if not near:
+                return grown
+            columns = np.stack([self.ground.column(one) for one in near]) / self.compliance
+            scale = np.sqrt((columns**2).mean(axis=1))
+            kept = scale > 1e-300
+            near, columns, scale = [t for t, k in zip(near, kept, strict=True) if k], columns[kept], scale[kept]
+            beside = replace(before, fit=replace(before.fit, scatter=grown.fit.scatter))
+            found = self._along(beside, near, columns / scale[:, None], scale)
+            better = self._with(beside, near[int(np.argmax(found.posterior))])
+            if better.posterior > grown.posterior:
+                grown = better
+        return grown
+
+    def without(self, description: Description, k: int) -> Description:
+        """A description less one of its terms, refitted."""
+        kept = [j for j in range(len(description.terms)) if j != k]
+        return self.described(
+            [description.terms[j] for j in kept], description.columns[kept], description.scale[kept],
+            description.fit.law, description.fit.scatter,
+        )  # fmt: skip
+
+
+def _bounded_step(
+    information: FloatArray, gradient: FloatArray, size: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """(G, 2 + p) Newton steps; sizes that would leave their bounds are held there and the others solved again."""
+    scale = np.sqrt(np.maximum(np.einsum("gii->gi", information), 1e-300))
+    matrix = information / (scale[:, :, None] * scale[:, None, :])
+    matrix += 1e-10 * np.eye(matrix.shape[-1])
+    right = gradient / scale
+    step = np.linalg.solve(matrix, right[..., None])[..., 0] / scale
+    moved = size + step[:, 2:]
+    goal = np.clip(moved, low, high)
+    held = np.zeros(step.shape, dtype=bool)
+    held[:, 2:] = goal != moved
+    if not held.any():
+        return step
+    fixed = np.zeros(step.shape)
+    fixed[:, 2:] = np.where(held[:, 2:], goal - size, 0.0)
+    left = right - np.einsum("gij,gj->gi", matrix, fixed * scale)
+    free = ~held
+    reduced = np.where(free[:, :, None] & free[:, None, :], matrix, 0.0)
+    reduced += np.einsum("gi,ij->gij", held * 1.0, np.eye(step.shape[1]))
+    again = np.linalg.solve(reduced, np.where(free, left, 0.0)[..., None])[..., 0] / scale
+    return np.where(held, fixed, again)
+
+
+# -- the way through ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What was chosen.
+
+    Attributes
+    ----------
+    description
+        The terms, the leading one first.
+    chance
+        How often something as strong as the leading term comes up by chance.
+    weights
+        (N,) posterior probabilities of the dictionary's terms in the place of the leading one.
+    held
+        Errors at left-out points.
+    """
+
+    description: Description
+    chance: float
+    weights: FloatArray
+    held: HeldOut
+
+
+def choose(selection: Selection) -> Chosen | None:
+    """One to three terms; None where nothing stands out from chance."""
+    before = selection.start
+    gains = selection.scores(before)
+    if not len(gains):
+        return None
+    chance, _ = selection.chance(before, float(gains.max()))
+    if chance > LEADS:
+        return None
+    found = selection.grown(before, selection.finalists(gains))
+    assert found is not None
+    while len(found.terms) < MOST_TERMS:
+        more = _one_more(selection, found)
+        if more is None:
+            break
+        found = more
+    found = _leading_first(selection, found)
+    weights = term_weights(selection, found)
+    return Chosen(found, chance, weights, _held(selection, found))
+
+
+def _one_more(selection: Selection, before: Description) -> Description | None:
+    """With a further term, where it does more than chance and helps at left-out points."""
+    gains = selection.scores(before)
+    threshold = selection.chance(before, 0.0)[1]
+    if gains.max() <= threshold:
+        return None
+    more = selection.grown(before, selection.finalists(gains))
+    if more is None or 2.0 * (more.posterior - before.posterior) <= threshold:
+        return None
+    more = _swapped(selection, more)
+    points = selection.problem.predictor.data.point
+    if held_out(more.fit, point=points).rms > BETTER * held_out(before.fit, point=points).rms:
+        return None
+    return more
+
+
+def _swapped(selection: Selection, description: Description) -> Description:
+    """Every term but the last once more the best beside the others: the first was chosen without them."""
+    for _ in range(len(description.terms) - 1):
+        others = selection.without(description, 0)
+        again = selection.grown(others, selection.finalists(selection.scores(others)))
+        # The first term comes last now, better or as it was.
+        same = [*range(1, len(description.terms)), 0]
+        description = (
+            again
+            if again is not None and again.posterior > description.posterior
+            else _ordered(selection, description, same)
+        )
+    return _ordered(selection, description, [*range(1, len(description.terms)), 0])
+
+
+def _ordered(selection: Selection, description: Description, order: Sequence[int]) -> Description:
+    rows = list(order)
+    return selection.described(
+        [description.terms[k] for k in rows], description.columns[rows], description.scale[rows],
+        description.fit.law, description.fit.scatter,
+    )  # fmt: skip
+
+
+def _leading_first(selection: Selection, description: Description) -> Description:
+    """Terms by what their absence would cost."""
+    if len(description.terms) < 2:
+        return description
+    costs = [selection.without(description, k).posterior for k in range(len(description.terms))]
+    return _ordered(selection, description, np.argsort(costs, kind="stable").tolist())
+
+
+def _held(selection: Selection, description: Description) -> HeldOut:
+    return held_out(description.fit, selection.problem.predictor.data.point)
+
+
+def temper(selection: Selection, description: Description) -> float:
+    """By how much the log likelihood is to be trusted less: what is left over what noise leaves."""
+    squares = float(description.fit.scatter.precision.squares(description.fit.residual))
+    left = squares / max(len(selection.compliance) - 2 - len(description.terms), 1)
+    return max(left, 1.0)
+
+
+def term_weights(selection: Selection, description: Description) -> FloatArray:
+    """(N,) posterior probability of each term in the place of the leading one, beside the others."""
+    others = selection.without(description, 0)
+    others = replace(others, fit=replace(others.fit, scatter=description.fit.scatter))
+    indices = selection.finalists(selection.scores(others))
+    found = selection.together(others, indices)
+    logs = np.full(len(selection.dictionary), -np.inf)
+    logs[indices] = found.posterior / temper(selection, description) + selection.dictionary.log_prior[indices]
+    logs[indices[np.abs(found.size[:, -1]) <= 0.0]] = -np.inf
+    weights = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum())
+
+
+Named = list[tuple[str, float]]
+
+
+def summed(selection: Selection, weights: FloatArray, of: Callable[[Term], str]) -> Named:
+    """Name -> probability summed over the terms, the likeliest first."""
+    found: dict[str, float] = {}
+    for i in np.flatnonzero(weights > 0.0).tolist():
+        name = of(selection.dictionary.terms[i])
+        found[name] = found.get(name, 0.0) + float(weights[i])
+    return sorted(found.items(), key=lambda item: (-item[1], item[0]))
