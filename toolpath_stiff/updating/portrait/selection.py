@@ -1,9 +1,9 @@
 """Which terms of the dictionary describe what is missing: few, chosen by likelihood, held to left-out points.
 
-Terms are added one by one. Every term's gain is first its score beside what is fitted already (Rao's score test, the
-sizes on their allowed side); the best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j,
-which is exact for whatever gives way in series. A term joins where its gain is more than the best of the whole dictionary
-would reach by chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls.
+Terms are added one by one. Every term's gain is first its score beside what is fitted already (Rao's score test, sizes
+on their allowed side); the best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j,
+exact for whatever gives way in series. A term joins where its gain is more than the best of the whole dictionary would reach
+by chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.updating.inference.covariances import Precision
+from toolpath_stiff.updating.inference.covariances import Precision, inverse_root
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.fits import HeldOut, held_out
 from toolpath_stiff.updating.inference.gates import Simulator, set_wild_aside
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, scaled_inverse
-from toolpath_stiff.updating.portrait.dictionary import Dictionary, Ground, dictionary_of, shapes_near
+from toolpath_stiff.updating.portrait.columns import Ground, shapes_near
+from toolpath_stiff.updating.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of
 from toolpath_stiff.updating.portrait.terms import Term
 
 FloatArray = NDArray[np.float64]
@@ -31,8 +32,12 @@ DRAWS = 200  # simulated campaigns
 LEADS = 0.01  # probability by chance below which the first term is taken for something
 JOINS = 0.02  # and a further one
 BETTER = 0.98  # share of the rms at left-out points to which a further term must bring it
-FINALISTS, EACH = 60, 2  # terms that are fitted in full: the best of all, and of every link and variable
-STEPS = 6
+TIE = 0.5  # of log likelihood: so near, the place with the larger prior is taken
+# By how much likelihoods are flattened: the true shape is none of the dictionary's, so that what fits a little better
+# is not that much likelier.
+ROUGH = 1.5
+FINALISTS, EACH = 40, 1  # terms that are fitted in full: the best of all, and of every link and variable
+STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
 ROUNDS = 2  # searches for wild readings
 
 
@@ -111,10 +116,6 @@ class Selection:
         """All terms."""
         return dictionary_of(self.ground)
 
-    @cached_property
-    def _draws(self) -> FloatArray:
-        return Simulator.of(self.noise, self.problem.scatter.covariance, self.seed, DRAWS).draws
-
     @property
     def start(self) -> Description:
         """Nothing but the base fit."""
@@ -140,8 +141,11 @@ class Selection:
             gradient[:, :2] -= laws / LAW_PRIOR**2
             step = _bounded_step(information, gradient, size, low, high)
             reach = np.abs(np.einsum("gp,gpn->gn", step, jacobian)).max(axis=1)
+            done = float(np.sqrt(np.einsum("gp,gpq,gq->g", step, information, step).max()))
             step *= np.minimum(1.0, 0.5 / np.maximum(reach, 1e-12))[:, None]
             laws, size = laws + step[:, :2], np.clip(size + step[:, 2:], low, high)
+            if done < SETTLED:
+                break
         residual = self._linearised(laws, size, columns)[0]
         posterior = -0.5 * precision.squares(residual) - 0.5 * (laws**2).sum(axis=1) / LAW_PRIOR**2
         return Sizes(laws, size, residual, posterior)
@@ -186,75 +190,101 @@ class Selection:
 
     def scores(self, before: Description) -> FloatArray:
         """(N,) twice the gain in log likelihood of each term beside a description, linearised."""
-        columns = self._beside(before)
-        projected = before.fit.scatter.precision.beside(before.fit.jacobian.T, self._prior(before))
-        slope = columns @ projected.times(before.fit.residual)
-        return self._gains(slope, projected.squares(columns))
+        projected = self._projected(before)
+        pulls = set_wild_aside(projected.times(before.fit.residual[None]), projected).pulls
+        return self._gains(-pulls @ self.dictionary.columns.T, before)[0]
 
     def chance(self, before: Description, gain: float) -> tuple[float, float]:
-        """How often the best of all terms gains as much by chance; the gain of one campaign in twenty."""
-        columns = self._beside(before)
-        projected = before.fit.scatter.precision.beside(before.fit.jacobian.T, self._prior(before))
-        aside = set_wild_aside(projected.times(self._draws), projected)
-        best = self._gains((aside.pulls @ columns.T), projected.squares(columns)).max(axis=-1)
+        """How often the best of all terms gains as much by chance; the gain that it rarely reaches."""
+        projected = self._projected(before)
+        draws = Simulator.of(self.noise, self.problem.scatter.covariance, self.seed, DRAWS).draws
+        pulls = set_wild_aside(projected.times(draws), projected).pulls
+        best = self._gains(-pulls @ self.dictionary.columns.T, before).max(axis=-1)
         return float((1.0 + (best >= gain).sum()) / (1.0 + len(best))), float(np.quantile(best, 1.0 - JOINS))
 
-    def _beside(self, before: Description) -> FloatArray:
-        """(N, n) d ln stiffness of all terms where a description is at work already."""
-        modelled = np.exp(before.fit.residual - self.problem.observed)
-        return -self.dictionary.columns * (self.compliance / modelled)
+    def _projected(self, before: Description) -> Precision:
+        return before.fit.scatter.precision.beside(before.fit.jacobian.T, self._prior(before))
+
+    @cached_property
+    def _squares(self) -> FloatArray:
+        """(N,) information of each term by itself under the base fit's scatter."""
+        return np.asarray(self.base.scatter.precision.squares(self.dictionary.columns))
+
+    def _gains(self, slope: FloatArray, before: Description) -> FloatArray:
+        """(s, N) of slopes (s, N), where the size goes to an allowed side.
+
+        Beside a description each term has the information A - A J (J^T A J + prior)^-1 J^T A leaves of it.
+        """
+        weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
+        root = inverse_root(weighted @ before.fit.jacobian + self._prior(before))
+        information = self._squares - ((self.dictionary.columns @ (weighted.T @ root)) ** 2).sum(axis=1)
+        allowed = self.dictionary.signed | (slope > 0.0)
+        seen = information > 1e-6 * self._squares
+        return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))
 
     def _prior(self, before: Description) -> FloatArray:
         prior = np.zeros((before.fit.jacobian.shape[1],) * 2)
         prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
         return prior
 
-    def _gains(self, slope: FloatArray, information: FloatArray) -> FloatArray:
-        """(..., N) of slopes (..., N), where the size goes to an allowed side."""
-        allowed = self.dictionary.signed | (slope > 0.0)
-        return np.where(allowed & (information > 1e-9), slope**2 / np.maximum(information, 1e-9), 0.0)
-
-    def finalists(self, gains: FloatArray) -> IntArray:
+    def finalists(self, gains: FloatArray) -> list[Entry]:
         """The best of all terms, and of every link and variable."""
-        order = np.argsort(-gains, kind="stable")
         count: dict[tuple[str, str], int] = {}
         chosen = []
+        order = np.argsort(-gains, kind="stable")
         for rank, i in enumerate(order[gains[order] > 0.0].tolist()):
-            term = self.dictionary.terms[i]
-            seen = count.get((term.link, term.variable), 0)
-            if rank < FINALISTS or seen < EACH:
-                chosen.append(i)
-                count[term.link, term.variable] = seen + 1
-        return np.array(chosen, dtype=np.int64)
+            entry = self.dictionary.entries[i]
+            kind = (entry.local.link, entry.variable)
+            if rank < FINALISTS or count.get(kind, 0) < EACH:
+                chosen.append(entry)
+                count[kind] = count.get(kind, 0) + 1
+        return chosen
 
-    def together(self, before: Description, indices: IntArray) -> Sizes:
+    def together(self, before: Description, terms: Sequence[Term]) -> Sizes:
         """Each of some terms refitted along with a description."""
-        terms = [self.dictionary.terms[i] for i in indices.tolist()]
-        columns = self.dictionary.columns[indices]
-        scale = self.dictionary.scale[indices]
-        return self._along(before, terms, columns, scale)
-
-    def _along(self, before: Description, terms: Sequence[Term], columns: FloatArray, scale: FloatArray) -> Sizes:
+        columns = np.stack([self.ground.column(one) for one in terms]) / self.compliance
+        scale = np.maximum(np.sqrt((columns**2).mean(axis=1)), 1e-300)
         own = np.stack(self.limits(terms, scale))  # (2, G)
         shared = np.stack(self.limits(before.terms, before.scale))  # (2, p)
         count = len(terms)
-        both = np.concatenate([np.repeat(before.columns[None], count, axis=0), columns[:, None]], axis=1)
+        both = np.concatenate(
+            [np.repeat(before.columns[None], count, axis=0), (columns / scale[:, None])[:, None]], axis=1
+        )
         low, high = (
             np.concatenate([np.repeat(shared[k][None], count, axis=0), own[k][:, None]], axis=1) for k in (0, 1)
         )
         return self.fitted(both, low, high, before.fit.law, before.fit.scatter.precision)
 
-    def grown(self, before: Description, indices: IntArray) -> Description | None:
-        """A description with the best of some terms more, its constants settled; None where none has a size."""
-        if not len(indices):
+    def grown(self, before: Description) -> Description | None:
+        """A description with the best further term, its constants settled; None where none has a size."""
+        entries = self.finalists(self.scores(before))
+        if not entries:
             return None
-        found = self.together(before, indices)
+        found = self.together(before, [entry.term for entry in entries])
+        # Under the law of few places for many constants, the likelier of two that fit alike.
         best = int(np.argmax(found.posterior))
-        chosen = int(indices[best])
-        grown = self._with(before, self.dictionary.terms[chosen])
-        return self._settled(before, grown)
+        grown = self._settled(before, self.extended(before, entries[best].term))
+        return self._best_place(before, grown)
 
-    def _with(self, before: Description, term: Term) -> Description:
+    def _best_place(self, before: Description, grown: Description) -> Description:
+        """The last term's variable and shape where they fit best."""
+        entries = crossed(grown.terms[-1], self.ground)
+        if len(entries) < 2:
+            return grown
+        found = self.together(self.scattered(before, grown), [entry.term for entry in entries])
+        logs = found.posterior + np.array([entry.log_prior for entry in entries])
+        best = entries[int(np.argmax(logs))].term
+        if best == grown.terms[-1]:
+            return grown
+        better = self.extended(before, best)
+        return better if better.posterior > grown.posterior - TIE else grown
+
+    def scattered(self, before: Description, grown: Description) -> Description:
+        """A description under the scatter of another one."""
+        return replace(before, fit=replace(before.fit, scatter=grown.fit.scatter))
+
+    def extended(self, before: Description, term: Term) -> Description:
+        """A description with a term more, all refitted."""
         column = self.ground.column(term) / self.compliance
         scale = float(np.sqrt(np.mean(column**2)))
         return self.described(
@@ -271,13 +301,8 @@ class Selection:
             near = shapes_near(grown.terms[-1], self.ground, finer)
             if not near:
                 return grown
-            columns = np.stack([self.ground.column(one) for one in near]) / self.compliance
-            scale = np.sqrt((columns**2).mean(axis=1))
-            kept = scale > 1e-300
-            near, columns, scale = [t for t, k in zip(near, kept, strict=True) if k], columns[kept], scale[kept]
-            beside = replace(before, fit=replace(before.fit, scatter=grown.fit.scatter))
-            found = self._along(beside, near, columns / scale[:, None], scale)
-            better = self._with(beside, near[int(np.argmax(found.posterior))])
+            found = self.together(self.scattered(before, grown), near)
+            better = self.extended(before, near[int(np.argmax(found.posterior))])
             if better.posterior > grown.posterior:
                 grown = better
         return grown
@@ -305,7 +330,7 @@ def _bounded_step(
     held = np.zeros(step.shape, dtype=bool)
     held[:, 2:] = goal != moved
     if not held.any():
-        return step
+        return np.asarray(step)
     fixed = np.zeros(step.shape)
     fixed[:, 2:] = np.where(held[:, 2:], goal - size, 0.0)
     left = right - np.einsum("gij,gj->gi", matrix, fixed * scale)
@@ -320,6 +345,22 @@ def _bounded_step(
 
 
 @dataclass(frozen=True)
+class Weighed:
+    """Terms in the place of the leading one, with their posterior probabilities, the likeliest first."""
+
+    terms: tuple[Term, ...]
+    weights: FloatArray
+    sizes: FloatArray
+
+    def summed(self, of: Callable[[Term], str]) -> list[tuple[str, float]]:
+        """Name -> probability summed over the terms, the likeliest first."""
+        found: dict[str, float] = {}
+        for term, weight in zip(self.terms, self.weights.tolist(), strict=True):
+            found[of(term)] = found.get(of(term), 0.0) + weight
+        return sorted(found.items(), key=lambda item: (-item[1], item[0]))
+
+
+@dataclass(frozen=True)
 class Chosen:
     """What was chosen.
 
@@ -329,76 +370,50 @@ class Chosen:
         The terms, the leading one first.
     chance
         How often something as strong as the leading term comes up by chance.
-    weights
-        (N,) posterior probabilities of the dictionary's terms in the place of the leading one.
+    weighed
+        What else may stand in the place of the leading term.
     held
         Errors at left-out points.
     """
 
     description: Description
     chance: float
-    weights: FloatArray
+    weighed: Weighed
     held: HeldOut
 
 
-def choose(selection: Selection) -> Chosen | None:
-    """One to three terms; None where nothing stands out from chance."""
-    before = selection.start
-    gains = selection.scores(before)
-    if not len(gains):
-        return None
-    chance, _ = selection.chance(before, float(gains.max()))
-    if chance > LEADS:
-        return None
-    found = selection.grown(before, selection.finalists(gains))
-    assert found is not None
+def choose(selection: Selection) -> tuple[Chosen | None, float]:
+    """One to three terms, none where nothing stands out from chance; and how often chance does as much."""
+    start = selection.start
+    gains = selection.scores(start)
+    chance, threshold = selection.chance(start, float(gains.max(initial=0.0)))
+    found = selection.grown(start)
+    if chance > LEADS or found is None:
+        return None, chance
     while len(found.terms) < MOST_TERMS:
-        more = _one_more(selection, found)
+        more = _one_more(selection, found, threshold)
         if more is None:
             break
         found = more
     found = _leading_first(selection, found)
-    weights = term_weights(selection, found)
-    return Chosen(found, chance, weights, _held(selection, found))
+    return Chosen(found, chance, weigh(selection, found), _held(selection, found)), chance
 
 
-def _one_more(selection: Selection, before: Description) -> Description | None:
+def _one_more(selection: Selection, before: Description, threshold: float) -> Description | None:
     """With a further term, where it does more than chance and helps at left-out points."""
-    gains = selection.scores(before)
-    threshold = selection.chance(before, 0.0)[1]
-    if gains.max() <= threshold:
+    if selection.scores(before).max() <= threshold:
         return None
-    more = selection.grown(before, selection.finalists(gains))
+    more = selection.grown(before)
     if more is None or 2.0 * (more.posterior - before.posterior) <= threshold:
         return None
     more = _swapped(selection, more)
-    points = selection.problem.predictor.data.point
-    if held_out(more.fit, point=points).rms > BETTER * held_out(before.fit, point=points).rms:
-        return None
-    return more
+    return more if _held(selection, more).rms <= BETTER * _held(selection, before).rms else None
 
 
 def _swapped(selection: Selection, description: Description) -> Description:
-    """Every term but the last once more the best beside the others: the first was chosen without them."""
-    for _ in range(len(description.terms) - 1):
-        others = selection.without(description, 0)
-        again = selection.grown(others, selection.finalists(selection.scores(others)))
-        # The first term comes last now, better or as it was.
-        same = [*range(1, len(description.terms)), 0]
-        description = (
-            again
-            if again is not None and again.posterior > description.posterior
-            else _ordered(selection, description, same)
-        )
-    return _ordered(selection, description, [*range(1, len(description.terms)), 0])
-
-
-def _ordered(selection: Selection, description: Description, order: Sequence[int]) -> Description:
-    rows = list(order)
-    return selection.described(
-        [description.terms[k] for k in rows], description.columns[rows], description.scale[rows],
-        description.fit.law, description.fit.scatter,
-    )  # fmt: skip
+    """The first term once more the best beside the others: it was chosen without them."""
+    again = selection.grown(selection.without(description, 0))
+    return again if again is not None and again.posterior > description.posterior else description
 
 
 def _leading_first(selection: Selection, description: Description) -> Description:
@@ -406,7 +421,11 @@ def _leading_first(selection: Selection, description: Description) -> Descriptio
     if len(description.terms) < 2:
         return description
     costs = [selection.without(description, k).posterior for k in range(len(description.terms))]
-    return _ordered(selection, description, np.argsort(costs, kind="stable").tolist())
+    rows = np.argsort(costs, kind="stable").tolist()
+    return selection.described(
+        [description.terms[k] for k in rows], description.columns[rows], description.scale[rows],
+        description.fit.law, description.fit.scatter,
+    )  # fmt: skip
 
 
 def _held(selection: Selection, description: Description) -> HeldOut:
@@ -414,32 +433,23 @@ def _held(selection: Selection, description: Description) -> HeldOut:
 
 
 def temper(selection: Selection, description: Description) -> float:
-    """By how much the log likelihood is to be trusted less: what is left over what noise leaves."""
+    """By how much less a likelihood is to be trusted where shapes are rough: what is left over what noise leaves."""
     squares = float(description.fit.scatter.precision.squares(description.fit.residual))
     left = squares / max(len(selection.compliance) - 2 - len(description.terms), 1)
-    return max(left, 1.0)
+    return ROUGH * max(left, 1.0)
 
 
-def term_weights(selection: Selection, description: Description) -> FloatArray:
-    """(N,) posterior probability of each term in the place of the leading one, beside the others."""
+def weigh(selection: Selection, description: Description) -> Weighed:
+    """Posterior probabilities of terms in the place of the leading one, beside the others."""
     others = selection.without(description, 0)
-    others = replace(others, fit=replace(others.fit, scatter=description.fit.scatter))
-    indices = selection.finalists(selection.scores(others))
-    found = selection.together(others, indices)
-    logs = np.full(len(selection.dictionary), -np.inf)
-    logs[indices] = found.posterior / temper(selection, description) + selection.dictionary.log_prior[indices]
-    logs[indices[np.abs(found.size[:, -1]) <= 0.0]] = -np.inf
+    others = selection.scattered(others, description)
+    entries = selection.finalists(selection.scores(others)) + crossed(description.terms[0], selection.ground)
+    entries = list({entry.term: entry for entry in entries}.values())
+    found = selection.together(others, [entry.term for entry in entries])
+    logs = found.posterior / temper(selection, description) + np.array([entry.log_prior for entry in entries])
+    logs = np.where(np.abs(found.size[:, -1]) > 0.0, logs, -np.inf)
     weights = np.exp(logs - logs.max())
-    return np.asarray(weights / weights.sum())
-
-
-Named = list[tuple[str, float]]
-
-
-def summed(selection: Selection, weights: FloatArray, of: Callable[[Term], str]) -> Named:
-    """Name -> probability summed over the terms, the likeliest first."""
-    found: dict[str, float] = {}
-    for i in np.flatnonzero(weights > 0.0).tolist():
-        name = of(selection.dictionary.terms[i])
-        found[name] = found.get(name, 0.0) + float(weights[i])
-    return sorted(found.items(), key=lambda item: (-item[1], item[0]))
+    order = np.argsort(-weights, kind="stable")
+    return Weighed(
+        tuple(entries[i].term for i in order.tolist()), weights[order] / weights.sum(), found.size[order, -1]
+    )

@@ -60,6 +60,7 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
 }
 ASSUMED = "described from readings; usual sizes are engineering experience, no source"
 AXES = {"X": 0, "Y": 1, "Z": 2}
+Constants = tuple[tuple[str, float], ...]
 IDLE = 1e-3  # N in a strut: below, a power of the force would diverge, and the strut adds nothing that shows
 
 
@@ -93,7 +94,7 @@ class Term:
     shape: str
     action: Action
     where: int | None = None
-    at: tuple[tuple[str, float], ...] = ()
+    at: Constants = ()
     column: str = ""
     size: float = field(default=0.0, compare=False)
 
