@@ -151,7 +151,7 @@ def _nothing_to_describe(diagnosis: Diagnosis) -> str:
         return f"{names} {word} these readings and leaves nothing that stands out: there is nothing to describe."
     unseen = [term.variable for term in diagnosis.portrait.terms if not term.acts]
     if len(unseen) == len(diagnosis.portrait.terms):
-        return f"What is missing varies with {joined(unseen)}, which no effect of a machine sees: nothing is drafted."
+        return f"What is missing varies with {joined(list(dict.fromkeys(unseen)))}, which no effect of a machine sees: nothing is drafted."
     return ""
 
 
