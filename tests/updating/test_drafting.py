@@ -47,6 +47,7 @@ TERMS = [
     Term("one strut", STRUT, "temperature", "slope", "strut factor", where=3, at=(("start", 20.0), ("end", 25.0))),
     Term("one strut", STRUT, "strut length", "threshold", "strut", where=4, at=(("edge", 2.7), ("side", 1.0))),
     Term("struts", STRUT, "strut force", "threshold", "strut", at=(("edge", 150.0), ("side", -1.0))),
+    Term("joints", STRUT, "load", "threshold", "strut", at=(("beyond", 500.0),)),
     Term("struts", STRUT, "z", "bump", "strut", at=(("centre", 0.9), ("width", 0.1))),
     Term("struts", STRUT, "constant", "offset", "coupling", at=(("first", 2.0), ("second", 5.0))),
     Term("frame", STRUT, "y", "slope", "coupling", at=(*LINE, ("first", 1.0), ("second", 2.0))),
@@ -62,7 +63,9 @@ WORDS = 'the "table" of C:\\new gives way """here"""'
 def written(tmp_path, *terms: Term) -> dict[str, Effect]:
     """The effects of the file that is drafted from these terms."""
     file = tmp_path / "missing.py"
-    text = draft_source("missing", Description(WORDS, terms, (WORDS,) * len(terms), (WORDS,)), ORIGIN)
+    text = draft_source(
+        "missing", Description(WORDS, terms, (WORDS,) * len(terms), ("9 nm/N",) * len(terms), (WORDS,)), ORIGIN
+    )
     assert max(map(len, text.splitlines())) <= 120
     file.write_text(text, encoding="utf-8")
     return effects_from_file(file)
@@ -130,13 +133,14 @@ def test_several_terms_are_one_effect_but_readings_and_geometry_have_their_own(t
     twice = own.load_compliance(some_path, {"size": 2.0 * values["table_y"]})
     np.testing.assert_allclose(effect.load_compliance(some_path, values), twice)
     assert effect.needs == ("temperature_C",)
-    names = effect_names("missing", (TERMS[0], TERMS[26], TERMS[28]))
+    three = [TERMS[0], *(next(t for t in TERMS if t.action == action) for action in ("joint offset", "reading factor"))]
+    names = effect_names("missing", three)
     assert names == ["missing", "missing_geometry", "missing_reading"]
-    several = written(tmp_path / "..", TERMS[0], TERMS[26], TERMS[28])
+    several = written(tmp_path / "..", *three)
     assert list(several) == names
     assert all(effect.described_from == ORIGIN.marks for effect in several.values())
 
 
 def test_the_same_gives_the_same_bytes():
-    description = Description(WORDS, (TERMS[0],), (WORDS,))
+    description = Description(WORDS, (TERMS[0],), (WORDS,), ("9 nm/N",))
     assert draft_source("missing", description, ORIGIN) == draft_source("missing", description, ORIGIN)

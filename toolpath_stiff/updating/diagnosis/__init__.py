@@ -20,7 +20,7 @@ from toolpath_stiff.hints import Asked
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
 from toolpath_stiff.stiffness.model import build_model, setup_of
-from toolpath_stiff.updating.inference import NONE, Judgement, judge
+from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, refine
@@ -32,6 +32,7 @@ from toolpath_stiff.updating.planning import plan_measurements
 from toolpath_stiff.updating.planning.document import plan_rows
 from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
+from toolpath_stiff.updating.portrait import Portrait, draw_portrait
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc import Program
@@ -72,6 +73,8 @@ class Diagnosis:
         Where it is `described`: of a plan that would confirm it.
     path
         How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
+    portrait
+        What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
     """
 
     verdict: str
@@ -96,6 +99,7 @@ class Diagnosis:
     next_measurements: tuple[dict[str, Any], ...] = ()
     remarks: tuple[str, ...] = ()
     path: dict[str, Any] | None = None
+    portrait: Portrait | None = None
 
     @property
     def noise(self) -> Noise:
@@ -207,7 +211,7 @@ def diagnose(
     """
     say = progress or (lambda text: None)
     found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(files), say)
-    found = replace(found, command=command, asked=asked)
+    found = replace(found, command=command, asked=asked, portrait=portrait_of(found, say))
     if found.verdict not in ("ambiguous", "described"):
         return found
     if plan_next:
@@ -282,6 +286,25 @@ def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...
 def _same(judgements: Sequence[Judgement]) -> bool:
     """Whether all of them name the same effects."""
     return len({frozenset(judgement.plausible) for judgement in judgements}) == 1
+
+
+def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | None:
+    """What the missing thing looks like: of unexplained readings, and of what the best explanation leaves behind.
+
+    None where nothing stands out of what is left, and where the readings do not look as if they were of this machine.
+    """
+    main, verdict = diagnosis.main, diagnosis.verdict
+    if main.question or verdict == "adequate":
+        return None
+    base = main.base
+    if verdict != "unexplained":
+        gate = main.gates.get(diagnosis.best or "")
+        if diagnosis.best is None or gate is None or gate.probability > FALSE_ALARM:
+            return None
+        base = diagnosis.fits[diagnosis.best]
+    say("describing what is missing")
+    found = draw_portrait(main.problem, base, diagnosis.noise, diagnosis.seed, main.base_gate.worst)
+    return found if found.terms or verdict == "unexplained" else None
 
 
 # -- what next ---------------------------------------------------------------------------------------------------------

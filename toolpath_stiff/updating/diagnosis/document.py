@@ -19,6 +19,7 @@ from toolpath_stiff.updating.inference.drawn import DrawnEntry
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
+from toolpath_stiff.updating.portrait.document import PortraitEntry, portrait_entry
 
 FloatArray = NDArray[np.float64]
 
@@ -207,6 +208,7 @@ class DiagnosisDocument(TypedDict):
     detectable: list[DetectableEntry]
     confounding: ConfoundingEntry
     path: dict[str, Any] | None
+    portrait: PortraitEntry | None
     assumptions: list[str]
     warnings: list[str]
     notes: list[str]
@@ -259,6 +261,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
             "threshold": CONFOUNDED,
         },
         "path": diagnosis.path,
+        "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": list(diagnosis.data.notes),

@@ -214,12 +214,16 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
             hint("see which readings are how far off", asked.command("compare")),
         ]
     if diagnosis.verdict == "unexplained":
-        file = asked.new_effect()
-        return [
-            hint("look where the residuals lie", asked.command("compare")),
-            hint("write the effect that you suspect as one file", command_line("effects", "new", file)),
-            hint("and try it", asked.command("diagnose", effects=[file])),
-        ]
+        found = [hint("look where the residuals lie", asked.command("compare"))]
+        if diagnosis.portrait is not None and any(one.term.acts for one in diagnosis.portrait.terms):
+            file = asked.new_effect("missing")
+            found.append(
+                hint("write what it looks like as an effect to edit", asked.command("effects draft", "-o", file))
+            )
+        else:
+            file = asked.new_effect()
+            found.append(hint("write the effect that you suspect as one file", command_line("effects", "new", file)))
+        return [*found, hint("and try it", asked.command("diagnose", effects=[file]))]
     return ["use the model; `detectable` lists what could still be there unseen"]
 
 

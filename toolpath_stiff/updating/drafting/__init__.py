@@ -23,6 +23,7 @@ from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.drafting.source import GEOMETRY, INSTRUMENT, STRUCTURE, Piece, pieces_of
 from toolpath_stiff.updating.measurements import reading_marks
 from toolpath_stiff.updating.portrait.terms import Term
+from toolpath_stiff.updating.portrait.words import portrait_text, size_words, term_words
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -82,11 +83,12 @@ class Origin:
 
 @dataclass(frozen=True)
 class Description:
-    """What a portrait says of what is missing: in a paragraph, term by term, and what else would look the same."""
+    """What a portrait says of what is missing: in a paragraph, term by term with its size, and what else is alike."""
 
     text: str
     terms: tuple[Term, ...]
     words: tuple[str, ...]
+    sizes: tuple[str, ...]
     alike: tuple[str, ...] = ()
 
 
@@ -125,13 +127,13 @@ def description_of(diagnosis: Diagnosis) -> Description:
     """The part of a portrait that an effect can say: terms of variables that effects see."""
     portrait = diagnosis.portrait
     assert portrait is not None
-    said = portrait.document
-    seen = [k for k, term in enumerate(portrait.terms) if term.acts]
+    seen = [one for one in portrait.terms if one.term.acts]
     return Description(
-        said["text"],
-        tuple(portrait.terms[k] for k in seen),
-        tuple(said["terms"][k]["words"] for k in seen),
-        tuple(one["words"] for one in said["alike"]),
+        portrait_text(portrait),
+        tuple(one.term for one in seen),
+        tuple(term_words(one.term) for one in seen),
+        tuple(size_words(one) for one in seen),
+        tuple(f"{term_words(one.term)} ({100.0 * (one.probability or 0.0):.0f} %)" for one in portrait.alike),
     )
 
 
@@ -144,14 +146,15 @@ def _nothing_to_describe(diagnosis: Diagnosis) -> str:
         return "Nothing is missing that these data could show: there is nothing to describe."
     if diagnosis.verdict == "described":
         return f"{names} describes these readings already: measure others, and see whether it foretells them."
-    if diagnosis.portrait is None and diagnosis.verdict == "unexplained":
+    if diagnosis.verdict == "unexplained" and (diagnosis.portrait is None or not diagnosis.portrait.terms):
         return "Something is missing, but no simple form of it stands out from chance: there is nothing to write down."
     if diagnosis.portrait is None:
         word = "explains" if diagnosis.verdict == "identified" else "may explain"
         return f"{names} {word} these readings and leaves nothing that stands out: there is nothing to describe."
-    unseen = [term.variable for term in diagnosis.portrait.terms if not term.acts]
+    unseen = [one.term.variable for one in diagnosis.portrait.terms if not one.term.acts]
     if len(unseen) == len(diagnosis.portrait.terms):
-        return f"What is missing varies with {joined(list(dict.fromkeys(unseen)))}, which no effect of a machine sees: nothing is drafted."
+        with_what = joined(list(dict.fromkeys(unseen)))
+        return f"What is missing varies with {with_what}, which no effect of a machine sees: nothing is drafted."
     return ""
 
 
@@ -174,11 +177,11 @@ def draft_source(name: str, description: Description, origin: Origin) -> str:
         "text": _filled(description.text),
         "pieces": [
             {
-                "bullet": _filled(f"{piece.parameter}: {piece.words}", "- ", "  "),
+                "bullet": _filled(f"{piece.parameter}: {piece.words}; {size}", "- ", "  "),
                 "formula": _filled(piece.formula, "    ", "    "),
                 "functions": piece.functions,
             }
-            for piece in pieces
+            for piece, size in zip(pieces, description.sizes, strict=True)
         ],
         "alike": [_filled(one, "- ", "  ") for one in description.alike],
         "origin": _filled(f"Drawn by `{origin.command}` from {read}."),

@@ -144,7 +144,8 @@ MEANINGS = {
     "centre": "where it is {}",
     "reach": "from there to where it is as large as the size says",
     "width": "from there to where it is 0.61 of its most",
-    "edge": "beyond it is there, before it is not",
+    "edge": "on one side it is there, on the other not",
+    "beyond": "what friction holds",
     "period": "from one crest to the next",
     "crest": "where it is as large as the size says",
 }
@@ -211,6 +212,8 @@ def _shape(term: Term) -> tuple[str, str]:
     if term.shape == "slope":
         line = f"({v} - start) / (end - start)"
         return (line, line) if signed else (f"np.maximum({line}, 0.0)", f"max(0, {line})")
+    if term.shape == "threshold" and "beyond" in term.constants:
+        return f"np.maximum(1.0 - beyond / np.maximum({v}, 1e-3), 0.0)", f"max(0, 1 - beyond / {v})"
     return {
         "offset": (v, "" if v == "on" else v),
         "square": (f"(({v} - centre) / reach) ** 2", f"(({v} - centre) / reach)^2"),
@@ -317,10 +320,11 @@ def _piece(term: Term, words: str, name: str) -> Piece:
         )
         own = f"{size} * {name}_share(path)"
         formula = f"c_i += {_times(name, shape)}"
-        statements = (f"added += {own}",)
+        statements: tuple[str, ...] = (f"added += {own}",)
         if term.action == "strut factor":
             statements = (
                 f"stiffness = {law.format('')}  # (n, 6) N/m, by the strut law",
+                "# No strut loses more than four fifths of its compliance.",
                 f"added += np.maximum({own}, {-LEAST_STRUT}) / stiffness",
             )
             formula = f"c_i += {_times(name, shape)} / k_i"
@@ -360,6 +364,7 @@ def _piece(term: Term, words: str, name: str) -> Piece:
         first, second = (int(term.constants[one]) for one in ("first", "second"))
         statements = (
             f"stiffness = {law.format(f'[:, [{first - 1}, {second - 1}]]')}",
+            "# Coupled by as much as both give way alone, the pair would have no stiffness left.",
             f"own = np.clip({own}, {-MOST_COUPLED}, {MOST_COUPLED}) / np.sqrt(stiffness.prod(axis=1))",
             f"form[:, {first - 1}, {second - 1}] += own",
             f"form[:, {second - 1}, {first - 1}] += own",

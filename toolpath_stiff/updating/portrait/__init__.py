@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import held_out
 from toolpath_stiff.updating.inference.gates import Simulator
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.portrait.columns import Ground
-from toolpath_stiff.updating.portrait.selection import Chosen, Description, Selection, choose
+from toolpath_stiff.updating.portrait.selection import Chosen, Description, Selection, choose, law_prior
 from toolpath_stiff.updating.portrait.smooth import smooth_rms
 from toolpath_stiff.updating.portrait.terms import Term
 
@@ -83,7 +83,7 @@ class Portrait:
     values: FloatArray | None = None
 
 
-def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portrait:
+def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: str = "") -> Portrait:
     """Describe what a fit leaves.
 
     Parameters
@@ -94,12 +94,14 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portr
         The fit that leaves something: the model with its strut law refitted, or the best explanation.
     seed
         Of the simulated campaigns.
+    form
+        The form of discrepancy that stands out most, in words, for the yardstick.
     """
     selection = Selection(problem, base, noise, seed)
     chosen, chance = choose(selection)
     start = selection.start
     points = problem.predictor.data.point
-    smooth = smooth_rms(problem, start.fit)
+    smooth = smooth_rms(problem, start.fit, form)
     if chosen is None:
         return Portrait(
             look_elsewhere=chance, smooth_rms=smooth, error=float(start.fit.errors.mean()),
@@ -181,10 +183,8 @@ def noise_floor(selection: Selection, description: Description) -> float:
     """Rms at left-out points that noise alone leaves: simulated campaigns through the same fit."""
     draws = Simulator.of(selection.noise, selection.problem.scatter.covariance, selection.seed, FLOOR_DRAWS).draws
     jacobian, precision = description.fit.jacobian, description.fit.scatter.precision
-    prior = np.zeros((jacobian.shape[1],) * 2)
-    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
     weighted = precision.times(jacobian.T)
-    inverse = np.linalg.pinv(weighted @ jacobian + prior, hermitian=True)
+    inverse = np.linalg.pinv(weighted @ jacobian + law_prior(description.fit), hermitian=True)
     points = selection.problem.predictor.data.point
     squares = []
     for draw in draws:

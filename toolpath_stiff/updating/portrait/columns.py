@@ -54,6 +54,8 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, lean: bool = Fals
     if variable in ("load", "strut force") and not (signed and many == 2):
         reference = float(np.median(values))
         found += [("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)]
+        held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if many > 2 else [0.5 * low, 0.9 * low]
+        found += [("threshold", (("beyond", force),)) for force in held]
     found += _slopes(low, high, signed, many > 4)
     if many == 2:
         return found
@@ -233,4 +235,4 @@ class Ground:
         if values.ndim == 2 and share.ndim == 1:
             raise ValueError(f"{term.link} has no {term.variable} of its own")
         shape = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
-        return self.columns(share, None, shape[None])[0]
+        return np.asarray(self.columns(share, None, shape[None])[0])

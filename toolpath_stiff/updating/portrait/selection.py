@@ -2,8 +2,8 @@
 
 Terms are added one by one. Every term's gain is first its score beside what is fitted already (Rao's score test, sizes
 on their allowed side); the best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j,
-exact for whatever gives way in series. A term joins where its gain is more than the best of the whole dictionary would reach
-by chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls.
+exact for whatever gives way in series. A term joins where its gain is more than the best of the whole dictionary would
+reach by chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls.
 """
 
 from __future__ import annotations
@@ -39,6 +39,13 @@ ROUGH = 1.5
 FINALISTS, EACH = 40, 1  # terms that are fitted in full: the best of all, and of every link and variable
 STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
 ROUNDS = 2  # searches for wild readings
+
+
+def law_prior(fit: Fit) -> FloatArray:
+    """(2 + p, 2 + p) information of the strut law's prior beside p sizes."""
+    prior = np.zeros((fit.jacobian.shape[1],) * 2)
+    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+    return prior
 
 
 @dataclass(frozen=True)
@@ -192,7 +199,7 @@ class Selection:
         """(N,) twice the gain in log likelihood of each term beside a description, linearised."""
         projected = self._projected(before)
         pulls = set_wild_aside(projected.times(before.fit.residual[None]), projected).pulls
-        return self._gains(-pulls @ self.dictionary.columns.T, before)[0]
+        return np.asarray(self._gains(-pulls @ self.dictionary.columns.T, before)[0])
 
     def chance(self, before: Description, gain: float) -> tuple[float, float]:
         """How often the best of all terms gains as much by chance; the gain that it rarely reaches."""
@@ -203,7 +210,7 @@ class Selection:
         return float((1.0 + (best >= gain).sum()) / (1.0 + len(best))), float(np.quantile(best, 1.0 - JOINS))
 
     def _projected(self, before: Description) -> Precision:
-        return before.fit.scatter.precision.beside(before.fit.jacobian.T, self._prior(before))
+        return before.fit.scatter.precision.beside(before.fit.jacobian.T, law_prior(before.fit))
 
     @cached_property
     def _squares(self) -> FloatArray:
@@ -216,16 +223,11 @@ class Selection:
         Beside a description each term has the information A - A J (J^T A J + prior)^-1 J^T A leaves of it.
         """
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
-        root = inverse_root(weighted @ before.fit.jacobian + self._prior(before))
+        root = inverse_root(weighted @ before.fit.jacobian + law_prior(before.fit))
         information = self._squares - ((self.dictionary.columns @ (weighted.T @ root)) ** 2).sum(axis=1)
         allowed = self.dictionary.signed | (slope > 0.0)
         seen = information > 1e-6 * self._squares
         return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))
-
-    def _prior(self, before: Description) -> FloatArray:
-        prior = np.zeros((before.fit.jacobian.shape[1],) * 2)
-        prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
-        return prior
 
     def finalists(self, gains: FloatArray) -> list[Entry]:
         """The best of all terms, and of every link and variable."""

@@ -1,7 +1,7 @@
 """The yardstick of a description: what a smooth unknown one reaches at points that it has not seen.
 
-The discrepancy as a Gaussian process with one of the forms of covariance of `inference.gates` (Kennedy and O'Hagan 2001,
-Bayesian calibration of computer models), its amplitude the likeliest; predictions at left-out points in closed form.
+The discrepancy as a Gaussian process with one of the forms of covariance of `inference.gates` (Kennedy and O'Hagan
+2001, Bayesian calibration of computer models), its amplitude the likeliest; left-out points in closed form.
 """
 
 from __future__ import annotations
@@ -13,22 +13,30 @@ from toolpath_stiff.updating.inference.covariances import Groups
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import POINT_TO_POINT, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import AMPLITUDES
+from toolpath_stiff.updating.portrait.selection import law_prior
 
 FloatArray = NDArray[np.float64]
 
 
-def smooth_rms(problem: Problem, fit: Fit) -> float:
-    """Rms of (modelled - measured) / measured at left-out points, of the likeliest form; nan with too few points."""
+GENERAL = ("smooth over the workspace, different by direction", "linear over the workspace, different by direction")
+
+
+def smooth_rms(problem: Problem, fit: Fit, form: str) -> float:
+    """Rms of (modelled - measured) / measured at left-out points; nan with too few points.
+
+    Of the likeliest form: `form`, the one that stands out most, in words, or what is smooth over the workspace.
+    """
     points = Groups.by(problem.predictor.data.point)
     if points.count < 3:
         return float("nan")
-    projected = problem.projected(fit.jacobian) if not fit.scatter.wild else None
-    precision = projected or fit.scatter.precision.beside(fit.jacobian.T, _prior(fit))
+    precision = fit.scatter.precision.beside(fit.jacobian.T, law_prior(fit))
     best: tuple[float, FloatArray, float] | None = None
     pull = precision.times(fit.residual)
-    for words, features in discrepancy_forms(problem.predictor).items():
-        if words == POINT_TO_POINT:  # nothing of one point is known from another
+    forms = discrepancy_forms(problem.predictor)
+    for words in dict.fromkeys((form, *GENERAL)):
+        if words not in forms or words == POINT_TO_POINT:  # of which nothing is known from another point
             continue
+        features = forms[words]
         inner = precision.times(features.T) @ features
         own, turn = np.linalg.eigh(inner)
         turned = (turn.T @ (features.T @ pull)) ** 2
@@ -45,11 +53,3 @@ def smooth_rms(problem: Problem, fit: Fit) -> float:
     for out in points.members():
         residual[out] = np.linalg.solve(whole.block(out), pulls[out])
     return float(np.sqrt(np.mean(np.expm1(-residual) ** 2)))
-
-
-def _prior(fit: Fit) -> FloatArray:
-    from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
-
-    prior = np.zeros((fit.jacobian.shape[1],) * 2)
-    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
-    return prior
