@@ -57,7 +57,7 @@ TERMS = [
     Term("instrument", "all", "time", "slope", "reading factor", at=(("start", 0.0), ("end", 7200.0))),
     Term("instrument", "reading", "load", "slope", "reading shift", at=(("start", 0.0), ("end", 2000.0))),
 ]  # fmt: skip
-WORDS = 'the "table" of C:\\new gives way """here"""'
+WORDS = "a long clause without an end, " * 5 + 'the "table" of C:\\new gives way """here"""'
 
 
 def written(tmp_path, *terms: Term) -> dict[str, Effect]:

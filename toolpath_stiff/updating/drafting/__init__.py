@@ -242,7 +242,7 @@ def _parameter(piece: Piece) -> dict[str, str]:
         "si": repr(piece.term.si),
         "bounds": repr(piece.bounds),
         "typical": repr(piece.typical),
-        "meaning": _text(piece.words),
+        "meaning": _long_text(piece.words, indent=" " * 12),
         "functions": piece.functions,
     }
 
@@ -274,8 +274,8 @@ def _plain(text: str) -> str:
 
 def _first(text: str) -> str:
     """As the first sentence of a docstring."""
-    said = _plain(text)
-    return textwrap.shorten(said[:1].upper() + said[1:], WIDTH - 8, placeholder=" ...").rstrip(".") + "."
+    said = textwrap.shorten(_plain(text), WIDTH - 8, placeholder=" ...")
+    return f"{said[:1].upper()}{said[1:]}" + ("" if said.endswith(".") else ".")
 
 
 def _filled(text: str, first: str = "", rest: str = "") -> str:

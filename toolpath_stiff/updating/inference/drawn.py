@@ -91,7 +91,7 @@ class Drawn:
         """Why it is confirmed or not, a sentence without its full stop."""
         said = f"the form of {joined(self.names)} was read off "
         if not self.new:
-            return f"{said}these very readings: that it fits them says nothing of others"
+            return f"{said}these very readings, and that it fits them says nothing of others"
         said += f"{self.seen} of these {self.seen + self.new} readings"
         if np.isnan(self.gain):
             return f"{said}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
