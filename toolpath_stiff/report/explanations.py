@@ -269,10 +269,12 @@ def text(document: DiagnosisDocument) -> str:
         As in `diagnose.json`.
     """
     verdict = str(document.get("verdict") or "-")
+    portrait = document.get("portrait")
     lines = [
         *_entry("data", _data(document)),
         *_entry("verdict", f"{verdict.upper()}. {document.get('text') or ''}"),
         *_listed("why", entries(document, "why")),
+        *_listed("portrait", [portrait["text"]] if portrait else []),
         *_entry("error", _error(document)),
         "",
         *_table(document),

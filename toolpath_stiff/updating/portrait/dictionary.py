@@ -183,13 +183,14 @@ def dictionary_of(ground: Ground) -> Dictionary:
         share, signed = ground.share(plain), len(plain.signs) > 1
         limit = max(abs(bound) for bound in plain.bounds) * plain.si
         for variable in local.variables:
-            for column in columns_of(variable, ground):
+            every_column = columns_of(variable, ground)
+            for column in every_column:
                 named, values = ground.shapes(variable, column, signed, local.where)
                 if not named:
                     continue
                 blocks.append(ground.columns(share, local.where, values))
                 kinds = Counter(shape for shape, _ in named)
-                log = prior.place(local, variable) - float(np.log(len(kinds)))
+                log = prior.place(local, variable) - float(np.log(len(kinds) * len(every_column)))
                 entries += [
                     Entry(local, variable, column, shape, at, log - float(np.log(kinds[shape]))) for shape, at in named
                 ]
