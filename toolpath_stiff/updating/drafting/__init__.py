@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 WIDTH = 116  # columns of running text in the file
-LONGEST_TEXT = 96  # of a string on a line of a class
+LONGEST_TEXT = 104  # of a string on a line of a class
 MARKS_A_LINE = 10
 REPEATED = "stiffness = path."  # what several statements use, and one line says
 KINDS = {STRUCTURE: "", GEOMETRY: "_geometry", INSTRUMENT: "_reading"}  # what an effect's name ends with

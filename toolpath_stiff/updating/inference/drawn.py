@@ -95,7 +95,7 @@ class Drawn:
         said += f"{self.seen} of these {self.seen + self.new} readings"
         if np.isnan(self.gain):
             return f"{said}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
-        against = f"{self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms)"
+        against = f"{self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms it)"
         if self.confirmed:
             return f"{said}; the {self.new} others confirm it: their log probability, foretold, is {against}"
         return f"{said}; the {self.new} others do not confirm it: their log probability, foretold, is {against}"
