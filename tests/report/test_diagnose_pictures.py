@@ -7,7 +7,9 @@ import pytest
 from matplotlib.image import imread
 
 from tests.report import diagnose_documents as documents
+from toolpath_stiff.report.diagnose import diagnose_html
 from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, ladder_png
+from toolpath_stiff.report.explanations import headline
 
 PICTURES = (ladder_png, confounding_png, detectable_png)
 
@@ -19,3 +21,11 @@ def test_every_verdict_is_drawn_with_the_same_bytes_again(name, draw):
     first = draw(document)
     assert imread(io.BytesIO(first), format="png").shape[1] >= 700
     assert draw(document) == first
+
+
+def test_a_description_is_not_told_as_an_explanation():
+    document = documents.described()
+    assert headline(document).endswith("(described, not confirmed)")
+    page = diagnose_html(document, {})
+    assert "describes it" in page and "is the explanation" not in page
+    assert 'class="verdict described"' in page

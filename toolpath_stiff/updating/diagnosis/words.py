@@ -11,7 +11,7 @@ from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 from toolpath_stiff.updating.inference.candidates import EXPECTED
-from toolpath_stiff.updating.inference.drawn import Drawn
+from toolpath_stiff.updating.inference.drawn import Drawn, seen_readings
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
 from toolpath_stiff.updating.inference.fits import errors_text
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED
@@ -127,7 +127,7 @@ def why(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict == "identified" and main.drawn is not None:
         found.append(main.drawn.reason)
     if diagnosis.verdict == "ambiguous":
-        found += _confounded(diagnosis)
+        found += [*_confounded(diagnosis), *_drawn_from_these(diagnosis)]
     if diagnosis.verdict == "unexplained" and not main.question:
         tested = [f"{name} (p = {g.probability:.2g})" for name, g in list(main.gates.items())[:4]]
         if tested:
@@ -178,6 +178,17 @@ def _confounded(diagnosis: Diagnosis) -> list[str]:
     if NONE in diagnosis.plausible:
         found.append("chance alone is not excluded either")
     return found
+
+
+def _drawn_from_these(diagnosis: Diagnosis) -> list[str]:
+    """Of plausible effects: those whose form was read off some of these readings."""
+    plausible = [f.effect for f in diagnosis.main.families if f.name in diagnosis.plausible]
+    seen = {effect.name: int(seen_readings([effect], diagnosis.data).sum()) for effect in plausible}
+    return [
+        f"the form of {name} was read off {count} of these {len(diagnosis.data)} readings: its probability is too high"
+        for name, count in seen.items()
+        if count
+    ]
 
 
 def _rival_names(diagnosis: Diagnosis, first: str, second: str) -> bool:
