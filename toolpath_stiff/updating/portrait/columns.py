@@ -29,6 +29,7 @@ Shapes = tuple[tuple[tuple[str, Constants], ...], FloatArray]  # shape and const
 PLACE = ("x", "y", "z", "radius")
 BUMPS, MOST_EDGES = 5, 5
 SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
+MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
 PHASES = 3  # of half a turn; the other half is the other sign's
 
 # -- shapes ------------------------------------------------------------------------------------------------------------
@@ -79,7 +80,9 @@ def _slopes(low: float, high: float, signed: bool, within: bool) -> list[tuple[s
     """Straight lines over the range, and from its middle on."""
     middle = 0.5 * (low + high)
     if signed:
-        return [("slope", (("start", middle), ("end", high)))]
+        begins = (middle,) if within else ()
+        bent = [(("from", b), ("end", e)) for b in begins for e in (low, high)]
+        return [("slope", (("start", middle), ("end", high))), *(("threshold", at) for at in bent)]
     lines = [(low, high), (high, low)] + ([(middle, high), (middle, low)] if within else [])
     return [("slope", (("start", start), ("end", end))) for start, end in lines]
 
@@ -93,8 +96,8 @@ def _edges(different: FloatArray, most: int) -> list[float]:
 
 
 def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -> list[tuple[str, Constants]]:
-    """Waves over the range: two turns at most of a place or of time, down to a screw's lead in a strut's length."""
-    turns = np.array([1.0, 2.0])
+    """Waves over the range: some turns of a place, down to a screw's lead in a strut's length."""
+    turns = np.arange(1.0, min(MOST_TURNS, many / 3.0) + 0.5)
     if variable == "strut length":
         # So close that between two neighbours a wave over the whole range loses a quarter of a turn at most.
         turns = np.arange(1.0, min(span / SHORTEST_PITCH, many / 3.0), 0.5)
@@ -121,14 +124,17 @@ def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
         moves[name] = at[name] * np.exp(finer * np.linspace(-spread, spread, 7))
     if "crest" in names:
         moves["crest"] = at["crest"] + finer * at["period"] / (2 * PHASES) * np.linspace(-0.5, 0.5, 7)
-    if term.shape == "slope":  # where it begins; its end is a matter of scale
-        moves = {"start": np.clip(moves["start"], low - step, high + step)} if len(term.signs) == 1 else {}
+    if "end" in at:  # where it begins; its end is a matter of scale
+        begins = "from" if "from" in at else "start"
+        moves = {begins: np.clip(moves[begins], low - step, high + step)}
+        if begins == "start" and len(term.signs) > 1:
+            return []
     found = []
     for values_of in product(*moves.values()):
         new = at | dict(zip(moves, (float(v) for v in values_of), strict=True))
         if "width" in new and new["width"] < (high - low) / 30.0:
             continue
-        if term.shape == "slope" and (new["end"] - new["start"]) * (at["end"] - at["start"]) <= 0.0:
+        if "end" in at and (new["end"] - new[begins]) * (at["end"] - at[begins]) <= 0.0:
             continue
         found.append(replace(term, at=tuple(new.items())))
     return found if moves else []

@@ -48,6 +48,11 @@ class Local:
     side: tuple[str, ...] = ()
     crossed: tuple[str, ...] = ()
 
+    @property
+    def single(self) -> bool:
+        """Whether it is one of several places or channels: a joint, a vertex, the readings along one axis."""
+        return self.where is not None or (self.link == "instrument" and self.direction != "reading")
+
     def term(self, variable: str, shape: str, at: Constants, column: str = "") -> Term:
         """With a variable and a shape."""
         return Term(
@@ -223,39 +228,72 @@ def columns_of(variable: str, ground: Ground) -> list[str]:
 
 @dataclass(frozen=True)
 class Prior:
-    """Logarithms of prior weights: even over links, over the variables of each, over places and directions."""
+    """Logarithms of prior weights: even over links, over the variables of each, over places and directions.
 
-    places: Mapping[tuple[str, str], int]
+    `places`: link, variable and whether at one place -> how many; `variables`: link -> how many variables.
+    """
+
+    places: Mapping[tuple[str, str, bool], int]
     variables: Mapping[str, int]
 
     @classmethod
     def of(cls, every: Iterable[Local], ground: Ground) -> Prior:
         """Of the links and those of their variables that the readings tell."""
         told: dict[str, bool] = {}
-        pairs: Counter[tuple[str, str]] = Counter()
+        places: Counter[tuple[str, str, bool]] = Counter()
         for local in every:
             for variable in local.variables:
                 if variable not in told:
                     told[variable] = bool(columns_of(variable, ground))
                 if told[variable]:
-                    pairs[local.link, variable] += 1
-        return cls(pairs, Counter(link for link, _ in pairs))
+                    places[local.link, variable, local.single] += 1
+        return cls(places, Counter(link for link, _ in {key[:2] for key in places}))
 
     def place(self, local: Local, variable: str) -> float:
-        """Of a link with one place and direction and a variable, all shapes together."""
-        share = SIDE if variable in local.side else 1.0
-        count = self.variables[local.link] * max(self.places.get((local.link, variable), 1), 1) * len(self.variables)
-        return float(np.log(share / count))
+        """Of a link with one place and direction and a variable, all shapes together.
+
+        A link with single places (a joint, a vertex) has half for one of them and half for all of them together.
+        """
+        both = (local.link, variable, not local.single) in self.places
+        share = (SIDE if variable in local.side else 1.0) * (0.5 if both else 1.0)
+        count = max(self.places.get((local.link, variable, local.single), 1), 1)
+        return float(np.log(share / count / self.variables[local.link] / len(self.variables)))
 
 
 def crossed(term: Term, ground: Ground) -> list[Entry]:
     """The same variable and shape, constants included, at every other link, place and direction that may feel it."""
     every = locals_of(ground.data.extra)
     prior = Prior.of(every, ground)
-    return [
-        Entry(local, term.variable, term.column, term.shape, term.at, prior.place(local, term.variable))
-        for local in every
-        if term.variable in (*local.variables, *local.crossed)
-        and term.variable not in ONCE
-        and local.action not in ("coupling", "joint offset")
-    ]
+    found = []
+    for local in every:
+        if term.variable not in (*local.variables, *local.crossed) or term.variable in ONCE:
+            continue
+        if local.action in ("coupling", "joint offset"):
+            continue
+        signed = len(local.term("constant", "offset", ()).signs) > 1
+        log = prior.place(local, term.variable)
+        found += [
+            Entry(local, term.variable, term.column, shape, at, log) for shape, at in _translated(term, signed, ground)
+        ]
+    return found
+
+
+def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Constants]]:
+    """A shape for links that give only, or whose stiffness may change to both sides, as it says the same there."""
+    at = term.constants
+    if (len(term.signs) > 1) == signed or "power" in at:
+        return [(term.shape, term.at)]
+    if term.shape == "slope" and signed:  # it begins where it is 0
+        return [("threshold", (("from", at["start"]), ("end", at["end"])))]
+    if term.shape == "threshold" and "from" in at:
+        return [("slope", (("start", at["from"]), ("end", at["end"])))]
+    values = ground.values(term.variable, term.column)
+    low, high = float(values.min()), float(values.max())
+    if term.shape == "slope":  # a straight line to both sides: up or down over the range
+        return [("slope", (("start", one), ("end", other))) for one, other in ((low, high), (high, low))]
+    if "side" in at and not signed:  # more on one side is less on the other
+        return [
+            (term.shape, tuple((name, side if name == "side" else value) for name, value in term.at))
+            for side in (1.0, -1.0)
+        ]
+    return [(term.shape, term.at)]

@@ -34,8 +34,8 @@ JOINS = 0.02  # and a further one
 BETTER = 0.98  # share of the rms at left-out points to which a further term must bring it
 TIE = 0.5  # of log likelihood: so near, the place with the larger prior is taken
 # By how much likelihoods are flattened: the true shape is none of the dictionary's, so that what fits a little better
-# is not that much likelier.
-ROUGH = 1.5
+# is not that much likelier. Of a large effect the shape's error counts, which grows with the gain; assumed.
+ROUGH, SHAPE = 2.5, 0.0015
 FINALISTS, EACH = 40, 1  # terms that are fitted in full: the best of all, and of every link and variable
 STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
 ROUNDS = 2  # searches for wild readings
@@ -434,11 +434,11 @@ def _held(selection: Selection, description: Description) -> HeldOut:
     return held_out(description.fit, selection.problem.predictor.data.point)
 
 
-def temper(selection: Selection, description: Description) -> float:
-    """By how much less a likelihood is to be trusted where shapes are rough: what is left over what noise leaves."""
+def temper(selection: Selection, description: Description, gain: float) -> float:
+    """By how much less a likelihood is to be trusted where shapes are rough, for a gain in log likelihood."""
     squares = float(description.fit.scatter.precision.squares(description.fit.residual))
     left = squares / max(len(selection.compliance) - 2 - len(description.terms), 1)
-    return ROUGH * max(left, 1.0)
+    return ROUGH * max(left, 1.0) + SHAPE * max(gain, 0.0)
 
 
 def weigh(selection: Selection, description: Description) -> Weighed:
@@ -448,7 +448,10 @@ def weigh(selection: Selection, description: Description) -> Weighed:
     entries = selection.finalists(selection.scores(others)) + crossed(description.terms[0], selection.ground)
     entries = list({entry.term: entry for entry in entries}.values())
     found = selection.together(others, [entry.term for entry in entries])
-    logs = found.posterior / temper(selection, description) + np.array([entry.log_prior for entry in entries])
+    fit = others.fit
+    before = -0.5 * float(fit.scatter.precision.squares(fit.residual) + fit.law @ fit.law / LAW_PRIOR**2)
+    gain = float(found.posterior.max()) - before
+    logs = found.posterior / temper(selection, description, gain) + np.array([entry.log_prior for entry in entries])
     logs = np.where(np.abs(found.size[:, -1]) > 0.0, logs, -np.inf)
     weights = np.exp(logs - logs.max())
     order = np.argsort(-weights, kind="stable")

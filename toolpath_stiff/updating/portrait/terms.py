@@ -79,8 +79,9 @@ class Term:
     at
         Constants in SI, by name. Of the shape: `slope` has `start` (where it is 0) and `end` (where it is 1), or
         `power` and `reference`; `square` has `centre` and `reach`; `bump` has `centre` and `width`; `threshold` has
-        `edge` and `side` (1: above it, -1: below), or `beyond`, a force that friction holds; `periodic` has `period`
-        and `crest`; `sign` has `side`. Of a `coupling`: `first` and `second`, numbers of struts.
+        `edge` and `side` (1: above it, -1: below), or `from` (where it begins) and `end` (where it is 1), or
+        `beyond`, a force that friction holds; `periodic` has `period` and `crest`; `sign` has `side`. Of a
+        `coupling`: `first` and `second`, numbers of struts.
     column
         Name of the set-up; of `tilt`, "" for the angle from Z, "X" or "Y" for the lean towards that axis; of a
         `joint offset`, "frame" or "platform".
@@ -193,6 +194,8 @@ def shape_values(shape: str, values: FloatArray, at: Mapping[str, float], signed
         return np.asarray(np.exp(-0.5 * ((values - at["centre"]) / at["width"]) ** 2))
     if shape == "threshold" and "beyond" in at:  # Coulomb friction holds up to the edge: (v - edge) / v of a force v
         return np.maximum(1.0 - at["beyond"] / np.maximum(values, IDLE), 0.0)
+    if shape == "threshold" and "from" in at:  # nothing up to there, then a straight line
+        return np.asarray(np.maximum((values - at["from"]) / (at["end"] - at["from"]), 0.0))
     if shape == "threshold":
         return np.asarray(at["side"] * (values - at["edge"]) > 0.0, dtype=float)
     if shape == "periodic":

@@ -99,6 +99,9 @@ def _with(term: Term) -> str:
         return f" where {name} is about {shown(at['centre'])} (to some {shown(2.0 * at['width'])} either side)"
     if term.shape == "periodic":
         return f" in a wave over {name} with a period of {shown(at['period'])}"
+    if "from" in at:
+        side = "above" if at["end"] > at["from"] else "below"
+        return f" where {name} is {side} {shown(at['from'])}, in full at {shown(at['end'])}"
     if "beyond" in at:
         return f" as far as {name} is above {shown(at['beyond'])}, which friction holds"
     return f" where {name} is {'above' if at['side'] > 0.0 else 'below'} {shown(at['edge'])}"
