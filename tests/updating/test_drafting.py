@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.updating.cases import campaign, predictor_for
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.effects import effects_from_file
@@ -14,6 +15,8 @@ from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.effects.trial import try_effect
 from toolpath_stiff.stiffness.model import build_model, load_path
 from toolpath_stiff.updating.drafting import Description, Origin, draft_source, effect_names
+from toolpath_stiff.updating.portrait.columns import Ground
+from toolpath_stiff.updating.portrait.dictionary import dictionary_of
 from toolpath_stiff.updating.portrait.terms import Term, effect_of
 
 ORIGIN = Origin(
@@ -47,6 +50,7 @@ TERMS = [
     Term("one strut", STRUT, "temperature", "slope", "strut factor", where=3, at=(("start", 20.0), ("end", 25.0))),
     Term("one strut", STRUT, "strut length", "threshold", "strut", where=4, at=(("edge", 2.7), ("side", 1.0))),
     Term("struts", STRUT, "strut force", "threshold", "strut", at=(("edge", 150.0), ("side", -1.0))),
+    Term("table", "Y", "load", "threshold", "give", at=(("from", 900.0), ("end", 3000.0))),
     Term("joints", STRUT, "load", "threshold", "strut", at=(("beyond", 500.0),)),
     Term("struts", STRUT, "z", "bump", "strut", at=(("centre", 0.9), ("width", 0.1))),
     Term("struts", STRUT, "constant", "offset", "coupling", at=(("first", 2.0), ("second", 5.0))),
@@ -87,15 +91,37 @@ def some_path():
 
 @pytest.mark.parametrize("term", TERMS, ids=lambda term: term.key)
 def test_text_and_term_give_the_same_numbers(term, some_path, tmp_path):
+    compare_with_term(term, some_path, tmp_path)
+
+
+def test_every_kind_of_term_that_a_portrait_may_choose_can_be_written(some_path, tmp_path):
+    """One of each link, action, direction, variable and shape of the dictionary of a campaign."""
+    data = campaign(7, "tilted", "none")[0]
+    predictor = predictor_for(data)
+    dictionary = dictionary_of(Ground(predictor, np.exp(-predictor.log_stiffness()), np.zeros(2)))
+    kinds = {
+        (t.action, t.variable, t.shape, bool(t.where), t.column, t.direction, *(name for name, _ in t.at)): t
+        for t in (entry.term for entry in dictionary.entries)
+        if t.acts
+    }
+    assert len(kinds) > 30
+    for number, term in enumerate(kinds.values()):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        compare_with_term(term, some_path, folder, acts=False)
+
+
+def compare_with_term(term, some_path, tmp_path, acts=True):
+    """What a drafted file adds against what the term itself adds; `acts` where it must add something here."""
     (drafted,), own = written(tmp_path, term).values(), effect_of(term)
     parameter = drafted.parameters[0]
-    size = 0.6 * parameter.typical[1] * parameter.si
+    size = (0.6 if acts else 0.02) * parameter.typical[1] * parameter.si
     p, q = {parameter.name: size}, {"size": size}
     for hook in ("strut_compliance", "load_compliance"):
         mine, theirs = (getattr(one, hook)(some_path, values) for one, values in ((drafted, p), (own, q)))
         assert (mine is None) == (theirs is None)
         if theirs is not None:
-            assert np.abs(theirs).max() > 0.0
+            assert np.abs(theirs).max() > 0.0 or not acts
             np.testing.assert_allclose(mine, theirs, rtol=1e-7, atol=1e-9 * np.abs(theirs).max())
     if term.action == "joint offset":
         machine = some_path.machine
@@ -108,7 +134,7 @@ def test_text_and_term_give_the_same_numbers(term, some_path, tmp_path):
     stiffness = np.linspace(1e7, 9e7, len(some_path))
     mine, theirs = drafted.reading(stiffness, some_path, p), own.reading(stiffness, some_path, q)
     np.testing.assert_allclose(mine, theirs, rtol=1e-7)
-    assert np.any(theirs != stiffness) == drafted.is_instrument
+    assert np.any(theirs != stiffness) == drafted.is_instrument or not acts
     for attribute in ("link", "needs", "load_dependent", "unknown_to_control"):
         assert getattr(drafted, attribute) == getattr(own, attribute), attribute
     theirs = own.parameters[0]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 WIDTH = 116  # columns of running text in the file
-LONGEST_TEXT = 104  # of a string on a line of a class
+LONGEST_TEXT, LONGEST_KEY = 108, 12  # of a string on a line of its own; of what stands before it on the same line
 MARKS_A_LINE = 10
 REPEATED = "stiffness = path."  # what several statements use, and one line says
 KINDS = {STRUCTURE: "", GEOMETRY: "_geometry", INSTRUMENT: "_reading"}  # what an effect's name ends with
@@ -260,9 +260,10 @@ def _text(text: str) -> str:
 
 def _long_text(text: str, indent: str = "    ") -> str:
     """The same, in brackets over several lines where one does not hold it."""
-    if len(text) < LONGEST_TEXT:
+    longest = LONGEST_TEXT - len(indent)
+    if len(text) < longest - LONGEST_KEY:
         return _text(text)
-    parts = textwrap.wrap(_plain(text), LONGEST_TEXT, break_long_words=False, break_on_hyphens=False)
+    parts = textwrap.wrap(_plain(text), longest, break_long_words=False, break_on_hyphens=False)
     lines = [_text(part + " ") for part in parts[:-1]] + [_text(parts[-1])]
     return "\n".join(["(", *(f"{indent}    {line}" for line in lines), f"{indent})"])
 

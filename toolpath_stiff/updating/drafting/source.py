@@ -136,6 +136,7 @@ CONSTANTS: Mapping[str, tuple[str, str, float]] = {
     "temperature": ("degrees C", "degrees C", 1.0),
     **dict.fromkeys(("strut force", "load"), ("N", "N", 1.0)),
 }
+CALLED = {"from": "begin"}  # constants whose name Python keeps for itself
 MEANINGS = {
     "start": "where it is nothing",
     "end": "where it is as large as the size says",
@@ -145,6 +146,7 @@ MEANINGS = {
     "reach": "from there to where it is as large as the size says",
     "width": "from there to where it is 0.61 of its most",
     "edge": "on one side it is there, on the other not",
+    "from": "where it begins",
     "beyond": "what friction holds",
     "period": "from one crest to the next",
     "crest": "where it is as large as the size says",
@@ -183,7 +185,7 @@ def _constant_lines(term: Term) -> list[str]:
         if name in MEANINGS:
             meaning = MEANINGS[name].format("least" if term.shape == "square" else "largest")
             unit = "" if name == "power" else f"{CONSTANTS[term.variable][0]}: "
-            lines.append(f"{name} = {number(value)}  # {unit}{meaning}")
+            lines.append(f"{CALLED.get(name, name)} = {number(value)}  # {unit}{meaning}")
     return lines
 
 
@@ -193,7 +195,7 @@ def _constants_in_words(term: Term) -> str:
     for name, value in term.at:
         if name in MEANINGS:
             _, unit, si = ("", "", 1.0) if name == "power" else CONSTANTS[term.variable]
-            said.append(f", {name} = {value / si:.4g} {unit}".rstrip())
+            said.append(f", {CALLED.get(name, name)} = {value / si:.4g} {unit}".rstrip())
     return "".join(said)
 
 
@@ -212,6 +214,9 @@ def _shape(term: Term) -> tuple[str, str]:
     if term.shape == "slope":
         line = f"({v} - start) / (end - start)"
         return (line, line) if signed else (f"np.maximum({line}, 0.0)", f"max(0, {line})")
+    if term.shape == "threshold" and "from" in term.constants:
+        line = f"({v} - begin) / (end - begin)"
+        return f"np.maximum({line}, 0.0)", f"max(0, {line})"
     if term.shape == "threshold" and "beyond" in term.constants:
         return f"np.maximum(1.0 - beyond / np.maximum({v}, 1e-3), 0.0)", f"max(0, 1 - beyond / {v})"
     return {
