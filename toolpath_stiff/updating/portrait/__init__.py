@@ -13,10 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff import defaults
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import held_out
 from toolpath_stiff.updating.inference.gates import Simulator
 from toolpath_stiff.updating.inference.noise import Noise
+from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.portrait.columns import Ground
 from toolpath_stiff.updating.portrait.selection import Chosen, Description, Selection, choose, law_prior
 from toolpath_stiff.updating.portrait.smooth import smooth_rms
@@ -28,7 +30,7 @@ HELD = 0.90  # probability that a set of links or variables adds up to
 MOST_LINKS, MOST_VARIABLES, MOST_ALIKE = 4, 3, 4
 SHOWN = 0.03  # probability from which another term is told
 FLOOR_DRAWS = 40
-NORMAL_95 = 1.96
+MOST_SEARCHED = 1000  # readings on which the dictionary is searched: more tell no more of which term to fit
 
 
 @dataclass(frozen=True)
@@ -98,8 +100,11 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: st
         The form of discrepancy that stands out most, in words, for the yardstick.
     """
     selection = Selection(problem, base, noise, seed)
-    chosen, chance = choose(selection)
     start = selection.start
+    if len(base.residual) > MOST_SEARCHED:
+        chosen, chance = _chosen_from_fewer(selection)
+    else:
+        chosen, chance = choose(selection)
     points = problem.predictor.data.point
     smooth = smooth_rms(problem, start.fit, form)
     if chosen is None:
@@ -129,10 +134,29 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int, form: st
     )
 
 
+def _chosen_from_fewer(whole: Selection) -> tuple[Chosen | None, float]:
+    """The search on readings spread over the campaign, what it has chosen fitted to all."""
+    base, noise = whole.base, whole.noise
+    rows = np.unique(np.linspace(0, len(base.residual) - 1, MOST_SEARCHED).round().astype(np.int64))
+    full = whole.problem.predictor
+    predictor = Predictor(full.machine, full.data.select(rows), full.effect_files)
+    problem = Problem.of(predictor, noise.select(rows))
+    residual = base.residual[rows]
+    scatter = problem.scatter.with_wild(residual)
+    fewer = replace(base, residual=residual, jacobian=base.jacobian[rows], scatter=scatter)
+    chosen, chance = choose(Selection(problem, fewer, noise.select(rows), whole.seed))
+    if chosen is None:
+        return None, chance
+    found = whole.start
+    for term in chosen.description.terms:
+        found = whole.extended(found, term)
+    return replace(chosen, description=found, held=held_out(found.fit, full.data.point)), chance
+
+
 def _sized(ground: Ground, description: Description, k: int, probability: float | None = None) -> Sized:
     term, deviation = description.terms[k], float(description.deviations[k])
     low, high = (bound * term.si for bound in term.bounds)
-    reach = NORMAL_95 * deviation
+    reach = defaults.NORMAL_95 * deviation
     interval = max(term.size - reach, low), min(term.size + reach, high)
     return Sized(term, interval, abs(term.size) * float(description.scale[k]), probability)
 

@@ -27,7 +27,7 @@ from toolpath_stiff.updating.portrait.terms import Term
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MOST_TERMS = 3
+MOST_TERMS, POINTS_EACH = 3, 6  # and points for each term but the first
 DRAWS = 200  # simulated campaigns
 LEADS = 0.01  # probability by chance below which the first term is taken for something
 JOINS = 0.02  # and a further one
@@ -387,12 +387,15 @@ class Chosen:
 def choose(selection: Selection) -> tuple[Chosen | None, float]:
     """One to three terms, none where nothing stands out from chance; and how often chance does as much."""
     start = selection.start
+    if not len(selection.dictionary):
+        return None, 1.0
     gains = selection.scores(start)
     chance, threshold = selection.chance(start, float(gains.max(initial=0.0)))
     found = selection.grown(start)
     if chance > LEADS or found is None:
         return None, chance
-    while len(found.terms) < MOST_TERMS:
+    points = len(set(selection.problem.predictor.data.point.tolist()))
+    while len(found.terms) < min(MOST_TERMS, points // POINTS_EACH):
         more = _one_more(selection, found, threshold)
         if more is None:
             break
