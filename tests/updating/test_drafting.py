@@ -112,7 +112,7 @@ def test_every_kind_of_term_that_a_portrait_may_choose_can_be_written(some_path,
 
 
 def compare_with_term(term, some_path, tmp_path, acts=True):
-    """What a drafted file adds against what the term itself adds; `acts` where it must add something here."""
+    """What a drafted file adds against the term itself; `acts`: it must add something here."""
     (drafted,), own = written(tmp_path, term).values(), effect_of(term)
     parameter = drafted.parameters[0]
     size = (0.6 if acts else 0.02) * parameter.typical[1] * parameter.si
@@ -122,7 +122,7 @@ def compare_with_term(term, some_path, tmp_path, acts=True):
         assert (mine is None) == (theirs is None)
         if theirs is not None:
             assert np.abs(theirs).max() > 0.0 or not acts
-            np.testing.assert_allclose(mine, theirs, rtol=1e-7, atol=1e-9 * np.abs(theirs).max())
+            np.testing.assert_allclose(mine, theirs, rtol=1e-7, atol=1e-8 * np.abs(theirs).max())
     if term.action == "joint offset":
         machine = some_path.machine
         mine, theirs = drafted.geometry(machine, p), own.geometry(machine, q)

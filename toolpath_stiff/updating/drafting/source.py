@@ -1,7 +1,7 @@
 """Terms of a portrait as source text: for each link, variable and shape a few lines of Python, and its formula.
 
 What `updating.portrait.terms` computes from a `Term`, these lines say for one term alone, so that an engineer can read
-and change them; a test holds both to the same numbers. Constants keep nine digits.
+and change them; a test holds both to the same numbers. Constants keep twelve digits.
 """
 
 from __future__ import annotations
@@ -102,8 +102,8 @@ def parameter_name(term: Term) -> str:
 
 
 def number(value: float) -> str:
-    """A float literal of nine digits."""
-    return repr(float(f"{value:.9g}"))
+    """A float literal of twelve digits."""
+    return repr(float(f"{value:.12g}"))
 
 
 # -- variables ---------------------------------------------------------------------------------------------------------
