@@ -56,6 +56,7 @@ UPDATING_RANK = {
     "portrait": 3,
     "diagnosis": 4,
     "correction": 5,
+    "drafting": 6,
 }
 RIG_MAY_IMPORT = {"units", "errors", "arrays", "defaults", "toml_reader", "files", "results_folder", "rig"}
 RIG_SHOWN_BY = ("api", "cli")  # a case starts, measures and reveals exercises, as the command does

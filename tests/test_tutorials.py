@@ -52,12 +52,6 @@ def test_outputs_renewed_agree():
     assert make.agrees(renewed, lines)
 
 
-def test_effect_shown_is_the_file():
-    shown = re.search(r"```python\n(.*?)```", (FOLDER / "3_outside_the_catalogue.md").read_text(), re.DOTALL)
-    assert shown is not None
-    assert shown.group(1) == (FOLDER / "drag_along_x.py").read_text()
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_links_and_pictures_are_there(page):
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):

@@ -3,9 +3,8 @@
     python docs/tutorials/make.py            rewrites outputs and pictures
     python docs/tutorials/make.py --check    only says what differs; exit code 1 if anything does
 
-A block ```console holds commands (`$ tps ...`) and what they print. A line `...` stands for lines left out. The
-commands of one tutorial run in the order of its text, in one folder that is empty but for `programs/` and the Python
-files that stand beside this one.
+A block ```console holds commands (`$ tps ...`, or `$ cat FILE`) and what they print. A line `...` stands for lines left
+out. The commands of one tutorial run in the order of its text, in one folder that is empty but for `programs/`.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import io
 import os
 import re
 import shlex
-import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -39,7 +37,7 @@ PICTURES = {
     "2_ladder.png": ("2_after_a_plan.md", "ex2/first/ladder.png", 1.0),
     "2_plan.png": ("2_after_a_plan.md", "ex2/plan/plan.png", 1.0),
     "2_ladder_again.png": ("2_after_a_plan.md", "ex2/second/ladder.png", 1.0),
-    "3_variables.png": ("3_outside_the_catalogue.md", "ex3/compare/variables.png", 0.186),
+    "3_portrait.png": ("3_outside_the_catalogue.md", "ex3/first/portrait.png", 1.0),
     "3_before_after.png": ("3_outside_the_catalogue.md", "ex3/update/before_after.png", 1.0),
 }
 
@@ -51,9 +49,6 @@ def workshop() -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "programs").symlink_to(HERE.parent.parent / "programs")
-        for file in HERE.glob("*.py"):
-            if file != Path(__file__).resolve():
-                shutil.copy(file, folder)
         os.chdir(folder)
         try:
             yield folder
@@ -77,8 +72,10 @@ def printed(command: str, pictures: bool) -> list[str]:
     from toolpath_stiff.cli.main import main
 
     arguments = shlex.split(command)
+    if arguments[0] == "cat":
+        return [line.rstrip() for line in Path(arguments[1]).read_text(encoding="utf-8").splitlines()]
     if arguments[0] != "tps":
-        raise ValueError(f"{command}: the tutorials run tps only")
+        raise ValueError(f"{command}: the tutorials run tps and cat only")
     if not pictures and arguments[1] in DRAWS:
         arguments.append("--no-plots")
     output = io.StringIO()

@@ -140,6 +140,20 @@ def identified() -> dict[str, Any]:
     )
 
 
+def described() -> dict[str, Any]:
+    finding = "the table gives way along X, with the square of y"
+    winner = candidate("table_compliance", 1.8, 0.99, "best", held_out_gain_in_se=6.0, adequate=True, finding=finding)
+    return common(
+        "described",
+        text=f"{finding.capitalize()}. This describes the readings, and does not explain them yet.",
+        candidates=[winner, *RULED_OUT],
+        plausible=["table_compliance"],
+        by_noise={"measured": {"verdict": "described", "plausible": ["table_compliance"]}},
+        drawn={"effects": ["table_compliance"], "readings_seen": 42, "readings_new": 0, "gain": None, "rival": "",
+               "confirmed": False},
+    )  # fmt: skip
+
+
 def ambiguous() -> dict[str, Any]:
     document = common(
         "ambiguous",

@@ -134,12 +134,13 @@ def _figures(document: DiagnosisDocument) -> list[tuple[str, str]]:
     key = "mean_abs_error_percent"
     found = [(percent(figure_of(base.get("as_given"), key), 2), "mean error as given")]
     found.append((percent(figure_of(base, key), 2), "mean error, strut law refitted"))
-    if best is not None and document.get("verdict") in ("identified", "ambiguous"):
+    if best is not None and document.get("verdict") in ("identified", "described", "ambiguous"):
         found.append((percent(figure_of(best, key), 2), f"mean error with {name_text(best)}"))
         found.append((percent(figure_of(best, "held_out_error_percent"), 2), "the same at points left out"))
     found.append((floor_text(document), "would be left by scatter alone"))
     standing = explanations(document)
-    remark = "is the explanation" if len(standing) == 1 else "are left standing"
+    described = document.get("verdict") == "described"
+    remark = "are left standing" if len(standing) > 1 else "describes it" if described else "is the explanation"
     found.append((plausible_text(standing), remark) if standing else ("no effect", "of the catalogue is left standing"))
     return found
 

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare
 
 
@@ -71,6 +72,7 @@ class Diagnosis:
         For the record, and for the commands that go on from here.
     next_measurements, remarks
         Where the verdict is `ambiguous`: rows of a plan that would tell the explanations apart; what it cannot do.
+        Where it is `described`: of a plan that would confirm it.
     path
         How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
     portrait
@@ -124,7 +126,7 @@ class Diagnosis:
 
         One alone where one is the answer.
         """
-        most = 1 if self.verdict == "identified" else None
+        most = 1 if self.verdict in NAMING else None
         return tuple(dict.fromkeys(name for one in self.judgements.values() for name in one.explanations[:most]))
 
     @property
@@ -219,13 +221,13 @@ def diagnose(
     say = progress or (lambda text: None)
     found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(files), say)
     found = replace(found, command=command, asked=asked, portrait=portrait_of(found, say))
-    if found.verdict != "ambiguous":
+    if found.verdict not in ("ambiguous", "described"):
         return found
     if plan_next:
         say("planning the next measurements")
         rows, remarks = next_measurements(found, seed=seed)
         found = replace(found, next_measurements=tuple(rows), remarks=tuple(remarks))
-    if program is not None:
+    if program is not None and found.verdict == "ambiguous":
         of_machine = found.predictor.base.conditions
         conditions = Conditions(
             of_machine.setup if setup is None else setup, of_machine.temperature if temperature is None else temperature
@@ -314,10 +316,15 @@ def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...
     plausible = tuple(dict.fromkeys(name for judgement in judgements for name in judgement.plausible))
     if len(verdicts) == 1:
         verdict = verdicts.pop()
-        if verdict == "identified" and any(set(j.plausible) != set(judgements[0].plausible) for j in judgements):
-            verdict = "ambiguous"
-        return verdict, plausible
+        return verdict if verdict not in NAMING or _same(judgements) else "ambiguous", plausible
+    if verdicts == set(NAMING) and _same(judgements):
+        return "described", plausible
     return "ambiguous", plausible if plausible else (NONE,)
+
+
+def _same(judgements: Sequence[Judgement]) -> bool:
+    """Whether all of them name the same effects."""
+    return len({frozenset(judgement.plausible) for judgement in judgements}) == 1
 
 
 def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | None:
@@ -359,11 +366,11 @@ def next_measurements(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
 
-    Empty unless the verdict is `ambiguous`: there is nothing to tell apart.
+    Of an answer that is only `described`, what would confirm it. Empty with any other verdict than these two.
     """
     # Under several noise models the most demanding one that leaves rivals: a plan for it serves the others, too.
-    open_ones = [j for j in diagnosis.judgements.values() if j.verdict == "ambiguous"]
-    if diagnosis.verdict != "ambiguous" or not open_ones:
+    open_ones = [j for j in diagnosis.judgements.values() if j.verdict == diagnosis.verdict]
+    if diagnosis.verdict not in ("ambiguous", "described") or not open_ones:
         return [], []
     judgement = open_ones[-1]
     rivals = rivals_of(judgement)
