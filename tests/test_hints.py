@@ -88,13 +88,35 @@ def test_what_nothing_explains_is_written_and_tried(here, capsys):
     rows, _ = rig.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
     (here / "data.csv").write_text(rig.csv_text(rows), encoding="utf-8")
     asked = Asked(("data.csv",), effects=(), noise=0.03)
-    steps = next_steps(SimpleNamespace(verdict="unexplained", best=None, main=SimpleNamespace(question="")), asked)
-    lines = [line for _, line in map(parted, steps)]
+    said = SimpleNamespace(verdict="unexplained", best=None, main=SimpleNamespace(question=""), portrait=None)
+    lines = [line for _, line in map(parted, next_steps(said, asked))]
     assert [shlex.split(line)[1] for line in lines] == ["compare", "effects", "diagnose"]
     for line in lines:
         run(line, capsys)
+    # Where it has a portrait, this is drafted.
+    portrait = SimpleNamespace(terms=(SimpleNamespace(term=SimpleNamespace(acts=True)),))
+    said.portrait = portrait
+    lines = [line for _, line in map(parted, next_steps(said, asked))]
+    assert lines[1:] == [
+        "tps effects draft data.csv -o missing.py --noise 3",
+        "tps diagnose data.csv --effects missing.py --noise 3",
+    ]
+
+
+def test_a_draft_is_written_and_its_commands_run(here, capsys):
+    rows, _ = rig.make_case(7, layout="paper", hidden="saddle_overhang", size=0.1)
+    (here / "a saddle.csv").write_text(rig.csv_text(rows), encoding="utf-8")
+    first = "tps effects draft 'a saddle.csv' -o missing.py"
+    printed = run(first, capsys)
+    assert [shlex.split(line)[1] for line in printed] == ["effects", "diagnose", "plan"]
+    assert all("missing.py" in line for line in printed) and "'a saddle.csv'" in printed[1]
+    run(printed[0], capsys)
+    assert any(line.startswith("tps update") and "--effects missing.py" in line for line in run(printed[1], capsys))
+    assert run(first, capsys, code=2) == []
+    assert main(["effects", "draft", "a saddle.csv", "--noise", "20", "-o", "other.py"]) == 0
+    assert "nothing to describe" in capsys.readouterr().out and not (here / "other.py").exists()
     again = Asked(("data.csv",), effects=("my_effect.py",))
-    assert again.new_effect == "my_effect_2.py"
+    assert again.new_effect() == "my_effect_2.py"
 
 
 def test_templates_and_imports(here, capsys):

@@ -50,8 +50,10 @@ UPDATING_RANK = {
     "inference": 2,
     "comparison": 3,
     "planning": 3,
+    "portrait": 3,
     "diagnosis": 4,
     "correction": 5,
+    "drafting": 6,
 }
 RIG_MAY_IMPORT = {"units", "errors", "arrays", "defaults", "toml_reader", "files", "results_folder", "rig"}
 RIG_SHOWN_BY = ("api", "cli")  # a case starts, measures and reveals exercises, as the command does

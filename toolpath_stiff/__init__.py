@@ -36,8 +36,10 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.diagnosis import preview as preview
     from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.api.effects import EffectCheck as EffectCheck
+    from toolpath_stiff.api.effects import EffectDraft as EffectDraft
     from toolpath_stiff.api.effects import EffectFile as EffectFile
     from toolpath_stiff.api.effects import check_effects as check_effects
+    from toolpath_stiff.api.effects import draft_effect as draft_effect
     from toolpath_stiff.api.effects import effect_template as effect_template
     from toolpath_stiff.api.effects import effects as effects
     from toolpath_stiff.api.inputs import Program as Program
@@ -90,7 +92,8 @@ __version__ = _VERSION
 _PUBLIC = {
     "api.case": ("Case",),
     "api.effects": (
-        "EffectCatalogue", "EffectCheck", "EffectFile", "check_effects", "effect_template", "effects",
+        "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "check_effects", "draft_effect",
+        "effect_template", "effects",
     ),
     "api.inputs": ("Program",),
     "api.machines": (

@@ -69,11 +69,11 @@ class Asked:
     def command(self, name: str, *own: str, machine: str | None = None, effects: Sequence[str] = ()) -> str:
         """`tps name` on the same data with the same options; `own` words of that command come after the machine.
 
-        `machine` is another one, `effects` are further files.
+        `name` may be two words, "effects draft". `machine` is another one, `effects` are further files.
         """
         chosen = machine or self.machine
         return command_line(
-            name,
+            *name.split(),
             *self.data,
             *options(machine=chosen if chosen != defaults.MACHINE else None),
             *own,
@@ -96,11 +96,10 @@ class Asked:
         name = NUMBERED.sub("", stem) + "-updated" + (f"-{number}" if number > 1 else "") + ".toml"
         return str(path.with_name(name))
 
-    @property
-    def new_effect(self) -> str:
+    def new_effect(self, stem: str = "my_effect") -> str:
         """A name for a file with an effect of the user's own that is not among the given ones."""
         taken, number = {PurePath(file).name for file in self.effects}, 1
-        while (name := f"my_effect{f'_{number}' if number > 1 else ''}.py") in taken:
+        while (name := f"{stem}{f'_{number}' if number > 1 else ''}.py") in taken:
             number += 1
         return name
 

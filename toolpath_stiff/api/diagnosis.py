@@ -352,7 +352,7 @@ class Diagnosis(FolderResult):
 
     @property
     def verdict(self) -> str:
-        """adequate, identified, ambiguous or unexplained."""
+        """adequate, identified, described, ambiguous or unexplained."""
         return self.diagnosed.verdict
 
     @property

@@ -6,15 +6,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import Result
+from toolpath_stiff.api.results import Progress, Result, teller
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.stiffness.effects.contract import Effect
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from toolpath_stiff.stiffness.effects.trial import Trial
+    from toolpath_stiff.updating.drafting import Draft
 
 
 class EffectCatalogue(Result):
@@ -173,6 +176,54 @@ class EffectFile(Result):
         return write_atomically(file, self.text)
 
 
+class EffectDraft(EffectFile):
+    """What a diagnosis leaves unexplained, as the text of an effect file.
+
+    Attributes
+    ----------
+    name, text
+        Name of the effect; the file, "" where there is nothing to describe.
+    effects
+        Names of all effects in it.
+    reason
+        Why nothing is drafted, a sentence; "" where something is.
+    diagnosis
+        The diagnosis that it was drawn from.
+    next
+        Commands that go on from here.
+    """
+
+    def __init__(self, name: str, draft: Draft, diagnosis: Diagnosis, commands: Sequence[str]) -> None:
+        super().__init__(name, draft.text)
+        self.effects, self.reason = list(draft.effects), draft.reason
+        self.diagnosis, self.next = diagnosis, list(commands) if draft.text else []
+
+    def to_dict(self) -> dict[str, Any]:
+        """Names and text, the verdict and the portrait; `reason` where nothing is drafted."""
+        said = self.diagnosis.to_dict()
+        return {
+            "effect": self.name if self.text else None,
+            "effects": self.effects,
+            "text": self.text,
+            "reason": self.reason,
+            "verdict": said["verdict"],
+            "portrait": said["portrait"],
+            "next": self.next,
+        }
+
+    def __str__(self) -> str:
+        return self.text or self.reason
+
+    def _short(self) -> str:
+        return super()._short() if self.text else self.reason
+
+    def save(self, file: str | Path) -> Path:
+        """Write the file, whole or not at all; raises `InputError` where nothing is drafted."""
+        if not self.text:
+            raise InputError(f"nothing is drafted: {self.reason}")
+        return super().save(file)
+
+
 def effect_template(name: str) -> EffectFile:
     """A commented, working example of an effect to change into one's own.
 
@@ -193,3 +244,74 @@ def effect_template(name: str) -> EffectFile:
         raise InputError(f"{name!r} cannot be an effect's name", expected="a name such as my_screw")
     text = (resources.files("toolpath_stiff") / "data" / "templates" / "effect.py.txt").read_text("utf-8")
     return EffectFile(name, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
+
+
+def draft_effect(
+    machine: Machine | str | Path,
+    data: Data,
+    file: str | Path = "missing.py",
+    *,
+    noise_percent: Noise = None,
+    strut_spread_percent: float = 1.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> EffectDraft:
+    """Describe what a diagnosis leaves unexplained as an effect file to read, edit and put to the test.
+
+    Parameters
+    ----------
+    machine, data
+        The machine, whose effect files take part; measurements, or the files that hold them.
+    file
+        Where it will be saved: the effect is named after it. Nothing is written yet.
+    noise_percent, strut_spread_percent, seed, progress
+        As of `diagnose`.
+
+    Raises
+    ------
+    InputError, InputErrors
+        A file cannot be read; too few readings; there is an effect of that name.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.draft_effect("nist", "nist-table1", noise_percent=20).reason
+    'Nothing is missing that these data could show: there is nothing to describe.'
+    """
+    from toolpath_stiff.stiffness.effects import known_effects
+    from toolpath_stiff.updating.diagnosis import diagnose
+    from toolpath_stiff.updating.drafting import draft
+
+    asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
+    name = effect_name(file)
+    if name in known_effects(asked.on.effect_files):
+        raise InputError(f"effect {name} exists already", hint="give the draft another file name")
+    found = diagnose(
+        asked.model,
+        asked.readings,
+        plan_next=False,
+        files=asked.files,
+        command=asked.asked.command("diagnose", *options(seed=seed or None)),
+        asked=asked.asked,
+        progress=teller(progress),
+        **asked.common,
+    )
+    drafted = draft(found, str(file))
+    return EffectDraft(name, drafted, Diagnosis(found, asked.inputs), next_of_draft(asked.asked, str(file)))
+
+
+def effect_name(file: str | Path) -> str:
+    """The name of the effect that a file is to hold: the file's own, without the ending."""
+    path = Path(file)
+    if path.suffix != ".py" or not path.stem.isidentifier():
+        raise InputError(f"{str(file)!r} cannot hold an effect", expected="a name such as my_screw.py")
+    return path.stem
+
+
+def next_of_draft(asked: Asked, file: str) -> list[str]:
+    """What to do with a drafted file, as hints."""
+    return [
+        hint("read it, change it, then try it", command_line("effects", "check", file)),
+        hint("let it compete with the catalogue", asked.command("diagnose", effects=[file])),
+        hint("measure where it would show, or fail", asked.command("plan", effects=[file])),
+    ]

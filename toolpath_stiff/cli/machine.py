@@ -311,6 +311,7 @@ examples:
   tps effects list
   tps effects show platform_flexibility
   tps effects new my_screw.py            a working effect to change into yours
+  tps effects draft measurements.csv -o missing.py   what a diagnosis leaves unexplained, as an effect to edit
   tps effects check my_screw.py          shapes, symmetry, units, neutral value, speed; exit code 1 if it fails
   tps effects list --effects my_screw.py
 
@@ -320,9 +321,11 @@ Machine files carry effects as [[effect]], those that act on readings as [[instr
 
 def effects_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    from toolpath_stiff.cli.measurements import add_data_arguments, add_noise_arguments
+
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EFFECTS_EPILOG
-    actions = parser.add_subparsers(dest="action", metavar="list|show|new|check", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="list|show|new|draft|check", required=True)
     listing = actions.add_parser("list", help="all effects, in the order of the load path")
     showing = actions.add_parser("show", help="equation, parameters, units, bounds, typical values and their source")
     showing.add_argument("name", metavar="NAME", help="name of the effect")
@@ -338,13 +341,25 @@ def effects_arguments(parser: argparse.ArgumentParser) -> None:
     writing = actions.add_parser("new", help="write a commented, working example of an effect")
     writing.add_argument("file", metavar="FILE.py", help="file to write")
     add_replace_option(writing)
+    drafting = actions.add_parser("draft", help="write what a diagnosis leaves unexplained as an effect to edit")
+    add_data_arguments(drafting)
+    add_noise_arguments(drafting)
+    drafting.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
+    drafting.add_argument("-o", "--output", default="missing.py", metavar="FILE.py", help="default: missing.py")
+    add_replace_option(drafting)
+    add_json_option(drafting, "print the draft as JSON")
 
 
 def effects(args: argparse.Namespace) -> int:
     """List, show, check or write."""
-    return {"list": _effects_list, "show": _effects_show, "check": _effects_check, "new": _effects_new}[args.action](
-        args
-    )
+    action = {
+        "list": _effects_list,
+        "show": _effects_show,
+        "check": _effects_check,
+        "new": _effects_new,
+        "draft": _effects_draft,
+    }[args.action]
+    return action(args)
 
 
 def _effects_list(args: argparse.Namespace) -> int:
@@ -376,15 +391,34 @@ def _effects_check(args: argparse.Namespace) -> int:
 
 def _effects_new(args: argparse.Namespace) -> int:
     """Write the example effect, named after its file."""
-    from toolpath_stiff.api.effects import effect_template
+    from toolpath_stiff.api.effects import effect_name, effect_template
 
-    target = Path(args.file)
-    if target.suffix != ".py" or not target.stem.isidentifier():
-        raise InputError(f"{args.file!r} cannot hold an effect", expected="a name such as my_screw.py")
+    name = effect_name(args.file)
     keep(check_new(args, args.file))
-    effect_template(target.stem).save(target)
-    line = command_line("effects", "show", target.stem, *options(effects=args.file))
+    effect_template(name).save(args.file)
+    line = command_line("effects", "show", name, *options(effects=args.file))
     print(f"wrote {args.file}\n{hint('read it back', line)}")
+    return 0
+
+
+def _effects_draft(args: argparse.Namespace) -> int:
+    """Diagnose, write what is left as an effect. That there is nothing to write is an answer as well."""
+    from toolpath_stiff.api.effects import draft_effect
+    from toolpath_stiff.cli.measurements import measured, noise_options
+
+    check_written(args, [args.output])
+    replaced = check_new(args, args.output)
+    with progress_line(quiet=args.json) as progress:
+        found = draft_effect(*measured(args), args.output, **noise_options(args), progress=progress)
+    if found.text:
+        keep(replaced, quiet=args.json)
+        found.save(args.output)
+    if args.json:
+        sys.stdout.write(found.to_json())
+    elif not found.text:
+        print(found.reason)
+    else:
+        print("\n".join([found.diagnosis.to_dict()["portrait"]["text"], f"wrote {args.output}", *found.next]))
     return 0
 
 

@@ -197,9 +197,10 @@ examples:
   tps diagnose nist-table1 --noise 5
   tps diagnose first.csv second.csv --effects my_effect.py --out reports/again
 
-The verdict: adequate (nothing is missing that these data could show), identified, ambiguous (several explain the data
-equally well), unexplained (something is missing that no effect of the catalogue describes). Files written to --out:
-diagnose.json, residuals.csv, ladder.png, confounding.png, detectable.png, before_after.png, envelope.png,
+The verdict: adequate (nothing is missing that these data could show), identified, described (by an effect whose form
+was read off these very readings), ambiguous (several explain the data equally well), unexplained (something is missing
+that no effect of the catalogue describes). Files written to --out:
+diagnose.json, residuals.csv, ladder.png, portrait.png, confounding.png, detectable.png, before_after.png, envelope.png,
 report.html.
 """
 

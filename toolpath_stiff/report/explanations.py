@@ -26,6 +26,7 @@ AS_GIVEN = "as given"
 HEADLINES = {
     "adequate": "Nothing is missing that these data could show",
     "identified": "One explanation is far likelier than any other",
+    "described": "One description fits, read off these very readings: new ones must confirm it",
     "ambiguous": "These data cannot tell several explanations apart",
     "unexplained": "Something is missing, and nothing in the catalogue accounts for it",
 }
@@ -214,9 +215,10 @@ def headline(document: DiagnosisDocument) -> str:
     if document.get("question"):
         return plain(str(document["question"]))
     verdict = str(document.get("verdict") or "-")
-    cause = str((best_explanation(document) or {}).get("finding") or "") if verdict == "identified" else ""
-    if cause:
-        return plain(cause[0].upper() + cause[1:])
+    cause = str((best_explanation(document) or {}).get("finding") or "")
+    if cause and verdict in ("identified", "described"):
+        said = " (described, not confirmed)" if verdict == "described" else ""
+        return plain(cause[0].upper() + cause[1:] + said)
     standing = explanations(document)
     if verdict == "ambiguous" and len(standing) == 1:
         return plain(f"{standing[0]} is likeliest, but something else is not ruled out")
@@ -267,10 +269,12 @@ def text(document: DiagnosisDocument) -> str:
         As in `diagnose.json`.
     """
     verdict = str(document.get("verdict") or "-")
+    portrait = document.get("portrait")
     lines = [
         *_entry("data", _data(document)),
         *_entry("verdict", f"{verdict.upper()}. {document.get('text') or ''}"),
         *_listed("why", entries(document, "why")),
+        *_listed("portrait", [portrait["text"]] if portrait else []),
         *_entry("error", _error(document)),
         "",
         *_table(document),

@@ -144,6 +144,9 @@ SENTENCES = {
 }
 
 
+ENDS = {"identified": "nothing else fits", "described": "described, not confirmed: new readings must tell"}
+
+
 def verdict(session: Session) -> dict[str, Any] | None:
     """What the diagnosis says; None while there is none for these readings."""
     found = session.found("diagnose")
@@ -152,8 +155,8 @@ def verdict(session: Session) -> dict[str, Any] | None:
     said = found["document"]
     best = next((one for one in said["candidates"] if one["effect"] == said["best"]), None)
     names = said["plausible"]
-    if said["verdict"] == "identified" and best and best["finding"]:
-        sentence = f"{best['finding'][0].upper()}{best['finding'][1:]}; nothing else fits"
+    if said["verdict"] in ENDS and best and best["finding"]:
+        sentence = f"{best['finding'][0].upper()}{best['finding'][1:]}; {ENDS[said['verdict']]}"
     elif said["verdict"] in SENTENCES:
         sentence = SENTENCES[said["verdict"]]
     else:

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, envelope_png, ladder_png
+from toolpath_stiff.report.diagnose.portrait import portrait_png, portrait_section
 from toolpath_stiff.report.explanations import (
     HEADLINES,
     best_explanation,
@@ -54,6 +55,11 @@ QUESTIONS = {
         "Every effect is fitted together with the strut law. The error at points that the fit has not seen falls only "
         "if the effect carries over from point to point; the noise floor is what scatter alone would leave.",
     ),
+    "portrait.png": (
+        "What does the missing thing look like?",
+        "Circles: what the model leaves of every reading, over what the missing thing varies with; dots: what is left "
+        "with the description. Bars: how probable each link of the load path and each variable is.",
+    ),
     "before_after.png": (
         "Where does the model fail, and what is left?",
         f"{DEVIATION}, {MINUS_IS_SOFTER} (red); blue: stiffer. A pattern points to physics, colours sprinkled at "
@@ -92,6 +98,8 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
     sections = [
         section("Why", bullets(entries(document, "why"))),
         picture("ladder.png", pictures, QUESTIONS),
+        section("What the missing thing looks like", portrait_section(document)),
+        picture("portrait.png", pictures, QUESTIONS),
         section("What the fits say", _candidates(document)),
         picture("before_after.png", pictures, QUESTIONS),
         picture("confounding.png", pictures, QUESTIONS),
@@ -124,12 +132,13 @@ def _figures(document: DiagnosisDocument) -> list[tuple[str, str]]:
     key = "mean_abs_error_percent"
     found = [(percent(figure_of(base.get("as_given"), key), 2), "mean error as given")]
     found.append((percent(figure_of(base, key), 2), "mean error, strut law refitted"))
-    if best is not None and document.get("verdict") in ("identified", "ambiguous"):
+    if best is not None and document.get("verdict") in ("identified", "described", "ambiguous"):
         found.append((percent(figure_of(best, key), 2), f"mean error with {name_text(best)}"))
         found.append((percent(figure_of(best, "held_out_error_percent"), 2), "the same at points left out"))
     found.append((floor_text(document), "would be left by scatter alone"))
     standing = explanations(document)
-    remark = "is the explanation" if len(standing) == 1 else "are left standing"
+    described = document.get("verdict") == "described"
+    remark = "are left standing" if len(standing) > 1 else "describes it" if described else "is the explanation"
     found.append((plausible_text(standing), remark) if standing else ("no effect", "of the catalogue is left standing"))
     return found
 
@@ -253,7 +262,7 @@ def _noise(document: DiagnosisDocument) -> Markup:
 def names(plots: bool = True) -> tuple[str, ...]:
     """Names of the files that `files` makes; a picture that has nothing to show is left out."""
     data = ("diagnose.json", "residuals.csv")
-    pictures = ("ladder.png", "confounding.png", "detectable.png", "before_after.png", "envelope.png")
+    pictures = ("ladder.png", "portrait.png", "confounding.png", "detectable.png", "before_after.png", "envelope.png")
     return (*data, *pictures, "report.html") if plots else data
 
 
@@ -270,6 +279,7 @@ def _pictures(document: DiagnosisDocument, diagnosis: Diagnosis) -> dict[str, Co
     """The pictures that have something to show, and the page with them."""
     pictures: dict[str, bytes | None] = {
         "ladder.png": ladder_png(document),
+        "portrait.png": portrait_png(document, diagnosis.data, diagnosis.portrait),
         "confounding.png": confounding_png(document),
         "detectable.png": detectable_png(document),
         "before_after.png": before_after_png(document, diagnosis.data, diagnosis.before, diagnosis.after),

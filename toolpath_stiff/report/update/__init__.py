@@ -88,7 +88,7 @@ def _headline(document: UpdateDocument) -> str:
         return f"Mean error {first['mean_abs_error_percent']:.2f} % as given, and nothing to add"
     if last["findings"] and document["verdict"] in ("updated", "forced"):
         cause = "; ".join(last["findings"])
-        return cause[0].upper() + cause[1:]
+        return cause[0].upper() + cause[1:] + (" (described, not confirmed)" if document["described"] else "")
     return f"Mean error {first['mean_abs_error_percent']:.2f} % as given, {last['mean_abs_error_percent']:.2f} % after"
 
 

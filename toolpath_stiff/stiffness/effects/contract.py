@@ -200,6 +200,9 @@ class Effect:
     unknown_to_control
         Of a geometry effect: whether the control computes with the geometry before it. The struts then get the
         lengths of the programmed pose on that geometry, and the platform goes where they put it.
+    described_from
+        Of an effect whose form was read off measurements: the marks of those readings (`measurements.reading_marks`).
+        A diagnosis of the same readings calls it `described`, not `identified`, until others confirm it.
 
     Examples
     --------
@@ -227,6 +230,7 @@ class Effect:
     needs: ClassVar[tuple[str, ...]] = ()
     load_dependent: ClassVar[bool] = False
     unknown_to_control: ClassVar[bool] = False
+    described_from: ClassVar[tuple[str, ...]] = ()
 
     def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
         """(n, 6) m/N in series with each strut. `p`: parameter name -> SI value."""

@@ -351,6 +351,9 @@ def check_declarations(effect: object, where: str) -> None:
             raise refuse(attribute, f"{attribute} = {getattr(effect, attribute)!r}", "True or False")
     if not isinstance(effect.needs, tuple | list) or not all(isinstance(name, str) for name in effect.needs):
         raise refuse("needs", f"needs = {effect.needs!r}", 'names of columns: ("time_min",)')
+    marks = effect.described_from
+    if not isinstance(marks, tuple | list) or not all(isinstance(one, str) for one in marks):
+        raise refuse("described_from", f"described_from = {marks!r:.60}", "marks of readings, a tuple of texts")
     if not isinstance(effect.parameters, tuple | list):
         raise refuse("parameters", f"parameters = {effect.parameters!r:.60}", "(Parameter(...), ...), with a comma")
     for i, parameter in enumerate(effect.parameters):

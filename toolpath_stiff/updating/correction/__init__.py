@@ -12,7 +12,8 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.model import build_model, setup_of
-from toolpath_stiff.updating.correction.ladder import Update, build_ladder, parse_addition
+from toolpath_stiff.updating.correction.additions import parse_addition
+from toolpath_stiff.updating.correction.ladder import Update, build_ladder
 from toolpath_stiff.updating.correction.machines import data_hash
 from toolpath_stiff.updating.correction.strut_law import BarCurve, StrutLawSearch, bar_curve, update_by_mean_error
 from toolpath_stiff.updating.measurements import Measurements
@@ -156,7 +157,9 @@ def check_mean_error(add: Sequence[str], strut_law: bool, auto: bool) -> None:
 
 def _provenance(update: Update, files: Sequence[str], command: str) -> dict[str, Any]:
     """Where the fitted values come from. No date: the same data and command give the same bytes."""
+    described = {} if update.described is None else {"described": f"not confirmed: {update.described.reason}"}
     return {
+        **described,
         "data": list(files),
         "data_sha256": data_hash(files),
         "readings": len(update.data),

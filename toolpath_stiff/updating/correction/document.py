@@ -104,6 +104,7 @@ class UpdateDocument(TypedDict):
     strut_law_refitted: RoundedErrors
     steps: list[StepEntry]
     support: list[SupportEntry]
+    described: list[str]  # effects whose form was read off these readings, and that no others have confirmed
     turned_down: list[SupportEntry]
     noise_percent: float | None
     noise_floor_percent: float | None
@@ -139,6 +140,7 @@ def document(correction: Correction) -> UpdateDocument:
         "strut_law_refitted": rounded_errors(update.refitted.fit.residual),
         "steps": steps,
         "support": [_support(one) for one in update.supports],
+        "described": [] if update.described is None else list(update.described.names),
         "turned_down": [_support(one) for one in update.turned_down],
         "noise_percent": json_number(100.0 * update.noise.typical),
         "noise_floor_percent": json_number(update.noise.floor_percent),
@@ -203,11 +205,17 @@ def _text(update: Update, verdict: str) -> str:
         return f"{asked}{said} (--force writes it all the same.) {errors}"
     if verdict == FORCED:
         said = f" ({against})" if against else ""
-        return f"{asked}Added by force, although the data do not support it{said}. {errors}"
+        return f"{asked}Added by force, although the data do not support it{said}. {_unconfirmed(update)}{errors}"
     if not fit.names:
         return f"Strut law refitted; no effect added. {errors}"
     cause = joined(fit.findings)
-    return f"{cause[:1].upper()}{cause[1:]} ({joined(fit.names)} added). {errors}"
+    word = "added" if update.described is None else "added as described, not as identified"
+    return f"{cause[:1].upper()}{cause[1:]} ({joined(fit.names)} {word}). {_unconfirmed(update)}{errors}"
+
+
+def _unconfirmed(update: Update) -> str:
+    """Of effects whose form was read off these readings: that, and what the others say; "" where there are none."""
+    return "" if update.described is None else f"But {update.described.reason}. "
 
 
 def _errors(update: Update) -> str:

@@ -20,7 +20,7 @@ from toolpath_stiff.hints import Asked
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
 from toolpath_stiff.stiffness.model import build_model, setup_of
-from toolpath_stiff.updating.inference import NONE, Judgement, judge
+from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, refine
@@ -32,6 +32,7 @@ from toolpath_stiff.updating.planning import plan_measurements
 from toolpath_stiff.updating.planning.document import plan_rows
 from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
+from toolpath_stiff.updating.portrait import Portrait, draw_portrait
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc import Program
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare
 
 
@@ -68,8 +70,11 @@ class Diagnosis:
         For the record, and for the commands that go on from here.
     next_measurements, remarks
         Where the verdict is `ambiguous`: rows of a plan that would tell the explanations apart; what it cannot do.
+        Where it is `described`: of a plan that would confirm it.
     path
         How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
+    portrait
+        What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
     """
 
     verdict: str
@@ -94,6 +99,7 @@ class Diagnosis:
     next_measurements: tuple[dict[str, Any], ...] = ()
     remarks: tuple[str, ...] = ()
     path: dict[str, Any] | None = None
+    portrait: Portrait | None = None
 
     @property
     def noise(self) -> Noise:
@@ -111,7 +117,7 @@ class Diagnosis:
 
         One alone where one is the answer.
         """
-        most = 1 if self.verdict == "identified" else None
+        most = 1 if self.verdict in NAMING else None
         return tuple(dict.fromkeys(name for one in self.judgements.values() for name in one.explanations[:most]))
 
     @property
@@ -205,14 +211,14 @@ def diagnose(
     """
     say = progress or (lambda text: None)
     found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(files), say)
-    found = replace(found, command=command, asked=asked)
-    if found.verdict != "ambiguous":
+    found = replace(found, command=command, asked=asked, portrait=portrait_of(found, say))
+    if found.verdict not in ("ambiguous", "described"):
         return found
     if plan_next:
         say("planning the next measurements")
         rows, remarks = next_measurements(found, seed=seed)
         found = replace(found, next_measurements=tuple(rows), remarks=tuple(remarks))
-    if program is not None:
+    if program is not None and found.verdict == "ambiguous":
         of_machine = found.predictor.base.conditions
         conditions = Conditions(
             of_machine.setup if setup is None else setup, of_machine.temperature if temperature is None else temperature
@@ -271,10 +277,34 @@ def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...
     plausible = tuple(dict.fromkeys(name for judgement in judgements for name in judgement.plausible))
     if len(verdicts) == 1:
         verdict = verdicts.pop()
-        if verdict == "identified" and any(set(j.plausible) != set(judgements[0].plausible) for j in judgements):
-            verdict = "ambiguous"
-        return verdict, plausible
+        return verdict if verdict not in NAMING or _same(judgements) else "ambiguous", plausible
+    if verdicts == set(NAMING) and _same(judgements):
+        return "described", plausible
     return "ambiguous", plausible if plausible else (NONE,)
+
+
+def _same(judgements: Sequence[Judgement]) -> bool:
+    """Whether all of them name the same effects."""
+    return len({frozenset(judgement.plausible) for judgement in judgements}) == 1
+
+
+def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | None:
+    """What the missing thing looks like: of unexplained readings, and of what the best explanation leaves behind.
+
+    None where nothing stands out of what is left, and where the readings do not look as if they were of this machine.
+    """
+    main, verdict = diagnosis.main, diagnosis.verdict
+    if main.question or verdict == "adequate":
+        return None
+    base = main.base
+    if verdict != "unexplained":
+        gate = main.gates.get(diagnosis.best or "")
+        if diagnosis.best is None or gate is None or gate.probability > FALSE_ALARM:
+            return None
+        base = diagnosis.fits[diagnosis.best]
+    say("describing what is missing")
+    found = draw_portrait(main.problem, base, diagnosis.noise, diagnosis.seed, main.base_gate.worst)
+    return found if found.terms or verdict == "unexplained" else None
 
 
 # -- what next ---------------------------------------------------------------------------------------------------------
@@ -290,11 +320,11 @@ def next_measurements(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
 
-    Empty unless the verdict is `ambiguous`: there is nothing to tell apart.
+    Of an answer that is only `described`, what would confirm it. Empty with any other verdict than these two.
     """
     # Under several noise models the most demanding one that leaves rivals: a plan for it serves the others, too.
-    open_ones = [j for j in diagnosis.judgements.values() if j.verdict == "ambiguous"]
-    if diagnosis.verdict != "ambiguous" or not open_ones:
+    open_ones = [j for j in diagnosis.judgements.values() if j.verdict == diagnosis.verdict]
+    if diagnosis.verdict not in ("ambiguous", "described") or not open_ones:
         return [], []
     judgement = open_ones[-1]
     rivals = rivals_of(judgement)

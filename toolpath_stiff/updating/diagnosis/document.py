@@ -12,12 +12,14 @@ from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import json_number, mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
-from toolpath_stiff.updating.diagnosis.words import assumptions, next_steps, row_words, verdict_text, why
+from toolpath_stiff.updating.diagnosis.words import assumptions, next_steps, row_words, unconfirmed, verdict_text, why
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
 from toolpath_stiff.updating.inference.candidates import Component
+from toolpath_stiff.updating.inference.drawn import DrawnEntry
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
+from toolpath_stiff.updating.portrait.document import PortraitEntry, portrait_entry
 
 FloatArray = NDArray[np.float64]
 
@@ -189,6 +191,7 @@ class DiagnosisDocument(TypedDict):
     verdict: str
     text: str
     question: str
+    drawn: DrawnEntry | None
     baseline: BaselineEntry
     candidates: list[CandidateEntry]
     pairs: list[PairEntry]
@@ -205,6 +208,7 @@ class DiagnosisDocument(TypedDict):
     detectable: list[DetectableEntry]
     confounding: ConfoundingEntry
     path: dict[str, Any] | None
+    portrait: PortraitEntry | None
     assumptions: list[str]
     warnings: list[str]
     notes: list[str]
@@ -223,6 +227,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "verdict": diagnosis.verdict,
         "text": verdict_text(diagnosis),
         "question": main.question,
+        "drawn": None if (drawn := unconfirmed(diagnosis) or main.drawn) is None else drawn.document,
         "baseline": _baseline(diagnosis),
         "candidates": _candidates(diagnosis),
         "pairs": _pairs(diagnosis),
@@ -256,6 +261,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
             "threshold": CONFOUNDED,
         },
         "path": diagnosis.path,
+        "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": list(diagnosis.data.notes),

@@ -11,6 +11,7 @@ from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 from toolpath_stiff.updating.inference.candidates import EXPECTED
+from toolpath_stiff.updating.inference.drawn import Drawn
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
 from toolpath_stiff.updating.inference.fits import errors_text
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED
@@ -25,6 +26,13 @@ def verdict_text(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "identified":
         best = diagnosis.explanations[0]
         return f"{_capital(_cause(diagnosis, best))}. Mean error: {_errors(diagnosis, best)}."
+    if diagnosis.verdict == "described":
+        best, drawn = diagnosis.explanations[0], unconfirmed(diagnosis)
+        assert drawn is not None
+        return (
+            f"{_capital(_cause(diagnosis, best))}. This describes the readings, and does not explain them yet: "
+            f"{drawn.reason}. Mean error: {_errors(diagnosis, best)}."
+        )
     if diagnosis.verdict == "ambiguous":
         if _noise_decides(diagnosis):
             parts = [
@@ -43,6 +51,12 @@ def verdict_text(diagnosis: Diagnosis) -> str:
         + (f" What is left forms a pattern {form}." if form else "")
         + _closest(diagnosis)
     )
+
+
+def unconfirmed(diagnosis: Diagnosis) -> Drawn | None:
+    """How an answer that is only `described` stands, under the noise model that confirms it least."""
+    found = [judgement.drawn for judgement in diagnosis.judgements.values() if judgement.verdict == "described"]
+    return next((drawn for drawn in found if drawn is not None), None)
 
 
 def _closest(diagnosis: Diagnosis) -> str:
@@ -110,6 +124,8 @@ def why(diagnosis: Diagnosis) -> list[str]:
         return found
     for judgement in diagnosis.judgements.values():
         found.append(_base_text(judgement, len(diagnosis.judgements) > 1))
+    if diagnosis.verdict == "identified" and main.drawn is not None:
+        found.append(main.drawn.reason)
     if diagnosis.verdict == "ambiguous":
         found += _confounded(diagnosis)
     if diagnosis.verdict == "unexplained" and not main.question:
@@ -180,6 +196,13 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
             return [hint(f"{joined(bounded)} ends at its bound: measure more before adding it", asked.command("plan"))]
         own = [*options(add=names), "-o", asked.updated_machine]
         return [hint("add it" if len(names) == 1 else "add them", asked.command("update", *own))]
+    if diagnosis.verdict == "described":
+        names = diagnosis.explanations[0].split(" + ")
+        own = [*options(add=names), "-o", asked.updated_machine]
+        return [
+            hint("measure where it would show, or fail", asked.command("plan")),
+            hint("add it all the same, as described", asked.command("update", *own)),
+        ]
     if diagnosis.verdict == "ambiguous":
         found = [hint("measure what tells them apart", asked.command("plan"))]
         if len(diagnosis.judgements) > 1:
@@ -191,12 +214,16 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
             hint("see which readings are how far off", asked.command("compare")),
         ]
     if diagnosis.verdict == "unexplained":
-        file = asked.new_effect
-        return [
-            hint("look where the residuals lie", asked.command("compare")),
-            hint("write the effect that you suspect as one file", command_line("effects", "new", file)),
-            hint("and try it", asked.command("diagnose", effects=[file])),
-        ]
+        found = [hint("look where the residuals lie", asked.command("compare"))]
+        if diagnosis.portrait is not None and any(one.term.acts for one in diagnosis.portrait.terms):
+            file = asked.new_effect("missing")
+            found.append(
+                hint("write what it looks like as an effect to edit", asked.command("effects draft", "-o", file))
+            )
+        else:
+            file = asked.new_effect()
+            found.append(hint("write the effect that you suspect as one file", command_line("effects", "new", file)))
+        return [*found, hint("and try it", asked.command("diagnose", effects=[file]))]
     return ["use the model; `detectable` lists what could still be there unseen"]
 
 

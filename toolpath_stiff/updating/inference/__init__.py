@@ -19,6 +19,7 @@ posterior probabilities decide; only a name far ahead of all others is given as 
 
 adequate      nothing is missing that these data could show
 identified    one effect (or one pair) explains the data, far likelier than any other
+described     the same, but its form was read off these very readings, and no others have confirmed it (`drawn`)
 ambiguous     several explain them, and none is far likelier than the others
 unexplained   something is missing, and nothing in the catalogue accounts for it; or the readings do not look as if
               they were of this machine at all (`question`)
@@ -34,6 +35,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.inference.candidates import EXPECTED
+from toolpath_stiff.updating.inference.drawn import Drawn, drawn
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.fits import refine
 from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
@@ -95,6 +97,8 @@ class Judgement:
         The form of discrepancy that stands out, in words; "" if none was looked for.
     question
         Whether these are readings of this machine, and why it is asked; "" where nothing says that they are not.
+    drawn
+        How the answer stands if its form was read off these readings; None otherwise.
     """
 
     verdict: str
@@ -110,6 +114,7 @@ class Judgement:
     probability: dict[str, float]
     form: str
     question: str = ""
+    drawn: Drawn | None = None
 
     @property
     def plausible(self) -> tuple[str, ...]:
@@ -139,9 +144,13 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     weighed = weigh(problem, noise, candidates, gates)
     asked = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
+    described = None
+    if verdict == "identified":
+        described = drawn(fits.made[explanations[0]], {NONE: candidates.base, **fits.made}, problem.predictor.data)
+        verdict = verdict if described is None or described.confirmed else "described"
     return Judgement(
         verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked,
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, described,
     )  # fmt: skip
 
 

@@ -118,7 +118,7 @@ class Predictor:
         except InputError:  # no pose, or no stiffness left: a fit walks away from there
             return np.full(len(self), np.nan)
         if model.instruments:
-            path = replace(self._full_path(), machine=model.machine)
+            path = replace(self.full_path(), machine=model.machine)
             for active in model.instruments:
                 stiffness = active.reading(stiffness, path)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -133,7 +133,7 @@ class Predictor:
         path = replace(prepared.path, machine=model.machine) if same_geometry else measured_path(model, prepared.data)
         return np.asarray(1.0 / exact.compliance_along(model, path, prepared.data.direction))
 
-    def _full_path(self) -> LoadPath:
+    def full_path(self) -> LoadPath:
         """What instruments see of every row."""
         prepared = self._timeless
         path = prepared.path.take(prepared.which)

@@ -464,6 +464,8 @@ def _rivals_after(
     if judgement is None:
         judgement = judge(problem, scatter, testable_effects(problem.predictor)[0], seed)
     verdict = judgement.verdict
-    if verdict != "ambiguous":
+    if verdict == "described":
+        notes.append("the answer is only described: the plan goes where it would show, or fail")
+    elif verdict != "ambiguous":
         notes.append(f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next")
     return rivals_of(judgement), verdict, scatter, problem, notes

@@ -1,0 +1,146 @@
+"""A drafted effect file: its text against the term that it was made of, on random poses, and what it declares."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness.effects import effects_from_file
+from toolpath_stiff.stiffness.effects.contract import Effect
+from toolpath_stiff.stiffness.effects.trial import try_effect
+from toolpath_stiff.stiffness.model import build_model, load_path
+from toolpath_stiff.updating.drafting import Description, Origin, draft_source, effect_names
+from toolpath_stiff.updating.portrait.terms import Term, effect_of
+
+ORIGIN = Origin(
+    ("data.csv",), "24" * 32, 12, "nist", ("0123456789",) * 12, "tps effects draft data.csv", ("a", "b", "c")
+)
+LINE, RAMP = (("start", -0.11), ("end", 0.17)), (("start", 0.71), ("end", 1.13))
+ABOVE, BELOW = (("edge", 0.02), ("side", 1.0)), (("edge", 0.013), ("side", -1.0))
+FALLING = (("power", -1.0 / 3.0), ("reference", 500.0))
+STRUT = "along the struts"
+TERMS = [
+    Term("table", "Y", "y", "slope", "give", at=LINE),
+    Term("table", "all", "constant", "offset", "give"),
+    Term("table", "radial", "radius", "square", "give", at=(("centre", 0.03), ("reach", 0.2))),
+    Term("table", "tangential", "setup", "offset", "give", column="it's \"here\""),
+    Term("table", "X", "x", "bump", "give", at=(("centre", -0.05), ("width", 0.08))),
+    Term("table", "Z", "z", "periodic", "give", at=(("period", 0.1), ("crest", 0.82))),
+    Term("table", "all", "load", "slope", "rocking", at=FALLING),
+    Term("table", "tangential", "x", "sign", "rocking", at=(("side", -1.0),)),
+    Term("tool", "radial", "tilt", "slope", "give", at=(("start", 0.01), ("end", 0.2))),
+    Term("tool", "axial", "tilt", "threshold", "give", at=ABOVE, column="X"),
+    Term("platform", "all", "time", "slope", "give", at=(("start", 0.0), ("end", 1800.0))),
+    Term("platform", "X", "y", "threshold", "tilting", at=BELOW),
+    Term("frame", "radial", "constant", "offset", "vertex", where=2),
+    Term("frame", "tangential", "y", "slope", "vertex", at=LINE),
+    Term("frame", "Z", "temperature", "slope", "vertex", where=1, at=(("start", 18.0), ("end", 24.0))),
+    Term("frame", STRUT, "x", "threshold", "vertex", at=BELOW),
+    Term("platform", "axial", "z", "slope", "vertex", where=3, at=RAMP),
+    Term("joints", STRUT, "strut force", "slope", "strut", at=FALLING),
+    Term("struts", STRUT, "strut length", "slope", "strut factor", at=(("start", 2.5), ("end", 3.2))),
+    Term("one strut", STRUT, "force sign", "sign", "strut factor", where=5, at=(("side", -1.0),)),
+    Term("one strut", STRUT, "temperature", "slope", "strut factor", where=3, at=(("start", 20.0), ("end", 25.0))),
+    Term("one strut", STRUT, "strut length", "threshold", "strut", where=4, at=(("edge", 2.7), ("side", 1.0))),
+    Term("struts", STRUT, "strut force", "threshold", "strut", at=(("edge", 150.0), ("side", -1.0))),
+    Term("joints", STRUT, "load", "threshold", "strut", at=(("beyond", 500.0),)),
+    Term("struts", STRUT, "z", "bump", "strut", at=(("centre", 0.9), ("width", 0.1))),
+    Term("struts", STRUT, "constant", "offset", "coupling", at=(("first", 2.0), ("second", 5.0))),
+    Term("frame", STRUT, "y", "slope", "coupling", at=(*LINE, ("first", 1.0), ("second", 2.0))),
+    Term("joints", "X", "constant", "offset", "joint offset", where=6, column="platform"),
+    Term("joints", "Z", "constant", "offset", "joint offset", where=1, column="frame"),
+    Term("instrument", "X", "x", "slope", "reading factor", at=(("start", 0.0), ("end", 0.3))),
+    Term("instrument", "all", "time", "slope", "reading factor", at=(("start", 0.0), ("end", 7200.0))),
+    Term("instrument", "reading", "load", "slope", "reading shift", at=(("start", 0.0), ("end", 2000.0))),
+]  # fmt: skip
+WORDS = "a long clause without an end, " * 5 + 'the "table" of C:\\new gives way """here"""'
+
+
+def written(tmp_path, *terms: Term) -> dict[str, Effect]:
+    """The effects of the file that is drafted from these terms."""
+    file = tmp_path / "missing.py"
+    text = draft_source(
+        "missing", Description(WORDS, terms, (WORDS,) * len(terms), ("9 nm/N",) * len(terms), (WORDS,)), ORIGIN
+    )
+    assert max(map(len, text.splitlines())) <= 120
+    file.write_text(text, encoding="utf-8")
+    return effects_from_file(file)
+
+
+@pytest.fixture(scope="module")
+def some_path():
+    """40 poses under loads, with everything that a term may depend on."""
+    rng, n = np.random.default_rng(3), 40
+    position = rng.uniform((-0.2, -0.2, 0.7), (0.2, 0.2, 1.2), (n, 3))
+    direction = rng.normal(size=(n, 3))
+    path = load_path(
+        build_model(load_machine("nist")), position, rotation_matrices(rng.uniform(-0.3, 0.3, (n, 3))), force=900.0,
+        direction=direction / np.linalg.norm(direction, axis=1, keepdims=True), time=rng.uniform(0.0, 3600.0, n),
+        temperature=rng.uniform(17.0, 26.0, n), setup=np.where(rng.random(n) < 0.5, "it's \"here\"", "elsewhere"),
+    )  # fmt: skip
+    return replace(path, force=rng.uniform(100.0, 4000.0, n), strut_forces=rng.normal(scale=400.0, size=(n, 6)))
+
+
+@pytest.mark.parametrize("term", TERMS, ids=lambda term: term.key)
+def test_text_and_term_give_the_same_numbers(term, some_path, tmp_path):
+    (drafted,), own = written(tmp_path, term).values(), effect_of(term)
+    parameter = drafted.parameters[0]
+    size = 0.6 * parameter.typical[1] * parameter.si
+    p, q = {parameter.name: size}, {"size": size}
+    for hook in ("strut_compliance", "load_compliance"):
+        mine, theirs = (getattr(one, hook)(some_path, values) for one, values in ((drafted, p), (own, q)))
+        assert (mine is None) == (theirs is None)
+        if theirs is not None:
+            assert np.abs(theirs).max() > 0.0
+            np.testing.assert_allclose(mine, theirs, rtol=1e-7, atol=1e-9 * np.abs(theirs).max())
+    if term.action == "joint offset":
+        machine = some_path.machine
+        mine, theirs = drafted.geometry(machine, p), own.geometry(machine, q)
+        np.testing.assert_array_equal(mine.frame_joints, theirs.frame_joints)
+        np.testing.assert_array_equal(mine.platform_joints, theirs.platform_joints)
+        assert not np.array_equal(
+            [mine.frame_joints, mine.platform_joints], [machine.frame_joints, machine.platform_joints]
+        )
+    stiffness = np.linspace(1e7, 9e7, len(some_path))
+    mine, theirs = drafted.reading(stiffness, some_path, p), own.reading(stiffness, some_path, q)
+    np.testing.assert_allclose(mine, theirs, rtol=1e-7)
+    assert np.any(theirs != stiffness) == drafted.is_instrument
+    for attribute in ("link", "needs", "load_dependent", "unknown_to_control"):
+        assert getattr(drafted, attribute) == getattr(own, attribute), attribute
+    theirs = own.parameters[0]
+    assert (parameter.unit, parameter.si, parameter.bounds) == (theirs.unit, theirs.si, theirs.bounds)
+
+
+@pytest.mark.parametrize("term", TERMS[::5], ids=lambda term: term.key)
+def test_a_draft_keeps_the_contract(term, tmp_path):
+    (drafted,) = written(tmp_path, term).values()
+    trial = try_effect(drafted, load_machine("nist"))
+    assert trial.passed, trial.outcomes
+
+
+def test_several_terms_are_one_effect_but_readings_and_geometry_have_their_own(tmp_path, some_path):
+    terms = (TERMS[0], TERMS[0], TERMS[20])
+    found = written(tmp_path, *terms)
+    assert list(found) == effect_names("missing", terms) == ["missing"]
+    (effect,) = found.values()
+    assert [p.name for p in effect.parameters] == ["table_y", "table_y_2", "strut_3"]
+    values = {p.name: p.typical[1] * p.si for p in effect.parameters}
+    own = effect_of(TERMS[0])
+    twice = own.load_compliance(some_path, {"size": 2.0 * values["table_y"]})
+    np.testing.assert_allclose(effect.load_compliance(some_path, values), twice)
+    assert effect.needs == ("temperature_C",)
+    three = [TERMS[0], *(next(t for t in TERMS if t.action == action) for action in ("joint offset", "reading factor"))]
+    names = effect_names("missing", three)
+    assert names == ["missing", "missing_geometry", "missing_reading"]
+    several = written(tmp_path / "..", *three)
+    assert list(several) == names
+    assert all(effect.described_from == ORIGIN.marks for effect in several.values())
+
+
+def test_the_same_gives_the_same_bytes():
+    description = Description(WORDS, (TERMS[0],), (WORDS,), ("9 nm/N",))
+    assert draft_source("missing", description, ORIGIN) == draft_source("missing", description, ORIGIN)

@@ -1,0 +1,151 @@
+"""The portrait of what is missing: terms are physics, the dictionary finds them, a sound machine gets none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolpath_stiff import rig
+from toolpath_stiff.machine import load_machine
+from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.noise import noise_models
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.measurements import read_measurements
+from toolpath_stiff.updating.portrait import Portrait, draw_portrait
+from toolpath_stiff.updating.portrait.columns import Ground
+from toolpath_stiff.updating.portrait.dictionary import crossed, dictionary_of
+from toolpath_stiff.updating.portrait.document import portrait_entry
+from toolpath_stiff.updating.portrait.terms import LINKS, SHAPES, VARIABLES, Term, effect_of
+from toolpath_stiff.updating.portrait.words import term_words
+
+
+@cache
+def sound(seed: int, folder: str) -> Predictor:
+    """A campaign of the rig on a machine that hides nothing."""
+    rows, _ = rig.make_case(seed, layout="tilted", hidden="none")
+    file = Path(folder) / f"sound_{seed}.csv"
+    file.write_text(rig.csv_text(rows), encoding="utf-8")
+    nist = load_machine("nist")
+    found = Predictor(nist, read_measurements(file, nist))
+    found.joint_columns()
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return str(tmp_path_factory.mktemp("portrait"))
+
+
+def forces(predictor: Predictor) -> np.ndarray:
+    """(n, 6) strut forces per unit load, of J^T f = w solved here."""
+    struts = predictor.full_path().struts
+    jacobian = np.concatenate([struts.directions, np.cross(struts.arms, struts.directions)], axis=-1)
+    wrench = np.concatenate([predictor.data.direction, np.zeros_like(predictor.data.direction)], axis=1)
+    return np.linalg.solve(np.swapaxes(jacobian, 1, 2), wrench[..., None])[..., 0]
+
+
+def portrait_with(predictor: Predictor, added: np.ndarray) -> Portrait:
+    """The portrait of the same campaign on a machine with more compliance (n,), m/N."""
+    compliance = np.exp(-predictor.log_stiffness())
+    data = replace(predictor.data, stiffness=predictor.data.stiffness * compliance / (compliance + added))
+    with_more = Predictor(predictor.machine, data)
+    noise = noise_models(data)[-1]
+    problem = Problem.of(with_more, noise)
+    return draw_portrait(problem, problem.score_base(), noise, seed=0)
+
+
+def test_every_term_is_the_effect_that_it_says(folder):
+    # The dictionary's columns are sums of squared forces; the effect goes through the exact route.
+    predictor = sound(1, folder)
+    base = predictor.log_stiffness()
+    compliance = np.exp(-base)
+    ground = Ground(predictor, compliance, np.zeros(2))
+    dictionary = dictionary_of(ground)
+    acting = [i for i, e in enumerate(dictionary.entries) if e.term.acts and e.term.action != "joint offset"]
+    chosen = np.random.default_rng(0).choice(acting, 40, replace=False)
+    assert len({dictionary.entries[i].term.action for i in chosen}) > 5
+    for i in chosen:
+        term = dictionary.entries[i].term
+        size = 0.01 / dictionary.scale[i]
+        whole = predictor.log_stiffness(effects=[ActiveEffect(effect_of(term), {"size": size})])
+        np.testing.assert_allclose(np.exp(-whole), compliance + size * ground.column(term), rtol=1e-11)
+
+
+def test_the_dictionary_speaks_the_agreed_words(folder):
+    dictionary = dictionary_of(Ground(sound(1, folder), np.exp(-sound(1, folder).log_stiffness()), np.zeros(2)))
+    terms = [entry.term for entry in dictionary.entries]
+    assert {t.link for t in terms} == set(LINKS)
+    assert {t.variable for t in terms} <= set(VARIABLES)
+    assert {t.shape for t in terms} <= set(SHAPES)
+    assert len({t.key for t in terms}) == len(terms)
+    assert np.exp(dictionary.log_prior).sum() <= 1.0 + 1e-9
+    np.testing.assert_allclose(np.sqrt((dictionary.columns**2).mean(axis=1)), 1.0)
+
+
+def test_what_can_only_give_has_no_negative_size_and_factors_leave_a_stiffness():
+    give = Term("table", "Y", "y", "slope", "give", at=(("start", -0.4), ("end", 0.4)))
+    assert effect_of(give).parameters[0].bounds[0] == 0.0
+    factor = Term("one strut", "along the struts", "constant", "offset", "strut factor", where=2)
+    assert -100.0 < effect_of(factor).parameters[0].bounds[0] < 0.0
+
+
+def test_no_effect_sees_the_order_of_the_readings():
+    term = Term("one strut", "along the struts", "order", "slope", "strut factor", 2, (("start", 0.0), ("end", 1.0)))
+    assert not term.acts
+    with pytest.raises(ValueError, match="order"):
+        effect_of(term)
+
+
+def test_a_table_that_gives_way_towards_one_side_is_recognised(folder):
+    # A smooth step that no shape of the dictionary is.
+    predictor = sound(1, folder)
+    y = predictor.data.position[:, 1]
+    found = portrait_with(predictor, 6e-9 * predictor.data.direction[:, 1] ** 2 * (1.0 + np.tanh(y / 0.08)))
+    entry = portrait_entry(found)
+    assert "table" in [one["link"] for one in entry["links"]]
+    assert [one["variable"] for one in entry["variables"]] == ["y"]
+    assert entry["terms"][0]["direction"] == "Y"
+    assert entry["held_out_rms_percent"] < 1.3 * entry["noise_floor_percent"]
+    assert entry["explained_percent"] > 90.0
+    assert entry["look_elsewhere"] < 0.01
+
+
+def test_a_strut_that_is_softer_in_tension_is_recognised(folder):
+    predictor = sound(2, folder)
+    own = forces(predictor)[:, 4]
+    stiffness = predictor.machine.strut_law.stiffness(predictor.full_path().struts.lengths[:, 4])
+    found = portrait_with(predictor, 0.5 * own**2 * (own > 0.0) / stiffness)
+    assert found.links[0][0] == "one strut"
+    assert found.terms[0].term.where == 5
+    assert found.variables[0][0] == "force sign"
+    low, high = found.terms[0].interval
+    assert low < 0.5 < high
+
+
+def test_a_sound_machine_has_no_description(folder):
+    found = portrait_with(sound(2, folder), np.zeros(288))
+    assert not found.terms
+    assert found.look_elsewhere > 0.01
+    assert portrait_entry(found)["terms"] == []
+    assert "No description" in portrait_entry(found)["text"]
+
+
+def test_the_same_readings_give_the_same_portrait(folder):
+    predictor = sound(1, folder)
+    added = 4e-9 * predictor.data.direction[:, 0] ** 2
+    assert portrait_entry(portrait_with(predictor, added)) == portrait_entry(portrait_with(predictor, added))
+
+
+def test_a_shape_is_tried_at_every_place_that_may_feel_it(folder):
+    predictor = sound(1, folder)
+    ground = Ground(predictor, np.exp(-predictor.log_stiffness()), np.zeros(2))
+    term = Term("table", "Y", "y", "bump", "give", at=(("centre", 0.1), ("width", 0.05)))
+    entries = crossed(term, ground)
+    assert {"table", "frame", "struts", "one strut", "instrument"} == {entry.local.link for entry in entries}
+    assert term in [entry.term for entry in entries]
+    assert all("y is about 100 mm" in term_words(entry.term) for entry in entries)

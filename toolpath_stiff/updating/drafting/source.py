@@ -1,0 +1,406 @@
+"""Terms of a portrait as source text: for each link, variable and shape a few lines of Python, and its formula.
+
+What `updating.portrait.terms` computes from a `Term`, these lines say for one term alone, so that an engineer can read
+and change them; a test holds both to the same numbers. Constants keep nine digits.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from toolpath_stiff.stiffness.effects.contract import Effect
+from toolpath_stiff.units import RAD_PER_DEG
+from toolpath_stiff.updating.portrait.terms import UNITS, Term, effect_of
+
+AXES = ("X", "Y", "Z")
+STRUCTURE, GEOMETRY, INSTRUMENT = "structure", "geometry", "instrument"
+HOOKS = {"strut": "strut_compliance", "strut factor": "strut_compliance", "joint offset": "geometry"}
+HOOKS |= {"reading factor": "reading", "reading shift": "reading"}
+LEAST_STRUT = 0.8  # share of its own compliance that a strut may lose at most, so that it keeps some
+MOST_COUPLED = 0.9  # of the mean of both compliances: beyond 1 the pair has none left
+LEAST_READ = 0.05  # of the deflection: less is never read
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One term as source text.
+
+    Attributes
+    ----------
+    term, words
+        The term, and what the portrait calls it.
+    parameter
+        Name of its size.
+    functions
+        Functions of the module: the share of the size at each pose, the loads of the link.
+    statements
+        Lines of the hook that adds it.
+    formula
+        What it adds, without its constants.
+    """
+
+    term: Term
+    words: str
+    parameter: str
+    functions: str
+    statements: tuple[str, ...]
+    formula: str
+
+    @property
+    def hook(self) -> str:
+        """Method of the effect that adds it."""
+        return HOOKS.get(self.term.action, "load_compliance")
+
+    @property
+    def kind(self) -> str:
+        """Which effect of the file it belongs to: readings and geometry have one of their own."""
+        return {"reading": INSTRUMENT, "geometry": GEOMETRY}.get(self.hook, STRUCTURE)
+
+    @property
+    def effect(self) -> Effect:
+        """The term as an effect, for what it declares."""
+        return effect_of(self.term)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """What the size may be, in the unit of files."""
+        return UNITS[self.term.action][2]
+
+    @property
+    def typical(self) -> tuple[float, float]:
+        """What is usual, in the unit of files."""
+        return UNITS[self.term.action][3]
+
+
+def pieces_of(terms: Sequence[Term], words: Sequence[str]) -> list[Piece]:
+    """Terms as source text, each with a parameter of its own name."""
+    taken: list[str] = []
+    found = []
+    for term, said in zip(terms, words, strict=True):
+        name = base = parameter_name(term)
+        while name in taken:
+            name = f"{base}_{sum(one.startswith(base) for one in taken) + 1}"
+        taken.append(name)
+        found.append(_piece(term, said, name))
+    return found
+
+
+def parameter_name(term: Term) -> str:
+    """What the size of a term is called: its link, which one, and its direction."""
+    if term.action == "coupling":
+        return f"coupling_{term.constants['first']:.0f}_{term.constants['second']:.0f}"
+    place = [f"strut_{term.where}" if term.link == "one strut" else f"{term.link} {term.where or ''}"]
+    if term.action == "joint offset":
+        place = [f"{term.column}_joint_{term.where}"]
+    if term.direction not in ("reading", "along the struts"):
+        place.append(term.direction)
+    if term.action in ("rocking", "tilting", "reading shift"):
+        place.append(term.action.removeprefix("reading "))
+    return re.sub(r"\W+", "_", " ".join(place).strip().lower()).strip("_")
+
+
+def number(value: float) -> str:
+    """A float literal of nine digits."""
+    return repr(float(f"{value:.9g}"))
+
+
+# -- variables ---------------------------------------------------------------------------------------------------------
+#
+# Variable -> its name in the file, how it is had from `path`, what it is.
+
+VARIABLES: Mapping[str, tuple[str, str, str]] = {
+    "x": ("x", "path.position[:, 0]", "m, X of the tool tip"),
+    "y": ("y", "path.position[:, 1]", "m, Y of the tool tip"),
+    "z": ("z", "path.position[:, 2]", "m, Z of the tool tip"),
+    "radius": ("radius", "np.hypot(path.position[:, 0], path.position[:, 1])", "m, of the tool tip from the Z axis"),
+    "tilt": (
+        "tilt",
+        "np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2])",
+        "rad, of the spindle from the vertical",
+    ),
+    "strut length": ("length", "path.struts.lengths", "(n, 6) m, of each strut"),
+    "strut force": ("force", "np.abs(path.strut_forces)", "(n, 6) N, size of the force in each strut"),
+    "force sign": ("force", "np.sign(path.strut_forces)", "(n, 6), 1 in tension, -1 in compression"),
+    "load": ("load", "path.force", "N, at the tool tip"),
+    "time": ("time", "path.time", "s since the indicator was zeroed"),
+    "temperature": ("temperature", "path.temperature", "degrees C"),
+}
+EACH_STRUT = ("strut length", "strut force", "force sign")
+# Variable -> unit of its constants in SI, in the workshop, and the SI value of one of the latter.
+CONSTANTS: Mapping[str, tuple[str, str, float]] = {
+    **dict.fromkeys(("x", "y", "z", "radius", "strut length"), ("m", "mm", 1e-3)),
+    "tilt": ("rad", "degrees", RAD_PER_DEG),
+    "time": ("s", "min", 60.0),
+    "temperature": ("degrees C", "degrees C", 1.0),
+    **dict.fromkeys(("strut force", "load"), ("N", "N", 1.0)),
+}
+MEANINGS = {
+    "start": "where it is nothing",
+    "end": "where it is as large as the size says",
+    "power": "of the variable",
+    "reference": "where it is as large as the size says",
+    "centre": "where it is {}",
+    "reach": "from there to where it is as large as the size says",
+    "width": "from there to where it is 0.61 of its most",
+    "edge": "on one side it is there, on the other not",
+    "beyond": "what friction holds",
+    "period": "from one crest to the next",
+    "crest": "where it is as large as the size says",
+}
+
+
+def _variable_lines(term: Term) -> list[str]:
+    """Lines that say what the variable is; none for what does not vary."""
+    if term.variable == "setup":
+        return [f"on = (path.setup == {term.column!r}).astype(float)  # 1 in this set-up"]
+    if term.variable == "tilt" and term.column:
+        axis = AXES.index(term.column)
+        return [f"tilt = np.arcsin(np.clip(path.rotation[:, {axis}, 2], -1.0, 1.0))  # rad, towards {term.column}"]
+    if term.variable not in VARIABLES:
+        return []
+    name, code, meaning = VARIABLES[term.variable]
+    lines = [f"{name} = {code}  # {meaning}"]
+    if term.variable == "tilt":
+        lines.insert(0, "axis = path.rotation[:, :, 2]  # the spindle's")
+    if term.variable in ("strut force", "force sign"):  # linear tensors have no direction of load
+        lines[:0] = [
+            "if path.strut_forces is None:  # no direction of the load, no forces",
+            "    return np.zeros((len(path), 6))",
+        ]
+    return lines
+
+
+def _variable_name(term: Term) -> str:
+    return "on" if term.variable == "setup" else VARIABLES[term.variable][0] if term.variable in VARIABLES else ""
+
+
+def _constant_lines(term: Term) -> list[str]:
+    """A line a constant, in SI, its unit behind it."""
+    lines = []
+    for name, value in term.at:
+        if name in MEANINGS:
+            meaning = MEANINGS[name].format("least" if term.shape == "square" else "largest")
+            unit = "" if name == "power" else f"{CONSTANTS[term.variable][0]}: "
+            lines.append(f"{name} = {number(value)}  # {unit}{meaning}")
+    return lines
+
+
+def _constants_in_words(term: Term) -> str:
+    """For the formula, as ", start = -200 mm, end = 250 mm"; "" without any."""
+    said = []
+    for name, value in term.at:
+        if name in MEANINGS:
+            _, unit, si = ("", "", 1.0) if name == "power" else CONSTANTS[term.variable]
+            said.append(f", {name} = {value / si:.4g} {unit}".rstrip())
+    return "".join(said)
+
+
+# -- shapes ------------------------------------------------------------------------------------------------------------
+
+
+def _shape(term: Term) -> tuple[str, str]:
+    """The share of the size as an expression and as a formula."""
+    v = _variable_name(term)
+    if not v:
+        return "np.ones(len(path))", ""
+    above = term.constants.get("side", 1.0) > 0.0
+    signed = len(term.signs) > 1
+    if term.shape == "slope" and "power" in term.constants:
+        return f"(np.maximum({v}, 1e-3) / reference) ** power", f"({v} / reference)^power"
+    if term.shape == "slope":
+        line = f"({v} - start) / (end - start)"
+        return (line, line) if signed else (f"np.maximum({line}, 0.0)", f"max(0, {line})")
+    if term.shape == "threshold" and "beyond" in term.constants:
+        return f"np.maximum(1.0 - beyond / np.maximum({v}, 1e-3), 0.0)", f"max(0, 1 - beyond / {v})"
+    return {
+        "offset": (v, "" if v == "on" else v),
+        "square": (f"(({v} - centre) / reach) ** 2", f"(({v} - centre) / reach)^2"),
+        "bump": (
+            f"np.exp(-0.5 * (({v} - centre) / width) ** 2)",
+            f"exp(-(({v} - centre) / width)^2 / 2)",
+        ),
+        "threshold": (
+            f"({v} {'>' if above else '<'} edge).astype(float)",
+            f"(1 where {v} {'>' if above else '<'} edge, else 0)",
+        ),
+        "periodic": (
+            f"0.5 * (1.0 + np.cos(2.0 * np.pi * ({v} - crest) / period))",
+            f"(1 + cos(2 pi ({v} - crest) / period)) / 2",
+        ),
+        "sign": (
+            f"({v} {'>' if above else '<'} 0.0).astype(float)",
+            f"(1 in {'tension' if above else 'compression'}, else 0)"
+            if term.variable == "force sign"
+            else f"(1 where {v} {'>' if above else '<'} 0, else 0)",
+        ),
+    }[term.shape]
+
+
+# -- links -------------------------------------------------------------------------------------------------------------
+
+
+def _rows(term: Term) -> tuple[list[str], str]:
+    """Lines that fill `rows` (n, k, 12), the loads of the link; and the load in words."""
+    if term.action == "vertex":
+        return _vertex_rows(term)
+    if term.link in ("tool", "platform"):
+        own = {"X": [0], "Y": [1], "Z": [2], "axial": [2], "radial": [0, 1], "all": [0, 1, 2]}[term.direction]
+        lines = [f"rows = np.zeros((len(path), {len(own)}, 12))"]
+        if term.action == "tilting":
+            lines.append("lever = -path.struts.arms.mean(axis=1)  # (n, 3) m, from the middle of the joints to the tip")
+        for k, axis in enumerate(own):
+            along = f"path.rotation[:, :, {axis}]"
+            if term.action == "tilting":  # moment about the platform's axis across the spindle and this one
+                along = f"np.cross(np.cross(path.rotation[:, :, 2], {along}), lever)"
+            lines.append(f"rows[:, {k}, 6:9] = {along}")
+        if term.action == "tilting":
+            return lines, f"moment of the tip force about the platform's middle, towards {term.direction}"
+        return lines, f"tip force along {term.direction} of the {term.link}"
+    if term.action == "rocking":
+        of = {"X": "[z, 0, -x]", "Y": "[0, z, -y]", "tangential": "[-y, x, 0]"}
+        chosen = ("X", "Y") if term.direction == "all" else (term.direction,)
+        lines = ["x, y, z = path.position.T  # m, the tool tip", f"rows = np.zeros((len(path), {len(chosen)}, 12))"]
+        for k, one in enumerate(chosen):
+            entries = of[one].strip("[]").split(", ")
+            lines += [f"rows[:, {k}, {6 + j}] = {entry}" for j, entry in enumerate(entries) if entry != "0"]
+        return lines, f"moment of the tip force about the origin, towards {term.direction}"
+    if term.direction in ("radial", "tangential"):
+        first, second = ("x", "y") if term.direction == "radial" else ("-y", "x")
+        return [
+            "x, y, _ = path.position.T  # m, the tool tip",
+            "reach = np.maximum(np.hypot(x, y), 1e-9)",
+            "rows = np.zeros((len(path), 1, 12))",
+            f"rows[:, 0, 6] = {first} / reach",
+            f"rows[:, 0, 7] = {second} / reach",
+        ], f"{term.direction} tip force"
+    own = [0, 1, 2] if term.direction == "all" else [AXES.index(term.direction)]
+    lines = [f"rows = np.zeros((len(path), {len(own)}, 12))"]
+    lines += [f"rows[:, {k}, {6 + axis}] = 1.0" for k, axis in enumerate(own)]
+    return lines, "tip force" if term.direction == "all" else f"tip force along {term.direction}"
+
+
+def _vertex_rows(term: Term) -> tuple[list[str], str]:
+    joints = "frame_joints" if term.link == "frame" else "platform_joints"
+    count = 3 if term.where is None else 1
+    lines = [f"rows = np.zeros((len(path), {count}, 12))"]
+    vertices = f"frame_vertices(path.machine.{joints})"
+    if term.where is None:
+        lines.append(f"for k, (pair, outward) in enumerate({vertices}):  # two struts meet in each")
+        k, indent = "k", "    "
+    else:
+        lines.append(f"pair, outward = {vertices}[{term.where - 1}]  # the two struts that meet there")
+        k, indent = "0", ""
+    which = f"{term.link} vertex" + ("" if term.where is None else f" {term.where}")
+    if term.direction == "along the struts":
+        return [*lines, f"{indent}rows[:, {k}, pair] = 1.0"], f"sum of both strut forces in the {which}"
+    axis = {"radial": "outward", "tangential": "np.array([-outward[1], outward[0], 0.0])"}.get(
+        term.direction, "np.array([0.0, 0.0, 1.0])"
+    )
+    lines.append(f"{indent}axis = {axis}  # {term.direction}" + (", turned with the platform" * (term.link != "frame")))
+    turned = "path.struts.directions[:, pair] @ axis"
+    if term.link != "frame":
+        turned = 'np.einsum("nij,nj->ni", path.struts.directions[:, pair], path.rotation @ axis)'
+    return [*lines, f"{indent}rows[:, {k}, pair] = {turned}"], f"{term.direction} force in the {which}"
+
+
+# -- one term ----------------------------------------------------------------------------------------------------------
+
+
+def _piece(term: Term, words: str, name: str) -> Piece:
+    lines, (share, shape) = [*_variable_lines(term), *_constant_lines(term)], _shape(term)
+    constants = _constants_in_words(term)
+    size = f'p["{name}"]'
+    law = "path.machine.strut_law.stiffness(path.struts.lengths{})"
+    functions: list[str] = []
+    if term.action in ("strut", "strut factor"):
+        functions.append(
+            _function(f"{name}_share", "(n, 6): how much of the size each strut has.", lines, _each(term, share))
+        )
+        own = f"{size} * {name}_share(path)"
+        formula = f"c_i += {_times(name, shape)}"
+        statements: tuple[str, ...] = (f"added += {own}",)
+        if term.action == "strut factor":
+            statements = (
+                f"stiffness = {law.format('')}  # (n, 6) N/m, by the strut law",
+                "# No strut loses more than four fifths of its compliance.",
+                f"added += np.maximum({own}, {-LEAST_STRUT}) / stiffness",
+            )
+            formula = f"c_i += {_times(name, shape)} / k_i"
+        if term.where is not None:
+            formula = formula.replace("_i", f"_{term.where}")
+        return Piece(term, words, name, functions[0], statements, formula + constants)
+    if term.action == "joint offset":
+        assert term.where is not None
+        joints = f"{term.column}_joints"
+        axis = AXES.index(term.direction)
+        statements = (
+            f"joints = np.array(machine.{joints})",
+            f"joints[{term.where - 1}, {axis}] += {size}",
+            f"machine = machine.with_changes({joints}=joints)",
+        )
+        return Piece(
+            term, words, name, "", statements, f"{term.direction.lower()}_{term.column}_{term.where} += {name}"
+        )
+    if term.direction in AXES and term.action in ("reading factor", "reading shift"):
+        along = f"path.direction[:, {AXES.index(term.direction)}] ** 2"
+        share = along if share.startswith("np.ones") else f"{_grouped(share)} * {along}"
+    what = "(n,): how much of the size acts at each pose."
+    functions.append(_function(f"{name}_share", what, lines, share))
+    own = f"{size} * {name}_share(path)"
+    if term.action == "reading factor":
+        statements = (f"factor = 1.0 + {own}", f"stiffness = stiffness / np.maximum(factor, {LEAST_READ})")
+        formula = f"k_read = k / (1 + {_times(name, shape)})"
+        return Piece(term, words, name, functions[0], statements, formula + _along(term) + constants)
+    if term.action == "reading shift":
+        statements = (
+            f"factor = 1.0 + {own} * stiffness / path.force",
+            f"stiffness = stiffness / np.maximum(factor, {LEAST_READ})",
+        )
+        formula = f"F / k_read = F / k + {_times(name, shape)}"
+        return Piece(term, words, name, functions[0], statements, formula + _along(term) + constants)
+    if term.action == "coupling":
+        first, second = (int(term.constants[one]) for one in ("first", "second"))
+        statements = (
+            f"stiffness = {law.format(f'[:, [{first - 1}, {second - 1}]]')}",
+            "# Coupled by as much as both give way alone, the pair would have no stiffness left.",
+            f"own = np.clip({own}, {-MOST_COUPLED}, {MOST_COUPLED}) / np.sqrt(stiffness.prod(axis=1))",
+            f"form[:, {first - 1}, {second - 1}] += own",
+            f"form[:, {second - 1}, {first - 1}] += own",
+        )
+        formula = f"c_{first}{second} += {_times(name, shape)} / sqrt(k_{first} k_{second})"
+        return Piece(term, words, name, functions[0], statements, formula + constants)
+    rows, load = _rows(term)
+    what = "(n, k, 12): what loads the link, of strut forces (0 to 5), tip force (6 to 8), moment (9 to 11)."
+    functions.append(_function(f"{name}_loads", what, rows, "rows"))
+    statements = (f"weight = {own}", f"form += springs(weight, {name}_loads(path))")
+    formula = f"c += {_times(name, shape)} h^2, h = {load} per unit load{constants}"
+    return Piece(term, words, name, "\n\n\n".join(functions), statements, formula)
+
+
+def _each(term: Term, share: str) -> str:
+    """The share of each strut, (n, 6), from one of all or from their own."""
+    own = term.variable in EACH_STRUT
+    if term.where is not None:
+        alone = f"np.eye(6)[{term.where - 1}]  # strut {term.where} alone"
+        return f"{_grouped(share)} * {alone}" if own else f"{_grouped(share)}[:, None] * {alone}"
+    return share if own else f"np.repeat({_grouped(share)}[:, None], 6, axis=1)"
+
+
+def _grouped(share: str) -> str:
+    """In brackets, unless it is a call or a name already."""
+    return share if re.fullmatch(r"[\w.]*\(((?![()]).|\([^()]*\))*\)(\.astype\(float\))?|\w+", share) else f"({share})"
+
+
+def _times(name: str, shape: str) -> str:
+    return f"{name} {shape}".strip()
+
+
+def _along(term: Term) -> str:
+    return f" along {term.direction}" if term.direction in AXES else ""
+
+
+def _function(name: str, what: str, lines: Sequence[str], result: str) -> str:
+    body = [f'    """{what}"""', *(f"    {line}" for line in lines), f"    return {result}"]
+    return "\n".join([f"def {name}(path):", *body])

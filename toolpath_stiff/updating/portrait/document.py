@@ -1,0 +1,95 @@
+"""A portrait as part of diagnose.json, in shop units."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+import numpy as np
+
+from toolpath_stiff.units import json_number
+from toolpath_stiff.updating.portrait import Portrait, Sized
+from toolpath_stiff.updating.portrait.words import portrait_text, term_words
+
+
+class LinkEntry(TypedDict):
+    """A link of the load path and its probability."""
+
+    link: str
+    probability: float | None
+
+
+class VariableEntry(TypedDict):
+    """What the missing thing varies with, and its probability."""
+
+    variable: str
+    probability: float | None
+
+
+class TermEntry(TypedDict):
+    """A term of a description; `where` is a strut or a vertex, `interval` holds 95 %."""
+
+    link: str
+    where: int | None
+    direction: str
+    variable: str
+    shape: str
+    size: float | None
+    unit: str
+    interval: list[float | None]
+    rms_percent: float | None
+    words: str
+
+
+class AlikeEntry(TermEntry):
+    """Another leading term that fits as well."""
+
+    probability: float | None
+
+
+class PortraitEntry(TypedDict):
+    """The content of `portrait`."""
+
+    text: str
+    links: list[LinkEntry]
+    variables: list[VariableEntry]
+    terms: list[TermEntry]
+    alike: list[AlikeEntry]
+    explained_percent: float | None
+    error_percent: float | None
+    held_out_rms_percent: float | None
+    noise_floor_percent: float | None
+    smooth_rms_percent: float | None
+    look_elsewhere: float | None
+
+
+def portrait_entry(portrait: Portrait) -> PortraitEntry:
+    """A portrait as diagnose.json has it."""
+    return {
+        "text": portrait_text(portrait),
+        "links": [{"link": name, "probability": json_number(weight, 3)} for name, weight in portrait.links],
+        "variables": [{"variable": name, "probability": json_number(weight, 3)} for name, weight in portrait.variables],
+        "terms": [_term(one) for one in portrait.terms],
+        "alike": [{**_term(one), "probability": json_number(one.probability or 0.0, 3)} for one in portrait.alike],
+        "explained_percent": json_number(100.0 * portrait.explained, 4),
+        "error_percent": json_number(100.0 * portrait.error, 4),
+        "held_out_rms_percent": json_number(100.0 * portrait.held_out_rms, 4),
+        "noise_floor_percent": json_number(100.0 * portrait.noise_floor, 4),
+        "smooth_rms_percent": json_number(100.0 * portrait.smooth_rms, 4),
+        "look_elsewhere": json_number(portrait.look_elsewhere, 3),
+    }
+
+
+def _term(sized: Sized) -> TermEntry:
+    term = sized.term
+    return {
+        "link": term.link,
+        "where": term.where,
+        "direction": term.direction,
+        "variable": term.variable,
+        "shape": term.shape,
+        "size": json_number(term.size / term.si),
+        "unit": term.unit,
+        "interval": [json_number(float(end)) for end in np.array(sized.interval) / term.si],
+        "rms_percent": json_number(100.0 * sized.rms, 3),
+        "words": term_words(term),
+    }
