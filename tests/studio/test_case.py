@@ -183,3 +183,18 @@ def test_what_cannot_be_set_aside(case):
         with pytest.raises(tps.InputError):
             case.set_aside(file, line)
     assert case.state.aside == ()
+
+
+def test_what_no_effect_explains_is_drafted_and_competes(tmp_path):
+    case = tps.Case.open(tmp_path / "case")
+    case.start_exercise(5, hidden="saddle_overhang")  # gives way along X as y squared: not in the catalogue
+    drafted = case.draft()
+    assert drafted.name == "missing"
+    assert case.state.effects == ("effects/missing.py",)
+    assert [step.kind for step in case.history[-2:]] == ["draft", "effects"]
+    line, text = case.history[-2].command, (case.folder / "effects/missing.py").read_text()
+    assert shlex.split(line)[:3] == ["tps", "effects", "draft"]
+    assert text == drafted.text
+    assert "missing" in [effect.name for effect in tps.effects([case.path("effects/missing.py")]).effects]
+    case.undo()
+    assert case.state.effects == ()

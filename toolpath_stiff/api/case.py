@@ -41,6 +41,7 @@ from toolpath_stiff.hints import command_line, options
 if TYPE_CHECKING:
     from toolpath_stiff.api.correction import Plan, Update
     from toolpath_stiff.api.diagnosis import Comparison, Diagnosis
+    from toolpath_stiff.api.effects import EffectDraft
     from toolpath_stiff.api.placements import Placement
     from toolpath_stiff.api.programs import Analysis
 
@@ -304,6 +305,39 @@ class Case(History):
         from toolpath_stiff.api.diagnosis import diagnose
 
         return self._kept("diagnose", diagnose(self.machine, self.data, progress=progress))
+
+    def draft(self, progress: Progress | None = None) -> EffectDraft:
+        """What a diagnosis leaves unexplained as an effect file, as `tps.draft_effect`; the case uses it from then on.
+
+        It competes like an effect of one's own; without new readings it is `described` at best.
+        """
+        result = self.next_result("draft")
+        found, command = self.draft_in(result, progress)
+        self.record("draft", found._short(), command=command, python="case.draft()", result=result)
+        if found.text:
+            self.add_effects(self.folder / result / f"{found.name}.py")
+        return found
+
+    def draft_in(self, result: str, progress: Progress | None = None) -> tuple[EffectDraft, str]:
+        """What `draft` finds, kept in a folder of the case without a step; and its command."""
+        from toolpath_stiff.api.effects import draft_effect
+
+        file = f"{result}/{self._free_effect('missing')}.py"
+        found = draft_effect(self.machine, self.data, file, progress=progress)
+        (self.folder / result).mkdir(parents=True, exist_ok=True)
+        if found.text:
+            found.save(self.folder / file)
+        state = self.state
+        asked = options(machine=state.machine, effects=list(state.effects), out=file)
+        return found, command_line("effects", "draft", *self.data_files, *asked)
+
+    def _free_effect(self, name: str) -> str:
+        taken, number = {one.name for one in effects([self.path(one) for one in self.state.effects]).effects}, 1
+        free = name
+        while free in taken:
+            number += 1
+            free = f"{name}_{number}"
+        return free
 
     def update(self, add: str | Iterable[str], progress: Progress | None = None) -> Update:
         """Fit effects, as `tps.update`; kept in results/, where `accept` takes machine.toml from."""

@@ -176,6 +176,7 @@ def verdict(session: Session) -> dict[str, Any] | None:
         "noise",
         "cannot_test",
         "readings",
+        "portrait",
     )
     kept = {key: said[key] for key in keys}
     kept["gates"] = {name: value for name, value in kept["gates"].items() if name != "simulated_squares"}

@@ -295,6 +295,8 @@ class Session:
                     self.case.record(job.kind, text, command=command, python=line, result=result)
                 if job.kind == "update":
                     self._take_sizes(answer["document"])
+                if job.kind == "draft":
+                    self._take_draft(answer["document"])
             elif error and job.key == self.key(job.kind):
                 self._failed[job.kind] = (job.key, error)
                 self._message = "" if error == "stopped" else f"{job.kind}: {error}"
@@ -309,6 +311,12 @@ class Session:
             if (step.kind, step.command) == (kind, command):
                 return True
         return False
+
+    def _take_draft(self, document: Mapping[str, Any]) -> None:
+        """What was drafted competes from now on; the file was written by the tool itself."""
+        if document["file"]:
+            self.case.add_effects(self.case.folder / document["file"])
+        self._message = document["reason"]
 
     def _take_sizes(self, document: Mapping[str, Any]) -> None:
         """The switches take what was fitted; the fit holds for them."""
@@ -462,6 +470,7 @@ ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
     "accept": Session._accept,
     "plan": lambda self, n=6: self._queue("plan", n=max(1, min(MOST_POSES, int(n)))),
     "compare": lambda self: self._queue("compare"),
+    "draft": lambda self: self._queue("draft"),
     "edit": lambda self, file: self.editing.open(str(file)),
     "save_effect": Session._save_effect,
     "set_up": lambda self: self._queue("set_up"),

@@ -222,6 +222,13 @@ def set_up(case: Any, tell: Tell, result: str) -> dict[str, Any]:
     return {"text": repr(found), "document": found.to_dict(), "command": command, "written": written[0]}
 
 
+def draft(case: Any, tell: Tell, result: str) -> dict[str, Any]:
+    """What is left unexplained, as an effect file."""
+    found, command = case.draft_in(result, tell)
+    document = {"reason": found.reason, "file": f"{result}/{found.name}.py" if found.text else ""}
+    return {"text": repr(found), "document": document, "command": command}
+
+
 TASKS: dict[str, Callable[..., dict[str, Any]]] = {
-    task.__name__: task for task in (diagnose, compare, update, plan, analyze, place, set_up)
+    task.__name__: task for task in (diagnose, compare, update, plan, analyze, place, set_up, draft)
 }

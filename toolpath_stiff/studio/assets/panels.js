@@ -53,10 +53,20 @@ function effectsPanel(state, act) {
       state.machine.effects.length ? h("span", { class: "muted" }, `in the machine: ${state.machine.effects.join(", ")}`) : null),
     fit ? h("p", { id: "fit-text", class: fit.accepted ? "" : "warning" }, fit.text) : null,
     (fit?.support ?? []).flatMap((one) => one.reasons).map((reason) => h("p", { class: "muted" }, reason)),
+    portrait(state.verdict?.portrait, act),
     state.verdict ? null : h("p", { class: "muted" }, state.readings ? "The ranking comes with the diagnosis." : "Without readings nothing is ranked."),
     rows,
     ownEffects(state, act),
   ];
+}
+// What no effect explains, as far as the readings describe it.
+function portrait(p, act) {
+  if (!p) return null;
+  const bars = (rows, key) => h("ul", { class: "shares" }, rows.map((one) => h("li", {}, h("span", { class: "bars", "aria-hidden": "true" }, h("i", { style: `width:${100 * (one.probability ?? 0)}%` })), ` ${one[key]} ${chance(one.probability ?? 0)}`)));
+  return h("section", { class: "portrait", id: "portrait" }, h("h3", {}, "What the missing thing looks like"), h("p", {}, p.text),
+    h("div", { class: "two" }, h("div", {}, h("b", {}, "where"), bars(p.links, "link")), h("div", {}, h("b", {}, "varies with"), bars(p.variables, "variable"))),
+    figures([["rms at left-out points", percent(p.held_out_rms_percent)], ["noise there", percent(p.noise_floor_percent)], ["best that a smooth form could do", percent(p.smooth_rms_percent)], ["of the misfit explained", percent(p.explained_percent, 0)]]),
+    p.terms.length ? h("div", { class: "actions live" }, button("Draft it as an effect", () => act({ do: "draft" }), { id: "draft" }), h("span", { class: "muted" }, "a commented file that competes with the others; new readings must confirm it")) : null);
 }
 // Effects of one's own: the working copy is edited here or in an editor; each save is loaded, a fault stands below.
 function ownEffects(state, act) {
