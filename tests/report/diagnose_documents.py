@@ -107,6 +107,7 @@ def common(verdict: str, **more: Any) -> dict[str, Any]:
                         "sets": [["joint_clearance", "contact_nonlinearity"],
                                  ["spindle_compliance", "table_compliance", "gauge_scale"]]},
         "path": None,
+        "loops": {"by_loop": [], "readings": []},
         "assumptions": ["each joint lies within 0.5 mm (standard deviation) of where the machine file has it",
                         "six struts are alike within 1 % (standard deviation)"],
         "warnings": [],
