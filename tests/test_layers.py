@@ -45,6 +45,8 @@ RANK = {
 }
 # The same within `updating`, of its modules and rooms.
 UPDATING_RANK = {
+    "dates": -2,
+    "history": -1,
     "loops": -1,
     "raw_shape": -1,
     "rows": 0,
