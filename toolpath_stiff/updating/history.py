@@ -141,13 +141,15 @@ class _Series:
     about: FloatArray
 
 
-def history(readings: Readings, seed: int = 0) -> HistoryDocument:
+def history(readings: Readings, sides: Readings | None = None, seed: int = 0) -> HistoryDocument:
     """What readings of struts alone say of time and of the sign of the force.
 
     Parameters
     ----------
     readings
         n of them, in any order.
+    sides
+        Those that tell tension from compression, if they are others: slopes of both sides of one record.
     seed
         Of the simulated series.
 
@@ -161,13 +163,13 @@ def history(readings: Readings, seed: int = 0) -> HistoryDocument:
     """
     if not len(readings.strut):
         return NOTHING
-    sides = _sides(readings)
+    compared = _sides(readings if sides is None else sides)
     series = _series(readings)
     looked_at = [one for one in series if len(one.day) > 1]
     scale = _Scale.of(looked_at, seed)
     struts = [_strut(one, scale, readings) for one in series]
     for one in struts:
-        one["sides"] = sides.get(one["strut"])
+        one["sides"] = compared.get(one["strut"])
     written: HistoryDocument = {
         "scatter_percent": 100.0 * scale.sd if looked_at else None,
         "scatter_from": scale.source if looked_at else "",
