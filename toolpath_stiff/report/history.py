@@ -40,7 +40,7 @@ def _figure_of(value: float | None) -> str:
 
 
 def _rows(history: HistoryDocument) -> list[tuple[str, ...]]:
-    """Strut, readings, dates, stiffness, scatter, drift."""
+    """Strut, readings, dates, stiffness, scatter, drift, tension, compression."""
     return [
         (
             plain(one["strut"]),
@@ -51,12 +51,17 @@ def _rows(history: HistoryDocument) -> list[tuple[str, ...]]:
             "-"
             if one["drift_percent_per_year"] is None
             else f"{one['drift_percent_per_year']:+.2f} +- {one['drift_sd_percent_per_year']:.2f}",
+            *(
+                ("-", "-")
+                if one["sides"] is None
+                else (f"{one['sides']['tension_N_per_mm']:,.0f}", f"{one['sides']['compression_N_per_mm']:,.0f}")
+            ),
         )
         for one in history["struts"]
     ]
 
 
-HEAD = ("strut", "readings", "dates", "N/mm", "scatter %", "drift, % a year")
+HEAD = ("strut", "readings", "dates", "N/mm", "scatter %", "drift, % a year", "tension", "compression")
 
 
 def _remark(history: HistoryDocument) -> list[str]:
@@ -84,7 +89,7 @@ def history_section(history: HistoryDocument) -> list[Markup]:
     """The section of a page; none without dates and without both signs of the force."""
     if not _shown(history):
         return []
-    listed = table(HEAD, [("", row) for row in _rows(history)], range(1, 6))
+    listed = table(HEAD, [("", row) for row in _rows(history)], range(1, len(HEAD)))
     remark = markup('<p class="muted">{}</p>', "; ".join(_remark(history)))
     pictures = {"history.png": history_png(history)} if dated(history) else {}
     return [

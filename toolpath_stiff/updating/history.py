@@ -41,6 +41,7 @@ A_SIDE = 2  # dates on either side of a step, from `SHORT` dates up
 SHORT = 4
 WILD = 4.0  # standard deviations from the median of the others, of one date that alone makes a change
 CREDIBLE = 0.95
+LEAST_TOLD = 1e-4  # probability
 DAYS_PER_YEAR = 365.25  # Julian year
 
 
@@ -390,8 +391,13 @@ def _change(
         "kind": kind, "after": dates[0], "before": dates[1], "change_percent": share, "low_percent": low,
         "high_percent": high, "percent_per_year": None if slope is None else 100.0 * float(np.expm1(slope)),
         "from_N_per_mm": first, "to_N_per_mm": last, "p": p,
-        "text": f"{text}: {first:,.0f} to {last:,.0f} N/mm (p = {p:.2g})",
+        "text": f"{text}: {first:,.0f} to {last:,.0f} N/mm ({_chance_text(p)})",
     }  # fmt: skip
+
+
+def _chance_text(p: float) -> str:
+    """Further digits than simulations have would say nothing."""
+    return f"p = {p:.2g}" if p >= LEAST_TOLD else f"p < {LEAST_TOLD:g}"
 
 
 def _strut(one: _Series, scale: _Scale, readings: Readings) -> StrutEntry:
@@ -469,7 +475,7 @@ def _side_entry(name: str, apart: float, middle: float, error: float, p: float) 
     numbers = f"{tension:,.0f} against {compression:,.0f} N/mm"
     if p < SURE:
         way = "softer" if share < 0.0 else "stiffer"
-        text = f"{name} is {abs(share):.2g} % {way} in tension than in compression: {numbers} (p = {p:.2g})"
+        text = f"{name} is {abs(share):.2g} % {way} in tension than in compression: {numbers} ({_chance_text(p)})"
     else:
         text = f"{name} is alike in tension and compression: {numbers}"
     return {
@@ -479,9 +485,9 @@ def _side_entry(name: str, apart: float, middle: float, error: float, p: float) 
 
 
 def history_lines(document: HistoryDocument) -> Sequence[str]:
-    """The sentences, strut by strut."""
+    """The sentences, strut by strut: changes or none, and tension against compression where they differ."""
     found = []
     for one in document["struts"]:
         found += [one["text"]] if one["text"] else []
-        found += [one["sides"]["text"]] if one["sides"] else []
+        found += [one["sides"]["text"]] if one["sides"] and one["sides"]["p"] < SURE else []
     return found

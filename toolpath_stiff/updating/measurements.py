@@ -218,7 +218,8 @@ def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
 
 
 def _columns(files: list[RowFile], machine: Machine) -> Measurements:
-    rows = [_placed(row, machine) for file in files for row in file.rows]
+    read = [row for file in files for row in file.rows]
+    rows = [_placed(row, machine) for row in read]
 
     def numbers(name: str) -> FloatArray:
         return np.array([getattr(row, name) for row in rows], dtype=float)
@@ -259,7 +260,7 @@ def _columns(files: list[RowFile], machine: Machine) -> Measurements:
         extra=extra,
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
-        notes=(*(note for file in files for note in file.notes), *_incomplete(given), *dropped),
+        notes=(*(note for file in files for note in file.notes), *_incomplete(given), *dropped, *_benches(read)),
         beside=beside,
         **_dates(rows),
     )
@@ -271,6 +272,14 @@ def _dates(rows: list[Row]) -> dict[str, Any]:
     if not (date != "").any():
         return {}
     return {"date": date, "day": days_since_first(np.array([day_of(row.date) for row in rows]))}
+
+
+def _benches(rows: list[Row]) -> list[str]:
+    """A remark about struts on a bench of which nobody says how long they were."""
+    unknown = [r for r in rows if r.beside and np.isnan(r.beside.length) and np.isnan(r.position).all()]
+    if not unknown:
+        return []
+    return [f"{len(unknown)} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"]
 
 
 def _placed(row: Row, machine: Machine) -> Row:

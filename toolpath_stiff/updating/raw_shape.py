@@ -83,9 +83,10 @@ def shape_of(force: FloatArray, deflection: FloatArray, main: slice) -> Shape:
     f, y = (_averaged(one[main]) for one in (force, deflection))
     if len(f) < FEWEST or f.max() <= 0.0 or f.min() >= 0.0:
         return Shape(lost=lost)
-    tried = [*_sticking(f), *_kinks(f), ("sides", np.nan, np.maximum(f, 0.0), np.minimum(f, 0.0))]
+    tried = [("sides", np.nan, np.maximum(f, 0.0), np.minimum(f, 0.0)), *_sticking(f), *_kinks(f)]
+    of_sides: Shape | None = None
     straight = _left([f], y)[0]
-    best, chance = Shape(lost=lost), SURE
+    best, chance, squares = Shape(lost=lost), SURE, {"": straight}
     for kind, at, one, other in tried:
         left, (_, first, second) = _left([one, other], y)
         # A kink's force is fitted, too: one more figure than its two slopes.
@@ -93,7 +94,12 @@ def shape_of(force: FloatArray, deflection: FloatArray, main: slice) -> Shape:
         found = _chance(straight, left, more, len(f) - 2 - more) * len(tried)
         slopes = (abs(1.0 / first), abs(1.0 / second)) if first * second > 0.0 else (0.0, 0.0)
         if found < chance and max(slopes) >= TELLING * min(slopes) > 0.0:
-            best, chance = Shape(kind, at, slopes[0], slopes[1], lost), found
+            best, chance, squares[kind] = Shape(kind, at, slopes[0], slopes[1], lost), found, left
+            of_sides = best if kind == "sides" else of_sides
+    # On this way alone, sticking that breaks away near zero force looks like two sides, which has no force to fit.
+    if of_sides is not None and best is not of_sides:
+        gain = _chance(squares["sides"], squares[best.kind], 1, len(f) - 4) * len(tried)
+        best = best if gain < SURE else of_sides
     return best
 
 
