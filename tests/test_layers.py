@@ -45,11 +45,14 @@ RANK = {
 }
 # The same within `updating`, of its modules and rooms.
 UPDATING_RANK = {
+    "dates": -2,
+    "history": -1,
     "loops": -1,
     "raw_shape": -1,
     "rows": 0,
     "measurements": 1,
-    "raw": 1,
+    "raw_records": 1,
+    "raw": 2,
     "inference": 2,
     "comparison": 3,
     "planning": 3,

@@ -41,10 +41,10 @@ class Reduction(Result):
         return list(self.reduced.notes)
 
     def to_dict(self) -> dict[str, Any]:
-        """One entry a loop, under "loops"."""
+        """One entry a loop, under "loops"; struts measured alone over their dates, under "history"."""
         from toolpath_stiff.updating.raw import document
 
-        return {"loops": document(self.reduced)}
+        return {"loops": document(self.reduced), "history": dict(self.reduced.history)}
 
     def to_frame(self) -> pd.DataFrame:
         """One row a loop."""
@@ -59,15 +59,16 @@ class Reduction(Result):
         return loops_png.figure(self.reduced.loops, self.reduced.figures, Path(self.raw).name)
 
     def __str__(self) -> str:
+        from toolpath_stiff.report.history import history_text
         from toolpath_stiff.report.measuring import loops_text
 
-        return loops_text(self.to_dict()["loops"])
+        return "\n".join([loops_text(self.to_dict()["loops"]), *history_text(self.reduced.history)])
 
     def _short(self) -> str:
         return f"{Path(self.raw).name}, {len(self.reduced.loops)} loops"
 
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
-        """The measurement file, and the picture of the loops beside it."""
+        """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
         from toolpath_stiff.report.measuring import loop_files
 
         return loop_files(self.reduced, Path(file), Path(self.raw).name, plots=plots)

@@ -112,10 +112,14 @@ columns of RAW:
   x_mm,y_mm,z_mm,direction     where and along what (X, Y, Z; or dx,dy,dz), optionally a_deg,b_deg,c_deg
   jog_um                       how far the machine was told to move from zero
   force_N,displacement_um      gauge and indicator, positive the way the jog counts
+  date                         ISO 8601, as 2024-03-31; each date is a loop of its own
   point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
+of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um, length_mm if known; no pose and no jog
 
 Records in the order taken, jogging 0, +200, -200, 0 um as ASME B5.54 and the paper do; those of one point, direction,
-set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's equation 12).
+set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's equation 12);
+on a bench, force over displacement between the extremes of the force, tension and stretch positive. Struts measured
+on several dates: which of them changed, and when.
 """
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
+from toolpath_stiff.report.history import dated, history_png
 from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.planning import Plan, Proposal
@@ -36,7 +37,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.updating.planning.document import PlanDocument
-    from toolpath_stiff.updating.raw import Loop, LoopFigures, Reduction
+    from toolpath_stiff.updating.raw import LoopFigures, Reduction
+    from toolpath_stiff.updating.raw_records import Loop
 
 FloatArray = NDArray[np.float64]
 
@@ -281,7 +283,7 @@ def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str)
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for ax, loop, one in zip(axes, loops, figures, strict=False):
             deflection = um_from_m(loop.deflection)
-            ends = [int(np.argmin(loop.jog)), int(np.argmax(loop.jog))]
+            ends = [int(np.argmin(loop.drive)), int(np.argmax(loop.drive))]
             ax.plot(deflection[ends], loop.force[ends], color=SECOND_ORANGE, linewidth=1.6, label="secant")
             ax.plot(deflection, loop.force, color=MUTED, linewidth=1.0, marker="o", markersize=3.5)
             ax.set_title(loop.title, fontsize=8.5)
@@ -304,16 +306,14 @@ def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str)
         return figure
 
 
-def loop_names(out: Path, *, plots: bool = True) -> tuple[Path, ...]:
-    """The files that `loop_files` makes: `out` itself, and the picture of the loops beside it."""
-    return (out, out.with_name(f"{out.stem}_loops.png")) if plots else (out,)
-
-
 def loop_files(reduction: Reduction, out: Path, title: str, *, plots: bool = True) -> dict[Path, Content]:
-    """The measurement file, and with `plots` the loops drawn under `title`."""
-    contents: list[Content] = [measurement_csv(reduction.loops, reduction.figures)]
-    contents += [loops_png(reduction.loops, reduction.figures, title)] if plots else []
-    return dict(zip(loop_names(out, plots=plots), contents, strict=True))
+    """The measurement file, and with `plots` the loops drawn under `title`; dated struts over their dates."""
+    contents: dict[Path, Content] = {out: measurement_csv(reduction.loops, reduction.figures)}
+    if plots:
+        contents[out.with_name(f"{out.stem}_loops.png")] = loops_png(reduction.loops, reduction.figures, title)
+        if dated(reduction.history):
+            contents[out.with_name(f"{out.stem}_history.png")] = history_png(reduction.history)
+    return contents
 
 
 def loops_text(entries: Sequence[Mapping[str, Any]]) -> str:

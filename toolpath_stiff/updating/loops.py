@@ -32,6 +32,7 @@ TextArray = NDArray[np.str_]
 
 COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of a measurement file, for loops beside the tip alone
 LARGEST_UM = 1e6
+LEAST_FORCE = 1e-3  # N, of either sign
 SOFTEST_ALONE, STIFFEST_ALONE = 1e5, 1e10  # N/m; beyond, the unit of a strut measured alone is wrong
 # Scatter of one reading where no `sd_um` says: a lever indicator or probe with its stand, and the load; assumed.
 INDICATOR_SD, LOAD_SHARE = 0.3e-6, 0.02  # m; of the reading
@@ -41,12 +42,17 @@ BACKWARDS = 3.0  # times a reading of the wrong sign, so that its logarithm exis
 
 
 class LoopReading(NamedTuple):
-    """One reading: m/N per load (nan if planned), its sd in m/N (nan: not stated), N, length of a strut alone in m."""
+    """One reading.
+
+    m/N per load (nan if planned), its sd in m/N (nan: not stated), N, length of a strut alone in m, and its side: 1
+    under tension, -1 under compression.
+    """
 
     compliance: float
     sd: float
     force: float
     length: float
+    side: float = 1.0
 
 
 def loop_of(text: str) -> MeasuringLoop:
@@ -84,6 +90,8 @@ def loop_reading(
     if not alone and not (math.isnan(own) and math.isnan(numbers["length_mm"])):
         raise MeasurementError(f"strut_force_N or length_mm in a row of loop {loop}", expected="loop strut 1 alone")
     force = own if alone and not math.isnan(own) else numbers["force_N"]
+    if abs(force) < LEAST_FORCE:
+        raise MeasurementError(f"strut_force_N = {force:g}", expected="a force: tension positive, compression negative")
     moved, stiffness = numbers["displacement_um"], numbers["stiffness_N_per_mm"]
     if math.isnan(moved) == math.isnan(stiffness) and not (planned and math.isnan(moved)):
         found = "neither displacement_um nor" if math.isnan(moved) else "displacement_um and"
@@ -99,7 +107,9 @@ def loop_reading(
             f"loop {loop}: {1e9 * compliance:.4g} nm/N",
             expected=f"{1e9 / STIFFEST_ALONE:g} to {1e9 / SOFTEST_ALONE:g} nm/N; longer under tension is positive",
         )
-    return LoopReading(compliance, m_from_um(numbers["sd_um"]) / force, force, 1e-3 * numbers["length_mm"])
+    size = abs(force)
+    side = math.copysign(1.0, force)
+    return LoopReading(compliance, m_from_um(numbers["sd_um"]) / size, size, 1e-3 * numbers["length_mm"], side)
 
 
 @dataclass(frozen=True)
@@ -114,6 +124,8 @@ class LoopColumns:
         (n,) m/N and 1 or -1: o and s above; 0 and 1 at the tip.
     length
         (n,) m, of a strut measured alone; nan: as the pose has it.
+    side
+        (n,) 1, or -1 of a strut measured alone under compression.
     """
 
     loops: tuple[MeasuringLoop, ...]
@@ -121,6 +133,7 @@ class LoopColumns:
     offset: FloatArray
     toward: FloatArray
     length: FloatArray
+    side: FloatArray
 
     def select(self, rows: NDArray[Any]) -> LoopColumns:
         """Of some of the readings."""
@@ -130,12 +143,13 @@ class LoopColumns:
         )
 
     @classmethod
-    def of(cls, names: Sequence[str], length: FloatArray) -> LoopColumns:
+    def of(cls, names: Sequence[str], length: FloatArray, side: FloatArray | None = None) -> LoopColumns:
         """Of readings' loops by name ("" is the tip), without offsets yet."""
         loops = (TIP, *(loop_of(name) for name in dict.fromkeys(names) if name))
         number = {"" if k == 0 else str(loop): k for k, loop in enumerate(loops)}
         which = np.array([number[str(name)] for name in names], dtype=np.int64)
-        return cls(loops, which, np.zeros(len(names)), np.ones(len(names)), length)
+        ones = np.ones(len(names))
+        return cls(loops, which, np.zeros(len(names)), ones, length, ones if side is None else side)
 
     @property
     def beside(self) -> NDArray[np.bool_]:
@@ -198,6 +212,4 @@ def offsets(
     counted = np.where(np.isnan(read), expected, read) * toward
     wanted = np.maximum.reduce([OFFSET_SHARE * tip, sd / widest - counted, -BACKWARDS * counted])
     kept = columns.straight
-    return LoopColumns(
-        columns.loops, columns.which, np.where(kept, wanted, 0.0), np.where(kept, toward, 1.0), columns.length
-    )
+    return replace(columns, offset=np.where(kept, wanted, 0.0), toward=np.where(kept, toward, 1.0))

@@ -24,6 +24,7 @@ from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table, read_table
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.updating.dates import day_of, days_since_first
 from toolpath_stiff.updating.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
 from toolpath_stiff.updating.rows import (
     COLUMNS,
@@ -90,6 +91,8 @@ class Measurements:
         What was assumed or not used; what is doubtful. For the report.
     beside
         Which readings are of loops beside the tip, and how these are compared; None where there are none.
+    date, day
+        (n,) as in the file, "" where a reading has none; days since the first of them (nan). None where no reading has.
     """
 
     position: FloatArray
@@ -113,6 +116,8 @@ class Measurements:
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     beside: LoopColumns | None = None
+    date: TextArray | None = None
+    day: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.position)
@@ -213,7 +218,8 @@ def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
 
 
 def _columns(files: list[RowFile], machine: Machine) -> Measurements:
-    rows = [_placed(row, machine) for file in files for row in file.rows]
+    read = [row for file in files for row in file.rows]
+    rows = [_placed(row, machine) for row in read]
 
     def numbers(name: str) -> FloatArray:
         return np.array([getattr(row, name) for row in rows], dtype=float)
@@ -254,9 +260,26 @@ def _columns(files: list[RowFile], machine: Machine) -> Measurements:
         extra=extra,
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
-        notes=(*(note for file in files for note in file.notes), *_incomplete(given), *dropped),
+        notes=(*(note for file in files for note in file.notes), *_incomplete(given), *dropped, *_benches(read)),
         beside=beside,
+        **_dates(rows),
     )
+
+
+def _dates(rows: list[Row]) -> dict[str, Any]:
+    """Dates as text and as days since the first; nothing where no reading has one."""
+    date = np.array([row.date for row in rows], dtype=str)
+    if not (date != "").any():
+        return {}
+    return {"date": date, "day": days_since_first(np.array([day_of(row.date) for row in rows]))}
+
+
+def _benches(rows: list[Row]) -> list[str]:
+    """A remark about struts on a bench of which nobody says how long they were."""
+    unknown = [r for r in rows if r.beside and np.isnan(r.beside.length) and np.isnan(r.position).all()]
+    if not unknown:
+        return []
+    return [f"{len(unknown)} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"]
 
 
 def _placed(row: Row, machine: Machine) -> Row:
@@ -274,11 +297,12 @@ def _beside(rows: list[Row]) -> tuple[FloatArray, FloatArray, LoopColumns | None
     if all(row.beside is None for row in rows):
         return stiffness, sd, None
     names, length = [row.labels["loop"] for row in rows], np.full(len(rows), np.nan)
+    side = np.array([1.0 if row.beside is None else row.beside.side for row in rows])
     for i, row in enumerate(rows):
         if row.beside is not None:
             length[i] = row.beside.length
             stiffness[i], sd[i] = row.beside.compliance, row.beside.sd  # m/N until `with_offsets`
-    return stiffness, sd, LoopColumns.of(names, length)
+    return stiffness, sd, LoopColumns.of(names, length, side)
 
 
 def with_offsets(data: Measurements, machine: Machine, widest: float = WIDEST) -> Measurements:
@@ -428,6 +452,7 @@ def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:
         "temperature_C": data.temperature,
         **{name: getattr(data, name) for name in ("setup", "clamp", "repeat", "loop")},
     }
+    columns |= {} if data.date is None or data.day is None else {"date": data.date, "day": data.day}
     return columns | {name: values for name, values in others.items() if name not in data.missing}
 
 

@@ -6,12 +6,15 @@ displacement D read by the indicator, the deflection is y - D, and the paper's e
 extremes:
 
     k = (F(+0.2 mm) - F(-0.2 mm)) / (0.4 mm - (D(+0.2 mm) - D(-0.2 mm)))
+
+A strut measured alone on a bench is not jogged: the force is set and its own stretch D read, so that k is the slope of
+the force over D between the extremes of the force.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict, cast
@@ -21,69 +24,21 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.tables import Columns, Table, read_table
-from toolpath_stiff.units import certain, m_from_um, n_per_mm_from_n_per_m, um_from_m
-from toolpath_stiff.updating.raw_shape import Shape, shape_of
+from toolpath_stiff.tables import read_table
+from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.updating.dates import day_of
+from toolpath_stiff.updating.history import HistoryDocument, Readings, history
+from toolpath_stiff.updating.raw_records import COLUMNS, CONDITIONS, PLACE, SAME_JOG, Loop, read_raw
+from toolpath_stiff.updating.raw_shape import Shape, shape_of, sides_of
 from toolpath_stiff.updating.rows import (
-    ANGLES,
-    LABELS,
-    POSITION,
+    DATE,
     SOFTEST,
     STIFFEST,
-    VECTOR,
-    direction_of,
-    number,
-    optional_number,
 )
 
 FloatArray = NDArray[np.float64]
-
-READINGS = ("jog_um", "force_N", "displacement_um")
-PLACE = (*POSITION, *ANGLES, "direction", *VECTOR, *LABELS, "tool_extension_mm")  # what one loop has in common
-CONDITIONS = ("time_min", "temperature_C")
-COLUMNS = Columns(
-    numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", *READINGS, *CONDITIONS), texts=("direction", *LABELS)
-)
-SIGNED = {"force_N": 1e7, "displacement_um": 1e6, "jog_um": 1e6}  # largest magnitude, either sign
-SAME_JOG = 1e-9  # m: jogs this close are the same step
+ONE_SIDE = 0.05  # of the range: a force set on a bench that goes less far to the other side is of one side
 FIGURES = ("lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
-
-
-@dataclass(frozen=True)
-class Loop:
-    """One test: records in the order in which they were taken. SI.
-
-    Attributes
-    ----------
-    place
-        Column -> text of what the records have in common: pose, direction, labels.
-    conditions
-        Column -> mean of time and temperature, in the file's unit.
-    jog, force, displacement
-        (m,) m, N, m, along the direction.
-    line
-        Line of the first record.
-    """
-
-    place: Mapping[str, str]
-    conditions: Mapping[str, float]
-    jog: FloatArray
-    force: FloatArray
-    displacement: FloatArray
-    line: int
-
-    @property
-    def deflection(self) -> FloatArray:
-        """(m,) m, what the machine gave way: jog less displacement."""
-        return self.jog - self.displacement
-
-    @property
-    def title(self) -> str:
-        """Point or position, direction, set-up, repeat: whatever is there."""
-        where = self.place.get("point") or ", ".join(self.place[name] for name in POSITION) + " mm"
-        way = self.place.get("direction") or "(" + ", ".join(self.place[name] for name in VECTOR) + ")"
-        rest = [f"{name} {self.place[name]}" for name in ("setup", "clamp", "repeat") if self.place.get(name)]
-        return ", ".join([where, way, *rest])
 
 
 @dataclass(frozen=True)
@@ -95,7 +50,8 @@ class LoopFigures:
     stiffness
         N/m, the paper's equation 12.
     force
-        N, half the difference of the forces at the extremes.
+        N, half the difference of the forces at the extremes; on a bench, of one side alone, the whole, compression
+        negative.
     deflection
         m, between the extremes. Errors of jog and indicator count in proportion to it.
     lost_motion
@@ -109,6 +65,8 @@ class LoopFigures:
         m, deflection at the end less that at the beginning.
     shape
         Kinks, two slopes, work lost.
+    tension, compression
+        N/m, slopes of the two sides of a strut on a bench.
     """
 
     stiffness: float
@@ -119,87 +77,8 @@ class LoopFigures:
     linearity: float
     closure: float
     shape: Shape
-
-
-def read_raw(table: Table) -> list[Loop]:
-    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`), in the order of their first record.
-
-    Raises
-    ------
-    InputError
-        Columns are missing or unknown, or there are no records.
-    InputErrors
-        Bad records, all of them.
-    """
-    file = table.file
-    _check_heading(list(table.heading), file, table.heading_line)
-    if not table.rows:
-        raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
-    groups: dict[tuple[str, ...], list[tuple[int, dict[str, str], list[float]]]] = {}
-    errors = []
-    for line, cells in table.rows:
-        try:
-            record = table.record(cells)
-            for name in (*POSITION, *(angle for angle in ANGLES if angle in record)):
-                number(record, name)
-            direction_of(record)
-            optional_number(record, "tool_extension_mm")
-            values = [_signed(record, name) for name in READINGS]
-            values += [optional_number(record, name) for name in CONDITIONS]
-        except InputError as error:
-            errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
-            continue
-        key = tuple(record.get(name, "") for name in PLACE)
-        groups.setdefault(key, []).append((line, record, values))
-    if errors:
-        raise InputErrors(errors)
-    return [_loop(records) for records in groups.values()]
-
-
-def _check_heading(heading: list[str], file: str, line: int) -> None:
-    for name in heading:
-        if name not in (*PLACE, *READINGS, *CONDITIONS):
-            raise MeasurementError(
-                f"unknown column {name!r}",
-                expected=f"some of {', '.join((*PLACE, *READINGS, *CONDITIONS))}",
-                file=file,
-                line=line,
-            )
-        if heading.count(name) > 1:
-            raise MeasurementError(f"column {name} stands twice", file=file, line=line)
-    vector = "direction" not in heading
-    angles = ANGLES if any(name in heading for name in ANGLES) else ()
-    for name in (*POSITION, *angles, *(VECTOR if vector else ("direction",)), *READINGS):
-        if name not in heading:
-            found = "no direction" if vector and name in VECTOR else f"column {name} is missing"
-            raise MeasurementError(
-                found, expected=f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}", file=file, line=line
-            )
-    if not vector and any(name in heading for name in VECTOR):
-        raise MeasurementError("two directions", expected="direction, or dx,dy,dz", file=file, line=line)
-
-
-def _signed(record: Mapping[str, str], name: str) -> float:
-    try:
-        value = float(record[name])
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= SIGNED[name]:
-        raise MeasurementError(f"{name} = {record[name]!r}", expected=f"a number within +-{SIGNED[name]:g}")
-    return value
-
-
-def _loop(records: list[tuple[int, dict[str, str], list[float]]]) -> Loop:
-    line, record, _ = records[0]
-    jog, force, displacement, *conditions = np.array([values for _, _, values in records]).T
-    return Loop(
-        place={name: record[name] for name in PLACE if name in record},
-        conditions={n: float(v.mean()) for n, v in zip(CONDITIONS, conditions, strict=True) if not np.isnan(v).any()},
-        jog=m_from_um(jog),
-        force=force,
-        displacement=m_from_um(displacement),
-        line=line,
-    )
+    tension: float = math.nan
+    compression: float = math.nan
 
 
 def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
@@ -211,43 +90,58 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
         The loop does not reach both sides, or gives no stiffness that could be.
     """
     where = {"file": file or None, "line": loop.line}
-    high, low = float(loop.jog.max()), float(loop.jog.min())
-    if not (low < -SAME_JOG and high > SAME_JOG):
+    drive, same = loop.drive, loop.same
+    high, low = float(drive.max()), float(drive.min())
+    if loop.jog is not None and not (low < -SAME_JOG and high > SAME_JOG):
         raise MeasurementError(
             f"{loop.title}: jogged from {um_from_m(low):g} to {um_from_m(high):g} um",
             expected="extremes on both sides of zero, as 0, +200, -200, 0 um",
             **where,  # type: ignore[arg-type]
         )
-    at_high, at_low = np.abs(loop.jog - high) < SAME_JOG, np.abs(loop.jog - low) < SAME_JOG
+    at_high, at_low = drive >= high - same, drive <= low + same
     force = float(loop.force[at_high].mean() - loop.force[at_low].mean())
-    moved = float(loop.displacement[at_high].mean() - loop.displacement[at_low].mean())
-    deflection = (high - low) - moved
+    deflection = float(loop.deflection[at_high].mean() - loop.deflection[at_low].mean())
     stiffness = force / deflection if deflection else math.inf
     if not SOFTEST <= n_per_mm_from_n_per_m(stiffness) <= STIFFEST:
         raise MeasurementError(
             f"{loop.title}: {force:g} N over a deflection of {um_from_m(deflection):g} um",
             expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm",
-            hint="force, jog and displacement count positive the same way; displacement is what the indicator read",
+            hint="tension and stretch are positive; a slope needs two forces"
+            if loop.jog is None
+            else "force, jog and displacement count positive the same way; displacement is what the indicator read",
             **where,  # type: ignore[arg-type]
         )
+    sides = (math.nan, math.nan) if loop.jog is not None else sides_of(loop.force, loop.deflection)
     return LoopFigures(
         stiffness=stiffness,
-        force=force / 2.0,
+        force=one_side * force if (one_side := side_of(loop)) else force / 2.0,
         deflection=deflection,
         lost_motion=_lost_motion(loop, high, low),
         loop_width=_loop_width(loop),
         linearity=_linearity(loop, deflection),
         closure=float(loop.deflection[-1] - loop.deflection[0]),
         shape=shape_of(loop.force, loop.deflection, _main_pass(loop)),
+        tension=sides[0],
+        compression=sides[1],
     )
+
+
+def side_of(loop: Loop) -> float:
+    """1 of a bench record under tension alone, -1 under compression alone, 0 of any other loop."""
+    if loop.jog is not None:
+        return 0.0
+    least = ONE_SIDE * float(np.ptp(loop.force))
+    return 1.0 if loop.force.min() >= -least else -1.0 if loop.force.max() <= least else 0.0
 
 
 def _lost_motion(loop: Loop, high: float, low: float) -> float:
     """Straight lines through the outer half of each side, both passes; their distance at zero force."""
-    at_zero = []
-    for outer in (loop.jog >= 0.5 * high - SAME_JOG, loop.jog <= 0.5 * low + SAME_JOG):
+    drive, same, at_zero = loop.drive, loop.same, []
+    if not low < 0.0 < high:
+        return math.nan
+    for outer in (drive >= 0.5 * high - SAME_JOG, drive <= 0.5 * low + SAME_JOG):
         force, deflection = loop.force[outer], loop.deflection[outer]
-        if np.ptp(loop.jog[outer]) < SAME_JOG or np.ptp(force) == 0.0:
+        if np.ptp(drive[outer]) < same or np.ptp(force) == 0.0:
             return math.nan
         centred = force - force.mean()
         slope = (centred @ deflection) / (centred @ centred)
@@ -257,7 +151,7 @@ def _lost_motion(loop: Loop, high: float, low: float) -> float:
 
 def _main_pass(loop: Loop) -> slice:
     """The records from one extreme to the other, whichever comes first."""
-    ends = sorted((int(np.argmax(loop.jog)), int(np.argmin(loop.jog))))
+    ends = sorted((int(np.argmax(loop.drive)), int(np.argmin(loop.drive))))
     return slice(ends[0], ends[1] + 1)
 
 
@@ -266,7 +160,7 @@ def _loop_width(loop: Loop) -> float:
     main = _main_pass(loop)
     order = np.argsort(loop.force[main], kind="stable")
     force, deflection = loop.force[main][order], loop.deflection[main][order]
-    other = np.r_[0 : main.start, main.stop : len(loop.jog)].astype(int)
+    other = np.r_[0 : main.start, main.stop : len(loop.force)].astype(int)
     other = other[(loop.force[other] >= force[0]) & (loop.force[other] <= force[-1])]
     if not len(other):
         return math.nan
@@ -282,11 +176,15 @@ def _linearity(loop: Loop, deflection: float) -> float:
 
 @dataclass(frozen=True)
 class Reduction:
-    """Loops of a file of raw records with what they say, and what reading it left to be said."""
+    """Loops of a file of raw records with what they say, and what reading it left to be said.
+
+    `history`: of struts measured alone, over their dates.
+    """
 
     loops: tuple[Loop, ...]
     figures: tuple[LoopFigures, ...]
     notes: tuple[str, ...]
+    history: HistoryDocument
 
 
 def reduce(raw: str | Path) -> Reduction:
@@ -317,7 +215,32 @@ def reduce(raw: str | Path) -> Reduction:
     """
     table = read_table(str(raw), "raw records", COLUMNS)
     loops = read_raw(table)
-    return Reduction(tuple(loops), tuple(reduce_loops(loops, str(raw))), tuple(table.notes))
+    figures = reduce_loops(loops, str(raw))
+    return Reduction(tuple(loops), tuple(figures), tuple(table.notes), _history(loops, figures))
+
+
+def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDocument:
+    """Struts measured alone over their dates; those of several lengths by length, as a strut's stiffness varies."""
+    rows = [(loop, one) for loop, one in zip(loops, figures, strict=True) if loop.jog is None]
+    lengths: dict[str, set[str]] = {}
+    for loop, _ in rows:
+        lengths.setdefault(loop.place["loop"], set()).add(loop.place.get("length_mm", ""))
+
+    def readings(chosen: list[tuple[Loop, float, float]]) -> Readings:
+        names = [loop.place["loop"] for loop, _, _ in chosen]
+        some = [loop.place.get("length_mm", "") for loop, _, _ in chosen]
+        shown = [f"{n}, {mm} mm" if len(lengths[n]) > 1 and mm else n for n, mm in zip(names, some, strict=True)]
+        return Readings(
+            np.array(shown, dtype=str),
+            np.array([day_of(loop.place.get(DATE, "")) for loop, _, _ in chosen]),
+            np.log([stiffness for _, stiffness, _ in chosen]),
+            np.array([side for _, _, side in chosen]),
+        )
+
+    secants = [(loop, one.stiffness, side_of(loop)) for loop, one in rows]
+    slopes = [(loop, k, s) for loop, one in rows for k, s in ((one.tension, 1.0), (one.compression, -1.0))]
+    slopes = [one for one in slopes if math.isfinite(one[1])]
+    return history(readings(secants), readings(slopes or secants))
 
 
 def document(reduction: Reduction) -> list[LoopEntry]:
@@ -399,13 +322,18 @@ def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> st
     """A measurement file, one row a loop; a figure that some loop lacks is left out as a column."""
     shown = [shop_figures(one) for one in figures]
     there = [name for name in FIGURES if all(math.isfinite(one[name]) for one in shown)]
-    place = [name for name in PLACE if name in loops[0].place]
+    alone = [loop.jog is None for loop in loops]
+    place = [n for n in PLACE if n in loops[0].place and not (all(alone) and not any(x.place[n] for x in loops))]
     conditions = [name for name in CONDITIONS if all(name in loop.conditions for loop in loops)]
     rows = []
     for loop, one, own in zip(loops, figures, shown, strict=True):
         cells = [loop.place[name] for name in place]
-        cells += [f"{n_per_mm_from_n_per_m(one.stiffness):.1f}", f"{one.force:.2f}"]
+        force = f"{one.force:.2f}"
+        cells += [f"{n_per_mm_from_n_per_m(one.stiffness):.1f}"]
+        cells += ([""] if loop.jog is None else [force]) * (not all(alone))
+        cells += ([force] if loop.jog is None else [""]) * any(alone)
         cells += [f"{loop.conditions[name]:.6g}" for name in conditions]
         cells += [f"{own[name] + 0.0:.3f}" for name in there]
         rows.append(cells)
-    return csv_text([*place, "stiffness_N_per_mm", "force_N", *conditions, *there], rows)
+    forces = ["force_N"] * (not all(alone)) + ["strut_force_N"] * any(alone)
+    return csv_text([*place, "stiffness_N_per_mm", *forces, *conditions, *there], rows)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+MOST = 200  # records of that way that are looked at singly; of more, runs are averaged: a logger's thousands
 FEWEST = 7  # records on the way from extreme to extreme from which a shape is looked for
 A_SIDE = 3  # records on each side of a kink
 POSITIONS = 4  # of a kink tried between two records
@@ -79,12 +80,13 @@ def shape_of(force: FloatArray, deflection: FloatArray, main: slice) -> Shape:
         The way from extreme to extreme.
     """
     lost = _work_lost(force, deflection)
-    f, y = force[main], deflection[main]
+    f, y = (_averaged(one[main]) for one in (force, deflection))
     if len(f) < FEWEST or f.max() <= 0.0 or f.min() >= 0.0:
         return Shape(lost=lost)
-    tried = [*_sticking(f), *_kinks(f), ("sides", np.nan, np.maximum(f, 0.0), np.minimum(f, 0.0))]
+    tried = [("sides", np.nan, np.maximum(f, 0.0), np.minimum(f, 0.0)), *_sticking(f), *_kinks(f)]
+    of_sides: Shape | None = None
     straight = _left([f], y)[0]
-    best, chance = Shape(lost=lost), SURE
+    best, chance, squares = Shape(lost=lost), SURE, {"": straight}
     for kind, at, one, other in tried:
         left, (_, first, second) = _left([one, other], y)
         # A kink's force is fitted, too: one more figure than its two slopes.
@@ -92,8 +94,31 @@ def shape_of(force: FloatArray, deflection: FloatArray, main: slice) -> Shape:
         found = _chance(straight, left, more, len(f) - 2 - more) * len(tried)
         slopes = (abs(1.0 / first), abs(1.0 / second)) if first * second > 0.0 else (0.0, 0.0)
         if found < chance and max(slopes) >= TELLING * min(slopes) > 0.0:
-            best, chance = Shape(kind, at, slopes[0], slopes[1], lost), found
+            best, chance, squares[kind] = Shape(kind, at, slopes[0], slopes[1], lost), found, left
+            of_sides = best if kind == "sides" else of_sides
+    # On this way alone, sticking that breaks away near zero force looks like two sides, which has no force to fit.
+    if of_sides is not None and best is not of_sides:
+        gain = _chance(squares["sides"], squares[best.kind], 1, len(f) - 4) * len(tried)
+        best = best if gain < SURE else of_sides
     return best
+
+
+def sides_of(force: FloatArray, deflection: FloatArray) -> tuple[float, float]:
+    """Stiffness in N/m under tension (positive force) and under compression; nan without `A_SIDE` records of both.
+
+    Slopes of two straight lines that meet at zero force, by least squares over all records.
+    """
+    if min(len(np.unique(force[force > 0.0])), len(np.unique(force[force < 0.0]))) < A_SIDE:
+        return np.nan, np.nan
+    pulled, pushed = _left([np.maximum(force, 0.0), np.minimum(force, 0.0)], deflection)[1][1:]
+    return (1.0 / float(pulled), 1.0 / float(pushed)) if min(pulled, pushed) > 0.0 else (np.nan, np.nan)
+
+
+def _averaged(values: FloatArray) -> FloatArray:
+    """At most `MOST` values, means of runs."""
+    if len(values) <= MOST:
+        return values
+    return np.array([run.mean() for run in np.array_split(values, MOST)])
 
 
 Tried = tuple[str, float, FloatArray, FloatArray]

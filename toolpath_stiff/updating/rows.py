@@ -17,6 +17,7 @@ from toolpath_stiff.stiffness.effects.measuring_loop import TIP, MeasuringLoop
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
 from toolpath_stiff.updating import loops
+from toolpath_stiff.updating.dates import day_of
 from toolpath_stiff.updating.loops import LoopReading
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
@@ -26,16 +27,18 @@ VECTOR = ("dx", "dy", "dz")
 LABELS = ("setup", "clamp", "repeat", "point", "loop")
 WIDE = tuple(f"measured_{axis}_N_per_mm" for axis in "xyz")
 WIDE_MODEL = tuple(f"modeled_{axis}_N_per_mm" for axis in "xyz")
+DATE = "date"
 OPTIONAL = ("force_N", "sd_N_per_mm", *LABELS, "time_min", "tool_extension_mm", "temperature_C")
 COLUMNS = Columns(
     numbers=(
         *POSITION, *ANGLES, *VECTOR, "stiffness_N_per_mm", "displacement_um", "force_N", "sd_N_per_mm", "time_min",
         "tool_extension_mm", "temperature_C", *loops.COLUMNS, *WIDE, *WIDE_MODEL,
     ),
-    texts=("direction", *LABELS),
+    texts=("direction", *LABELS, DATE),
 )  # fmt: skip
 KNOWN = (
-    *POSITION, *ANGLES, "direction", *VECTOR, "stiffness_N_per_mm", "displacement_um", *OPTIONAL, *loops.COLUMNS,
+    *POSITION, *ANGLES, "direction", *VECTOR, "stiffness_N_per_mm", "displacement_um", *OPTIONAL, DATE,
+    *loops.COLUMNS,
 )  # fmt: skip
 
 # N/mm: no machine is softer than 0.1 N/um or stiffer than 10 kN/um; beyond, the unit is not N/mm.
@@ -50,12 +53,12 @@ BOUNDS = {
     "time_min": (0.0, 1e6),
     "temperature_C": (-50.0, 200.0),
     "sd_um": (1e-4, 1e4),
-    "strut_force_N": (1e-3, 1e7),
+    "strut_force_N": (-1e7, 1e7),
     "length_mm": (1.0, 1e5),
 }
 # Of a loop beside the tip, which may read nothing, or backwards.
 LOOP_BOUNDS = {"stiffness_N_per_mm": (-1e12, 1e12), "displacement_um": (-loops.LARGEST_UM, loops.LARGEST_UM)}
-DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
+LIKE_DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be their quotient, rounding allowed
 
 
@@ -83,6 +86,8 @@ class Row:
         Further numeric columns, as they stand.
     file, line
         Where it was read.
+    date
+        As in the file; a date of ISO 8601.
     """
 
     position: tuple[float, ...]
@@ -99,6 +104,7 @@ class Row:
     line: int
     extra: Mapping[str, float] = field(default_factory=dict)
     beside: LoopReading | None = None
+    date: str = ""
 
 
 @dataclass(frozen=True)
@@ -186,7 +192,8 @@ def _check_names(heading: list[str]) -> Wrong | None:
 def _check_layout(heading: list[str]) -> Wrong | None:
     """Wide or long, not both, with the columns that the layout needs."""
     wide = any(name in heading for name in WIDE)
-    missing = [name for name in (POSITION + WIDE if wide else POSITION) if name not in heading]
+    places = () if "loop" in heading else POSITION  # a strut on a bench has none
+    missing = [name for name in (POSITION + WIDE if wide else places) if name not in heading]
     if missing:
         return f"column {missing[0]} is missing", "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm or more", ""
     if wide and any(name in heading for name in ("direction", *VECTOR, "stiffness_N_per_mm", "displacement_um")):
@@ -205,8 +212,9 @@ def _check_groups(heading: list[str]) -> Wrong | None:
 
 def _check_long(heading: list[str], planned: bool) -> Wrong | None:
     """One direction, and a stiffness unless it is still to be measured."""
-    if ("direction" in heading) == (VECTOR[0] in heading):
-        found = "no direction" if "direction" not in heading else "two directions"
+    directions = ("direction" in heading) + (VECTOR[0] in heading)
+    if directions == 2 or (not directions and "loop" not in heading):
+        found = "two directions" if directions else "no direction"
         return found, "direction, or dx,dy,dz", ""
     loaded = "displacement_um" in heading and ("force_N" in heading or "strut_force_N" in heading)
     if not planned and "stiffness_N_per_mm" not in heading and not loaded:
@@ -225,7 +233,10 @@ def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, p
     """The one reading of a long row, the three of a wide one."""
     loop = loops.loop_of(record.get("loop", ""))
     labels = {name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == TIP else str(loop)}
-    on_bench = loop.kind == "alone" and bool(record.get("length_mm"))
+    on_bench = loop.kind == "alone" and (
+        bool(record.get("length_mm")) or not any(record.get(name) for name in (*POSITION, *ANGLES))
+    )
+    day_of(record.get(DATE, ""))  # refuses what is no date
     position, angles = _pose(record, on_bench)
     force, beside = optional_number(record, "force_N"), None
     if loop == TIP:
@@ -253,6 +264,7 @@ def _rows_of(record: Mapping[str, str], more: list[str], file: str, line: int, p
                 line=line,
                 extra={name: float(record[name]) for name in more},
                 beside=beside,
+                date=record.get(DATE, ""),
             )
         )
     return rows
@@ -302,6 +314,8 @@ def _readings(record: Mapping[str, str], force: float, planned: bool) -> list[tu
 
 def direction_of(record: Mapping[str, str]) -> tuple[float, ...]:
     """Unit vector of `direction`, or of dx,dy,dz."""
+    if "direction" not in record and VECTOR[0] not in record:
+        raise MeasurementError("no direction", expected="direction, or dx,dy,dz")
     if "direction" in record:
         name = record["direction"].upper().removeprefix("+").removeprefix("-")
         if name not in AXES:
@@ -316,13 +330,15 @@ def direction_of(record: Mapping[str, str]) -> tuple[float, ...]:
 
 def number(record: Mapping[str, str], name: str, bounds: tuple[float, float] | None = None) -> float:
     """A cell that must hold a finite number within `BOUNDS`, or within these."""
+    if name not in record:
+        raise MeasurementError(f"no column {name}", expected="x_mm,y_mm,z_mm; only a strut measured alone has no pose")
     text = record[name]
     try:
         value = math.nan if "_" in text else float(text)  # Python's own "1_000" is no number of an office
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        dated = "the spreadsheet has made a date of it" if DATE.match(text) else ""
+        dated = "the spreadsheet has made a date of it" if LIKE_DATE.match(text) else ""
         raise MeasurementError(f"{name} = {text!r}", expected="a finite number", hint=dated)
     low, high = bounds or BOUNDS.get(name, (-math.inf, math.inf))
     if not low <= value <= high:
@@ -342,7 +358,8 @@ def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
     errors: list[InputError] = []
     for row in rows:
         # repr: nan differs from itself, its text does not.
-        at = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels, row.beside)
+        at = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels, row.beside,
+              row.date)  # fmt: skip
         numbered = bool(row.labels["repeat"]) and not across_files
         key = tuple(repr(part) for part in (at if numbered else (*at, row.stiffness)))
         seen = first.setdefault(key, row)

@@ -14,6 +14,7 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.report.compare.machine import machine_png
 from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare.variables import load_path_png, variables_png
+from toolpath_stiff.report.history import history_section, history_text
 from toolpath_stiff.report.loops import loops_section, loops_text
 from toolpath_stiff.report.pages import bullets, markup, picture, readings_page, section, table
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
@@ -86,6 +87,7 @@ def compare_html(found: Comparison, pictures: Mapping[str, bytes]) -> str:
         picture("strips.png", pictures, QUESTIONS),
         section("Readings far off", _far_off(document)),
         *loops_section(document["loops"]),
+        *history_section(document["history"]),
         picture("variables.png", pictures, QUESTIONS),
         section("Checks without a model", _model_free(document)),
         picture("load_path.png", pictures, QUESTIONS),
@@ -278,6 +280,7 @@ def text(document: ComparisonDocument) -> str:
             others = ", ".join(one["not_told_from"])
             lines.append(f"  ({plain(one['pattern'])} looks the same here as: {plain(others)})")
     lines += loops_text(document["loops"])
+    lines += history_text(document["history"])
     lines += ["", "checks without a model"]
     lines += [f"  {plain(one['text'])}" for one in document["model_free"]["checks"]]
     lines += [f"  {one['check']}: {one['reason']}" for one in document["model_free"]["cannot_check"]]

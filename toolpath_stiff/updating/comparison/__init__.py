@@ -20,7 +20,7 @@ from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import read_parameters
 from toolpath_stiff.updating.comparison.document import Answer, ComparisonDocument, document_of
-from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument, loops_document
+from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument, loops_document, strut_history
 from toolpath_stiff.updating.comparison.principles import LinkShares, assess, load_path_shares, model_free_checks
 from toolpath_stiff.updating.comparison.residuals import (
     Label,
@@ -33,6 +33,7 @@ from toolpath_stiff.updating.comparison.structure import (
     Scattering,
     find_structure,
 )
+from toolpath_stiff.updating.history import NOTHING, HistoryDocument
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
 from toolpath_stiff.updating.inference.covariances import Covariance, Groups
 from toolpath_stiff.updating.inference.doubts import suspect_entries, suspect_rows
@@ -144,7 +145,11 @@ def compare(
     """
     every, data = data, data.of_tip
     if not len(data):
-        raise InputError("no reading of the tip", expected="readings of tool against work beside those of other loops")
+        raise InputError(
+            "no reading of the tip",
+            expected="readings of tool against work beside those of other loops",
+            hint="`tps reduce` shows struts measured alone over their dates, from their raw records",
+        )
     predictor = Predictor(machine, data, effect_files)
     log_model = predictor.log_stiffness()
     bad = np.flatnonzero(~np.isfinite(log_model))
@@ -184,7 +189,7 @@ def compare(
         predictor, answers, residual, looked_for, numbers, cannot, notes, seed,
         [hint("which effect would explain it", asked.command("diagnose"))],
         suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=False),
-        _loops(machine, every, effect_files, noise_models(every, noise, strut_spread)[-1]),
+        *_loops(machine, every, effect_files, noise_models(every, noise, strut_spread)[-1], seed),
     )  # fmt: skip
     return Comparison(
         predictor, data, noises, log_model, residual, np.sqrt(last.scattering.square), last.scattering.covariance,
@@ -193,12 +198,15 @@ def compare(
     )  # fmt: skip
 
 
-def _loops(machine: Machine, data: Measurements, effect_files: Sequence[str | Path], noise: Noise) -> LoopsDocument:
-    """Readings of loops beside the tip against the machine as its file has it."""
+def _loops(
+    machine: Machine, data: Measurements, effect_files: Sequence[str | Path], noise: Noise, seed: int
+) -> tuple[LoopsDocument, HistoryDocument]:
+    """Readings of loops beside the tip against the machine as its file has it; struts alone over their dates."""
     if data.beside is None:
-        return {"by_loop": [], "readings": []}
+        return {"by_loop": [], "readings": []}, NOTHING
     predictor = Predictor(machine, data, effect_files)
-    return loops_document(data, predictor.log_stiffness(), covariance(noise, predictor))
+    log_model = predictor.log_stiffness()
+    return loops_document(data, log_model, covariance(noise, predictor)), strut_history(data, log_model, seed)
 
 
 def _places(data: Measurements) -> NDArray[np.int64]:

@@ -29,6 +29,7 @@ from toolpath_stiff.updating.comparison.structure import (
     Scattering,
     far_off,
 )
+from toolpath_stiff.updating.history import HistoryDocument
 from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.doubts import SuspectEntry
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
@@ -158,6 +159,7 @@ class ComparisonDocument(TypedDict):
     tests: list[PatternTest]
     far_off: list[FarOffEntry]
     loops: LoopsDocument
+    history: HistoryDocument
     model_free: ModelFree
     noise: list[NoiseEntry]
     not_tested: list[str]
@@ -217,6 +219,7 @@ def document_of(
     following: list[str],
     suspects: list[SuspectEntry],
     loops: LoopsDocument,
+    history: HistoryDocument,
 ) -> ComparisonDocument:
     """The content of compare.json; `following` are the commands that go on from here."""
     data, asked = predictor.data, question(predictor)
@@ -250,6 +253,7 @@ def document_of(
         "tests": tests,
         "far_off": _far_off_entries(residual, answers[-1], looked_for, data),
         "loops": loops,
+        "history": history,
         "model_free": {"checks": _checks(answers), "cannot_check": cannot},
         "noise": noises,
         "not_tested": [*(f"no column {name}" for name in data.missing), *notes],

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.updating.comparison.residuals import directions
+from toolpath_stiff.updating.dates import day_of
+from toolpath_stiff.updating.history import NOTHING, HistoryDocument, Readings, history
 from toolpath_stiff.updating.inference.covariances import Covariance
 from toolpath_stiff.updating.measurements import Measurements
 
@@ -115,3 +117,22 @@ def _entry(name: str, count: int, read: float, model: float, off: float, error: 
         "standard_deviations": ratio,
         "text": text,
     }
+
+
+def strut_history(data: Measurements, log_model: FloatArray, seed: int) -> HistoryDocument:
+    """Struts measured alone, over their dates and by the sign of their force.
+
+    Readings at several lengths are reduced to the mean of these by the model's own stiffness, `log_model` (n,).
+    """
+    if data.beside is None:
+        return NOTHING
+    alone = np.array([loop.kind == "alone" for loop in data.beside.loops])[data.beside.which]
+    names, log_read = data.loop[alone], np.log(data.stiffness[alone])
+    modelled = log_model[alone]
+    for name in np.unique(names):
+        own = names == name
+        log_read[own] -= modelled[own] - modelled[own].mean()
+    day = np.full(len(names), np.nan)
+    if data.date is not None:
+        day = np.array([day_of(text) for text in data.date[alone].tolist()])
+    return history(Readings(names, day, log_read, data.beside.side[alone]), seed=seed)
