@@ -19,7 +19,7 @@ from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
 from toolpath_stiff.updating.diagnosis.document import HeldErrors, RoundedErrors, interval, rounded_errors
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent, errors_text, gain_in_standard_errors
-from toolpath_stiff.updating.inference.prediction import scaled_law
+from toolpath_stiff.updating.inference.prediction import at_both_ends, scaled_law
 
 FloatArray = NDArray[np.float64]
 
@@ -269,7 +269,7 @@ def _step(update: Update, k: int) -> StepEntry:
 
 def _law(machine: Machine, step: Step, widening: float) -> list[LawEntry]:
     law = scaled_law(machine.strut_law, step.fit.law)
-    deviations = widening * np.sqrt(np.maximum(np.diag(step.fit.covariance)[:2], 0.0))
+    deviations = widening * np.sqrt(np.maximum(at_both_ends(law, np.diag(step.fit.covariance)[:2]), 0.0))
     ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))
     return [
         {

@@ -28,6 +28,7 @@ from toolpath_stiff.updating.inference.drawn import DrawnEntry
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
+from toolpath_stiff.updating.inference.prediction import at_both_ends
 from toolpath_stiff.updating.portrait.document import PortraitEntry, portrait_entry
 
 if TYPE_CHECKING:
@@ -303,8 +304,8 @@ def rounded_errors(residual: FloatArray) -> RoundedErrors:
 def _baseline(diagnosis: Diagnosis) -> BaselineEntry:
     held = diagnosis.held_out_base
     law = diagnosis.machine.strut_law
-    factors = np.exp(diagnosis.base.law)
-    deviations = np.sqrt(np.diag(diagnosis.base.covariance)[:2])
+    factors = np.exp(at_both_ends(law, diagnosis.base.law))
+    deviations = np.sqrt(at_both_ends(law, np.diag(diagnosis.base.covariance)[:2]))
     return {
         **rounded_errors(diagnosis.base.residual),
         "held_out_error_percent": json_number(100.0 * held.mean_error),
