@@ -17,7 +17,9 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import Machine, load_machine, machine_toml, packaged_machines, parse_machine
 from toolpath_stiff.machine.model import with_parameter
 from toolpath_stiff.nc import parse_program
+from toolpath_stiff.report.compare import text as compare_text
 from toolpath_stiff.report.machine import machine_figures
+from toolpath_stiff.report.update import text as update_text
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import parse_nominal
 from toolpath_stiff.rotations import rotation_matrices
@@ -267,7 +269,10 @@ def test_update_refits_the_law_in_its_own_form(law, tmp_path):
     ends = update.to_dict()["steps"][-1]["strut_law_N_per_um"]
     assert ends[0]["stiffness"] == pytest.approx(found.stiffness_1 / 1e6, rel=1e-4)
     if truth.constant:
-        assert ends[0]["stiffness"] == ends[1]["stiffness"] and ends[0]["sd"] == ends[1]["sd"]
+        assert len(ends) == 1 and ends[0]["length_mm"] is None
+    said = update_text(update.to_dict())
+    assert ("N/um at every length" in said) == truth.constant
+    assert ("N/um at 2561.6 mm and" in said) != truth.constant
 
 
 @pytest.mark.parametrize("law", [CONSTANT, table_text(BENT)], ids=["constant", "table"])
@@ -293,5 +298,5 @@ def test_compare_refits_the_law_too(law):
     figures = found["baseline"]["strut_law_refitted"]
     assert figures["mean_abs_error_percent"] < 2.0
     assert figures["excess_scatter_percent"] is not None
-    if law == CONSTANT:
-        assert figures["strut_law"]["N_per_um"][0] == figures["strut_law"]["N_per_um"][1]
+    assert len(figures["strut_law"]["N_per_um"]) == (1 if law == CONSTANT else 2)
+    assert "strut law refitted: " in compare_text(found)

@@ -1,6 +1,6 @@
 """Which route computes the tip compliance: the exact LAPACK route, the closed form, or the compiled loops.
 
-For linear struts on a rigid platform all three give the same to rounding; the choice is made by the number of poses.
+For struts on a rigid platform all three give the same to rounding; the choice is made by the number of poses.
 Physical effects take the exact route. Poses at which the closed form is ill-conditioned go to the exact route, which
 pivots, by themselves.
 

@@ -116,7 +116,7 @@ class StiffnessModel:
 
     @property
     def is_plain(self) -> bool:
-        """Whether linear struts and platform bars are all there is, so that the fast kernels apply."""
+        """Whether struts and platform bars are all there is, so that the fast kernels apply."""
         return all(type(active.effect) is PlatformFlexibility for active in self.effects)
 
 

@@ -37,7 +37,7 @@ class StrutLawCurvature(Effect):
     def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
         """Difference of the compliances with and without curvature.
 
-        On top of a table or a constant law as on top of a straight line; a constant law is taken from one end of the
+        On top of a table or a constant law as on top of a straight line; x of a constant law runs from one end of the
         travel to the other.
         """
         law = path.machine.strut_law
