@@ -47,7 +47,7 @@ BAD_FILES = [
     (changed("max_mm = 3650.0", "max_mm = true"), "max_mm = True"),
     (changed("max_mm = 3650.0", 'max_mm = "long"'), "max_mm = 'long'"),
     (changed("length_mm = 150.0", ""), "[reference_tool] length_mm is missing"),
-    (changed("stiffness_N_per_um = [46.5, 32.5]", "stiffness_N_per_um = [46.5]"), "2 numbers in N/um"),
+    (changed("stiffness_N_per_um = [46.5, 32.5]", "stiffness_N_per_um = [46.5]"), "2 or more numbers in N/um"),
     (changed("stiffness_N_per_um = [46.5, 32.5]", "stiffness_N_per_um = [46.5, -1]"), "stiffness_N_per_um = -1"),
     (changed("length_mm = [2561.6, 3213.2]", "length_mm = [2561.6, 2561.6]"), "both lengths are equal"),
     (changed("    [304.77, 330.0, 296.97],\n", ""), "6 rows of 3 numbers"),

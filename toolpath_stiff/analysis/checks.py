@@ -433,7 +433,7 @@ def _at(model: StiffnessModel, pose: Pose) -> PoseReport:
 def _struts(machine: Machine) -> Iterator[str]:
     """Stiffnesses of a strut that no strut has, at the lengths that the file gives and at the ends of the travel."""
     law = machine.strut_law
-    given = [(law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2)]
+    given = law.points
     ends = [length for length in machine.limits.strut_length if np.isfinite(length)]
     found = [*_implausible("[strut_law]", given)]
     if not found:

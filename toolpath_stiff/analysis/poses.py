@@ -155,7 +155,7 @@ def _evaluate_fast(
     route: str,
     result: PoseStiffness,
 ) -> IntArray:
-    """Poses of linear struts on a rigid platform along loads that the geometry directs: margins and stiffness at once.
+    """Poses of struts on a rigid platform along loads that the geometry directs: margins and stiffness at once.
 
     Returns the rows that are left: other directions, poses near singular ones, and where an angle near zero decides.
     """

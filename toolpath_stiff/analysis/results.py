@@ -265,7 +265,9 @@ def assumptions(analysis: Analysis) -> list[str]:
     found.append(f"a force of {analysis.force:g} N for deflections{secant}")
     law = machine.strut_law
     found.append(
-        f"the strut law is extrapolated outside {mm_from_m(min(law.length_1, law.length_2)):.1f} to "
+        "the stiffness of a strut is the same at every length"
+        if law.constant
+        else f"the strut law is extrapolated outside {mm_from_m(min(law.length_1, law.length_2)):.1f} to "
         f"{mm_from_m(max(law.length_1, law.length_2)):.1f} mm of strut length"
     )
     if analysis.parameter_band is not None:

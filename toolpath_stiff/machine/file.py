@@ -44,7 +44,8 @@ SINGULAR = 1e-6
 class Key:
     """What a key of a machine file may hold.
 
-    `shape` () for a number, (3,) or (6, 3) for lists; a tuple of two lengths in `lengths` admits either.
+    `shape` () for a number, (3,) or (6, 3) for lists; `also_length` admits a second length, `many` any greater one,
+    `or_one` a single number instead of a list.
     Bounds are inclusive unless `open_low`.
     """
 
@@ -57,6 +58,8 @@ class Key:
     infinite: bool = False
     open_low: bool = False
     also_length: int | None = None
+    many: bool = False
+    or_one: bool = False
 
 
 JOINTS_MM = Key(unit="mm", shape=(6, 3), required=False)
@@ -72,8 +75,8 @@ SECTIONS: dict[str, dict[str, Key]] = {
     "platform_joints": {"mm": JOINTS_MM, "cylindrical_mm_deg": JOINTS_CYLINDRICAL},
     "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
     "strut_law": {
-        "length_mm": Key(unit="mm", shape=(2,), low=0.0, open_low=True),
-        "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=1e-6, high=1e5),
+        "length_mm": Key(unit="mm", shape=(2,), low=0.0, open_low=True, required=False, many=True),
+        "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=1e-6, high=1e5, many=True, or_one=True),
     },
     "platform": {"bar_stiffness_N_per_m": Key(unit="N/m", low=1e5, high=INFINITY, infinite=True, open_low=True)},
     "limits.strut_length": {
@@ -127,6 +130,8 @@ def describe(rule: Key) -> str:
     }[rule.shape]
     if rule.also_length:
         shape = f"{rule.shape[0]} or {rule.also_length} numbers"
+    if rule.many:
+        shape = f"{'a number or ' if rule.or_one else ''}{rule.shape[0]} or more numbers"
     unit = f" in {rule.unit}" if rule.unit else ""
     low = f"above {rule.low:g}" if rule.open_low else f"at least {rule.low:g}"
     high = "" if math.isinf(rule.high) else f", at most {rule.high:g}"
@@ -198,6 +203,7 @@ def _machine(toml: TomlReader, table: dict[str, Any]) -> Machine:
     values = {name: _section(toml, name, content) for name, content in sections.items()}
     top, setup = values[""], values.get("setup", {})
     effects, instruments = _entries(toml, table, "effect"), _entries(toml, table, "instrument")
+    law = _strut_law(toml, values["strut_law"], values["limits.strut_length"])
     machine = Machine(
         name=top["name"],
         title=top.get("title", top["name"]),
@@ -205,7 +211,7 @@ def _machine(toml: TomlReader, table: dict[str, Any]) -> Machine:
         frame_joints=_joints(toml, "frame_joints", values),
         platform_joints=_joints(toml, "platform_joints", values),
         reference_tool_length=m_from_mm(values["reference_tool"]["length_mm"]),
-        strut_law=_strut_law(toml, values["strut_law"]),
+        strut_law=law,
         platform_bar_stiffness=values.get("platform", {}).get("bar_stiffness_N_per_m", INFINITY),
         limits=_limits(toml, values),
         default_origin=_pose(setup.get("default_origin_mm", np.zeros(3))),
@@ -217,7 +223,7 @@ def _machine(toml: TomlReader, table: dict[str, Any]) -> Machine:
         remarks={name: v["remark"] for name, v in values.items() if name and "remark" in v},
         effects=effects,
         instruments=instruments,
-        uncertainty=read_uncertainty(toml, (*effects, *instruments)),
+        uncertainty=read_uncertainty(toml, law, (*effects, *instruments)),
     )
     _check_law(toml, machine)
     _check_neutral_pose(toml, machine)
@@ -228,8 +234,9 @@ def _check_law(toml: TomlReader, machine: Machine) -> None:
     """The struts must keep some stiffness over their whole travel."""
     law = machine.strut_law
     for key, length in zip(("min_mm", "max_mm"), machine.limits.strut_length, strict=True):
-        if np.isfinite(length) and law.intercept + law.slope * length <= 0.0:
-            vanishes = mm_from_m(-law.intercept / law.slope)
+        intercept, slope = law.line_at(length)
+        if np.isfinite(length) and intercept + slope * length <= 0.0:
+            vanishes = mm_from_m(-intercept / slope)
             raise _fail(
                 toml,
                 "limits.strut_length",
@@ -332,8 +339,7 @@ def _value(toml: TomlReader, section: str, key: str, raw: Any, rule: Key) -> Any
             raise _fail(toml, section, key, f" = {shown}", expected="a text that is not empty")
         return raw
     array = as_array(raw)
-    shapes = [rule.shape, *([(rule.also_length,)] if rule.also_length else [])]
-    if array is None or array.shape not in shapes:
+    if array is None or not _fits(array.shape, rule):
         raise _fail(toml, section, key, f" = {shown}", expected=describe(rule))
     bad = np.isnan(array) | (array < rule.low) | (array > rule.high)
     if rule.open_low:
@@ -344,6 +350,16 @@ def _value(toml: TomlReader, section: str, key: str, raw: Any, rule: Key) -> Any
         worst = float(array[bad][0])
         raise _fail(toml, section, key, f" = {worst:g}", expected=describe(rule))
     return float(array) if array.ndim == 0 else array
+
+
+def _fits(shape: tuple[int, ...], rule: Key) -> bool:
+    if rule.many and len(shape) == 1:
+        return shape[0] >= rule.shape[0]
+    return (
+        shape == rule.shape
+        or (rule.also_length is not None and shape == (rule.also_length,))
+        or (rule.or_one and not shape)
+    )
 
 
 def _joints(toml: TomlReader, section: str, values: dict[str, dict[str, Any]]) -> FloatArray:
@@ -364,13 +380,39 @@ def _joints(toml: TomlReader, section: str, values: dict[str, dict[str, Any]]) -
     return m_from_mm(rows)
 
 
-def _strut_law(toml: TomlReader, values: dict[str, Any]) -> StrutLaw:
-    lengths, stiffnesses = m_from_mm(values["length_mm"]), n_per_m_from_n_per_um(values["stiffness_N_per_um"])
+def _strut_law(toml: TomlReader, values: dict[str, Any], travel: dict[str, Any]) -> StrutLaw:
+    """Linear by two lengths, a table by more, constant by one stiffness without a length."""
+    lengths, stiffnesses = values.get("length_mm"), n_per_m_from_n_per_um(values["stiffness_N_per_um"])
+    if np.ndim(stiffnesses) == 0:
+        if lengths is not None:
+            found = f": {len(lengths)} lengths, but one stiffness"
+            raise _fail(toml, "strut_law", "length_mm", found, "a stiffness for each length, or no length_mm: constant")
+        low, high = m_from_mm(travel["min_mm"]), m_from_mm(travel["max_mm"])
+        return StrutLaw(low, float(stiffnesses), high, float(stiffnesses), constant=True)
+    if lengths is None:
+        expected = "a length for each stiffness, or a single stiffness: constant"
+        raise _fail(toml, "strut_law", "length_mm", " is missing", expected)
+    if len(lengths) != len(stiffnesses):
+        found = f": {len(stiffnesses)} stiffnesses, but {len(lengths)} lengths"
+        raise _fail(toml, "strut_law", "stiffness_N_per_um", found, f"{len(lengths)} numbers, one for each length")
+    lengths = m_from_mm(lengths)
+    if len(lengths) > 2:
+        _check_table(toml, lengths)
+        return StrutLaw.table(lengths, stiffnesses)
     if lengths[0] == lengths[1]:
         raise _fail(toml, "strut_law", "length_mm", ": both lengths are equal", "two lengths apart")
     if abs(lengths[1] - lengths[0]) < CLOSEST_LENGTHS:
         raise _fail(toml, "strut_law", "length_mm", ": the lengths are all but equal", "two lengths 0.001 mm apart")
     return StrutLaw(float(lengths[0]), float(stiffnesses[0]), float(lengths[1]), float(stiffnesses[1]))
+
+
+def _check_table(toml: TomlReader, lengths: FloatArray) -> None:
+    """Lengths of a table rise, each 0.001 mm or more above the one before."""
+    bad = np.flatnonzero(np.diff(lengths) < CLOSEST_LENGTHS)
+    if len(bad):
+        before, after = (float(mm_from_m(v)) for v in lengths[bad[0] : bad[0] + 2])
+        found = f": {after:g} comes after {before:g} (number {bad[0] + 2})"
+        raise _fail(toml, "strut_law", "length_mm", found, "lengths of a table rising, 0.001 mm apart or more")
 
 
 def _limits(toml: TomlReader, values: dict[str, dict[str, Any]]) -> Limits:

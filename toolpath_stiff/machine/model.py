@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import EffectError, InputError, MachineFileError
 from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
@@ -25,42 +25,121 @@ ORIGINS = ("published", "recovered", "assumed", "fitted")
 
 UNCERTAINTY_KEYS = ("parameters", "sd", "correlation")
 STRUT_LAW = ("strut_law.stiffness_1_N_per_um", "strut_law.stiffness_2_N_per_um")
+CONSTANT_LAW = ("strut_law.stiffness_N_per_um",)
+NO_END = 1e3  # m, the room of a law that holds at every length: finite, because a search takes differences of it
 NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may leave
 
 
 @dataclass(frozen=True)
 class StrutLaw:
-    """Strut stiffness as a linear function of length, the paper's equation 5.
+    """Strut stiffness as a function of length: linear (the paper's equation 5), a table, or constant.
 
-    k(L) = k1 + (k2 - k1) (L - L1) / (L2 - L1). Lengths in m, stiffnesses in N/m. Between L1 and L2 the law
-    is what its source gives; outside it is extrapolated.
+    Linear: k(L) = k1 + (k2 - k1) (L - L1) / (L2 - L1). A table is that straight line between its first and its last
+    point times a shape, so that moving k1 or k2 scales the table and keeps its shape. Between L1 and L2 the law is
+    what its source gives; outside it is extrapolated, a table along its first and its last segment.
+
+    Attributes
+    ----------
+    length_1, length_2
+        m, where the law begins and ends; of a constant law the ends of the travel.
+    stiffness_1, stiffness_2
+        N/m there; of a constant law `stiffness_1` is both.
+    shape
+        Of a table: (length in m, stiffness over that of the straight line) of each point, lengths rising, both ends
+        with 1.
+    constant
+        Whether the stiffness is the same at every length, inside and outside the travel.
     """
 
     length_1: float
     stiffness_1: float
     length_2: float
     stiffness_2: float
+    shape: tuple[tuple[float, float], ...] = ()
+    constant: bool = False
+
+    def __post_init__(self) -> None:
+        """One stiffness at both ends of a constant law, also after `dataclasses.replace`."""
+        if self.constant:
+            object.__setattr__(self, "stiffness_2", self.stiffness_1)
+
+    @classmethod
+    def table(cls, lengths: FloatArray, stiffnesses: FloatArray) -> StrutLaw:
+        """Through three or more points: (p,) m, rising, and (p,) N/m, more than 0."""
+        ends = cls(float(lengths[0]), float(stiffnesses[0]), float(lengths[-1]), float(stiffnesses[-1]))
+        factors = stiffnesses / ends.stiffness(lengths)
+        factors[[0, -1]] = 1.0
+        return replace(ends, shape=tuple(zip(lengths.tolist(), factors.tolist(), strict=True)))
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of its free constants, as `[uncertainty]` of a machine file has them."""
+        return CONSTANT_LAW if self.constant else STRUT_LAW
+
+    @property
+    def points(self) -> list[tuple[float, float]]:
+        """Length in m and stiffness in N/m of each point that the law runs through; of a constant law one."""
+        if self.constant:
+            return [(self.length_1, self.stiffness_1)]
+        if not self.shape:
+            return [(self.length_1, self.stiffness_1), (self.length_2, self.stiffness_2)]
+        lengths, factors = np.array(self.shape).T
+        inner = (factors * self._straight(lengths)).tolist()[1:-1]
+        # Not by the straight line, which may miss its second end by the last digit.
+        return list(zip(lengths.tolist(), [self.stiffness_1, *inner, self.stiffness_2], strict=True))
 
     @property
     def slope(self) -> float:
-        """dk/dL in N/m per m."""
+        """dk/dL in N/m per m of the straight line between both ends."""
         return (self.stiffness_2 - self.stiffness_1) / (self.length_2 - self.length_1)
 
     @property
     def intercept(self) -> float:
-        """Stiffness at L = 0 in N/m, so that k(L) = intercept + slope L."""
+        """Stiffness of that line at L = 0 in N/m; unless the law is a table, k(L) = intercept + slope L."""
         return self.stiffness_1 - self.slope * self.length_1
 
     def stiffness(self, length: FloatArray) -> FloatArray:
         """Stiffness k(L) in N/m, of any shape. At or below 0 the law has been carried too far."""
+        if not self.shape:
+            return self._straight(length)
+        lengths, stiffnesses = np.array(self.points).T
+        return _piecewise(length, lengths, stiffnesses)
+
+    def _straight(self, length: FloatArray) -> FloatArray:
         return self.intercept + self.slope * length
 
+    def line_at(self, length: float) -> tuple[float, float]:
+        """Stiffness at L = 0 in N/m and slope in N/m per m of the straight piece of the law at that length."""
+        if not self.shape:
+            return self.intercept, self.slope
+        lengths, stiffnesses = np.array(self.points).T
+        i = _segment(np.array(length), lengths)
+        slope = float((stiffnesses[i + 1] - stiffnesses[i]) / (lengths[i + 1] - lengths[i]))
+        return float(stiffnesses[i]) - slope * float(lengths[i]), slope
+
+    def weights(self, length: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What each of its two constants counts in the stiffness: k(L) = k1 first + k2 second.
+
+        Of a table both share a point as on the straight line between the ends, times the shape: they do not change
+        when the ends do. Of a constant law the first is all.
+        """
+        if self.constant:
+            return np.ones_like(length), np.zeros_like(length)
+        if not self.shape:
+            second = (length - self.length_1) / (self.length_2 - self.length_1)
+            return 1.0 - second, second
+        lengths, factors = np.array(self.shape).T
+        second = (lengths - self.length_1) / (self.length_2 - self.length_1)
+        return _piecewise(length, lengths, factors * (1.0 - second)), _piecewise(length, lengths, factors * second)
+
     def room(self, length: FloatArray) -> FloatArray:
-        """How far lengths lie inside the range that the law was given for, m; negative outside."""
+        """How far lengths lie inside the range that the law was given for, m; negative outside; `NO_END`: no range."""
         return self.room_of(length, length)
 
     def room_of(self, shortest: FloatArray, longest: FloatArray) -> FloatArray:
         """How far the shortest and the longest of some lengths lie inside that range, m."""
+        if self.constant:
+            return np.asarray(NO_END + 0.0 * (shortest + longest))  # nan stays nan
         # Half a micrometre: a pose that lands on an end of the range by construction is not outside it.
         slack = 5e-7
         low, high = sorted((self.length_1, self.length_2))
@@ -69,6 +148,17 @@ class StrutLaw:
     def extrapolates(self, length: FloatArray) -> BoolArray:
         """Whether a length lies outside the range that the law was given for."""
         return np.asarray(self.room(length) < 0.0)
+
+
+def _piecewise(at: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
+    """Linear between values (p,) at rising knots (p,), at positions of any shape; the end pieces go on outside."""
+    i = _segment(at, knots)
+    slope = (values[1:] - values[:-1]) / (knots[1:] - knots[:-1])
+    return np.asarray(values[i] + slope[i] * (at - knots[i]))
+
+
+def _segment(at: FloatArray, knots: FloatArray) -> IntArray:
+    return np.asarray(np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2))
 
 
 @dataclass(frozen=True)
@@ -203,7 +293,7 @@ class Uncertainty:
     Attributes
     ----------
     names
-        `STRUT_LAW`, or an effect's name and the key of its parameter: `spindle_compliance.radial_nm_per_N`.
+        `StrutLaw.parameters`, or an effect's name and the key of its parameter: `spindle_compliance.radial_nm_per_N`.
     sd
         (p,) standard deviations in the units of the keys.
     correlation
@@ -247,10 +337,10 @@ def with_parameter(machine: Machine, name: str, change: float) -> Machine:
 
     Raises `InputError` if the machine has no such parameter.
     """
-    if name in STRUT_LAW:
-        law = machine.strut_law
+    law = machine.strut_law
+    if name in law.parameters:
         values = [law.stiffness_1, law.stiffness_2]
-        values[STRUT_LAW.index(name)] += n_per_m_from_n_per_um(change)
+        values[law.parameters.index(name)] += n_per_m_from_n_per_um(change)
         return machine.with_changes(strut_law=replace(law, stiffness_1=values[0], stiffness_2=values[1]))
     owner, _, key = name.partition(".")
     for kind in ("effects", "instruments"):
@@ -263,7 +353,7 @@ def with_parameter(machine: Machine, name: str, change: float) -> Machine:
     raise MachineFileError(f"machine {machine.name} has no parameter {name!r}")
 
 
-def read_uncertainty(toml: TomlReader, entries: Sequence[EffectEntry]) -> Uncertainty | None:
+def read_uncertainty(toml: TomlReader, law: StrutLaw, entries: Sequence[EffectEntry]) -> Uncertainty | None:
     """`[uncertainty]` of a machine file, checked; None where there is none. Raises `InputError`."""
     table = toml.data.get("uncertainty")
     if table is None:
@@ -276,7 +366,8 @@ def read_uncertainty(toml: TomlReader, entries: Sequence[EffectEntry]) -> Uncert
     for key in UNCERTAINTY_KEYS:
         if key not in table:
             raise _fail(toml, key, " is missing", "parameters, sd and correlation")
-    names = _parameters(toml, table["parameters"], entries)
+    known = [*law.parameters, *(f"{entry.name}.{key}" for entry in entries for key in entry.parameters)]
+    names = _parameters(toml, table["parameters"], known)
     return Uncertainty(names, _deviations(toml, table["sd"], len(names)), _correlation(toml, table, len(names)))
 
 
@@ -285,11 +376,10 @@ def _fail(toml: TomlReader, key: str, found: str, expected: str) -> InputError:
     return MachineFileError(f"{f'[uncertainty] {key}'.strip()}{found}", expected=expected, file=toml.file, line=line)
 
 
-def _parameters(toml: TomlReader, names: Any, entries: Sequence[EffectEntry]) -> tuple[str, ...]:
+def _parameters(toml: TomlReader, names: Any, known: Sequence[str]) -> tuple[str, ...]:
     """The names of the parameters, each once, each of the machine file."""
     if not isinstance(names, list) or not names or len(set(map(str, names))) != len(names):
         raise _fail(toml, "parameters", f" = {names!r}", "a list of parameters, each once")
-    known = list(STRUT_LAW) + [f"{entry.name}.{key}" for entry in entries for key in entry.parameters]
     for name in names:
         if name not in known:
             found = f": {name!r} is not a parameter of this file"

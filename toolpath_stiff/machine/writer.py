@@ -24,6 +24,9 @@ HEADINGS = {
     "# Tools of other lengths (G43 with a tool table) move the tip along the spindle.",
     "strut_law": "Stiffness of a strut, linear in its length: two lengths in mm and the stiffness at each in N/um.\n"
     "# Outside the two lengths it is extrapolated, and every result says how often.",
+    "strut_law, a table": "Stiffness of a strut by its length: lengths in mm and the stiffness at each in N/um,\n"
+    "# linear between. Outside it is extrapolated along the end segments, and every result says how often.",
+    "strut_law, constant": "Stiffness of a strut in N/um, the same at every length.",
     "platform": "Stiffness in N/m of each of the 19 bars that stand for platform, spindle and tool; inf is rigid.",
     "limits.strut_length": "Travel of the struts, between the joint centres, in mm.",
     "limits.joint_angle": "Largest swing of the joints in degrees from the direction that each strut has at the\n"
@@ -45,9 +48,11 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
         "platform_joints": {"mm": _rows(mm_from_m(machine.platform_joints))},
         "reference_tool": {"length_mm": _number(mm_from_m(machine.reference_tool_length))},
         "strut_law": {
-            "length_mm": _list([mm_from_m(law.length_1), mm_from_m(law.length_2)]),
-            "stiffness_N_per_um": _list([n_per_um_from_n_per_m(k) for k in (law.stiffness_1, law.stiffness_2)]),
-        },
+            "length_mm": _list([mm_from_m(length) for length, _ in law.points]),
+            "stiffness_N_per_um": _list([n_per_um_from_n_per_m(k) for _, k in law.points]),
+        }
+        if not law.constant
+        else {"stiffness_N_per_um": _number(n_per_um_from_n_per_m(law.stiffness_1))},
         "platform": {"bar_stiffness_N_per_m": _number(machine.platform_bar_stiffness)},
         "limits.strut_length": {
             "min_mm": _number(mm_from_m(limits.strut_length[0])),
@@ -73,8 +78,10 @@ def machine_toml(machine: Machine, preamble: str = "") -> str:
     lines += [
         f"{key} = {toml_text(getattr(machine, key))}" for key in ("name", "title", "source") if getattr(machine, key)
     ]
+    kind_of_law = ", constant" if law.constant else ", a table" if law.shape else ""
     for name, values in sections.items():
-        lines += ["", f"# {HEADINGS[name]}", f"[{name}]", *(f"{key} = {value}" for key, value in values.items())]
+        heading = HEADINGS[name + kind_of_law if name == "strut_law" else name]
+        lines += ["", f"# {heading}", f"[{name}]", *(f"{key} = {value}" for key, value in values.items())]
         lines.append(f"origin = {toml_text(machine.origins.get(name, 'assumed'))}")
         if name in machine.remarks:
             lines.append(f"remark = {toml_text(machine.remarks[name])}")

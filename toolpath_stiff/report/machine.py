@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.report.figure import BLUE, house_style, new_figure, picture
 from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.rotations import rotation_matrices
@@ -221,6 +221,14 @@ def _draw_view(axes: Any, frame: FloatArray, joints: FloatArray, tip: FloatArray
     axes.grid(True, color="#e5e7eb", lw=0.6)
 
 
+def _law_figures(law: StrutLaw) -> tuple[str, str]:
+    """Value and unit of a strut law."""
+    if law.constant:
+        return f"{law.stiffness_1 / 1e6:g}", "N/um at every length"
+    first, *rest = [f"{stiffness / 1e6:g} N/um at {mm_from_m(length):g}" for length, stiffness in law.points]
+    return ", ".join([f"{first} mm", *rest]), "mm, linear between" if law.shape else "mm, linear"
+
+
 def machine_figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
     """Quantity, value, unit, origin, remark of a machine's figures, in the shop's units."""
     limits, law = machine.limits, machine.strut_law
@@ -248,13 +256,7 @@ def machine_figures(machine: Machine) -> list[tuple[str, str, str, str, str]]:
     return [
         *rows,
         row("reference tool length", f"{mm_from_m(machine.reference_tool_length):g}", "mm", "reference_tool"),
-        row(
-            "strut stiffness",
-            f"{law.stiffness_1 / 1e6:g} N/um at {mm_from_m(law.length_1):g} mm, "
-            f"{law.stiffness_2 / 1e6:g} N/um at {mm_from_m(law.length_2):g}",
-            "mm, linear",
-            "strut_law",
-        ),
+        row("strut stiffness", *_law_figures(law), "strut_law"),
         row("platform bar stiffness", f"{machine.platform_bar_stiffness:g}", "N/m", "platform"),
         row("strut length", numbers([mm_from_m(v) for v in limits.strut_length]), "mm", "limits.strut_length"),
         row("frame joint angle up to", f"{deg_from_rad(limits.frame_joint_angle):g}", "deg", "limits.joint_angle"),

@@ -294,14 +294,19 @@ class Covariance:
 
 
 def _spread(scale: Scale, nuisances: Nuisances) -> FloatArray:
-    """(n, 8) changes of ln readings by one standard deviation of each strut and of the strut law's two constants."""
+    """(n, 8) changes of ln readings by one standard deviation of each strut and of the strut law at its two ends.
+
+    (n, 7) of a law with one stiffness; of a law with more than two the points between move with the ends.
+    """
     step = 1e-4
     columns = []
     for strut in range(6):
         factors = np.where(np.arange(6) == strut, 1.0 + step, 1.0)
         columns.append(nuisances.strut_spread * scale.change(HiddenMachine(strut_factors=factors)) / step)
-    for which in range(2):
-        stiffer = scale.nominal.law_stiffnesses * np.where(np.arange(2) == which, 1.0 + step, 1.0)
+    (first, last), at = scale.nominal.law_ends, scale.nominal.law_lengths
+    toward = (at - first) / (last - first)
+    for moved in [np.ones(1)] if len(at) == 1 else [1.0 - toward, toward]:
+        stiffer = scale.nominal.law_stiffnesses * (1.0 + step * moved)
         other = dataclasses.replace(scale.nominal, law_stiffnesses=stiffer)
         columns.append(FREE_LAW * (np.log(readings(other, HiddenMachine(), scale.rows)) - scale.base) / step)
     return np.column_stack(columns)

@@ -278,11 +278,21 @@ def _true_geometry(
 
 def _struts(nominal: Nominal, hidden: HiddenMachine, rows: Rows, lengths: FloatArray) -> FloatArray:
     """(n, 6, 6) N/m: the paper's law, linear in length (its equation 5), with curvature, spread and oddities."""
-    (l1, l2), (k1, k2) = nominal.law_lengths, nominal.law_stiffnesses
+    l1, l2 = nominal.law_ends
     s = (lengths - l1) / (l2 - l1)
     # The exponential keeps strongly curved laws positive beyond the two lengths.
-    law = (k1 + (k2 - k1) * s) * np.exp(hidden.curvature * 4.0 * s * (1.0 - s))
+    law = _law(nominal, lengths) * np.exp(hidden.curvature * 4.0 * s * (1.0 - s))
     return strut_block(hidden.oddity, law * hidden.strut_factors, lengths, rows)
+
+
+def _law(nominal: Nominal, lengths: FloatArray) -> FloatArray:
+    """N/m of struts of any lengths (m) by the nominal law, which its end pieces carry on."""
+    at, stiffness = nominal.law_lengths, nominal.law_stiffnesses
+    if len(at) == 1:
+        return np.full_like(lengths, stiffness[0])
+    piece = np.clip(np.searchsorted(at, lengths, side="right") - 1, 0, len(at) - 2)
+    share = (lengths - at[piece]) / (at[piece + 1] - at[piece])
+    return np.asarray(stiffness[piece] + (stiffness[piece + 1] - stiffness[piece]) * share)
 
 
 def _joint_law(hidden: HiddenMachine) -> Callable[[FloatArray], FloatArray]:

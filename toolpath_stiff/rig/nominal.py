@@ -41,7 +41,8 @@ class Nominal:
     tool_length
         m, length of the reference tool.
     law_lengths, law_stiffnesses
-        (2,) m and N/m; the stiffness of a strut is linear in its length through both points.
+        (p,) m and N/m; the stiffness of a strut is linear in its length between two points, and along the first and the
+        last two outside. One point: the same at every length.
     strut_range
         (2,) m, shortest and longest strut.
     swing
@@ -60,6 +61,13 @@ class Nominal:
     strut_range: tuple[float, float]
     swing: tuple[float, float] | None
     neutral_pose: FloatArray
+
+    @property
+    def law_ends(self) -> tuple[float, float]:
+        """Shortest and longest strut that the law is given for, m; of one point the travel."""
+        if len(self.law_lengths) == 1:
+            return self.strut_range
+        return float(self.law_lengths[0]), float(self.law_lengths[-1])
 
     @property
     def vertices(self) -> IntArray:
@@ -119,14 +127,15 @@ def parse_nominal(text: str, file: str) -> Nominal:
         )
     angles = _section(toml, "limits.joint_angle")
     neutral = _numbers(toml, "limits.joint_angle", "neutral_pose_mm_deg", 6) if angles else np.zeros(6)
+    lengths, stiffnesses = _law(toml)
     return Nominal(
         name=str(table.get("name", "machine")),
         text=text,
         frame_joints=_joints(toml, "frame_joints"),
         platform_joints=_joints(toml, "platform_joints"),
         tool_length=m_from_mm(float(_numbers(toml, "reference_tool", "length_mm", 1)[0])),
-        law_lengths=m_from_mm(_numbers(toml, "strut_law", "length_mm", 2)),
-        law_stiffnesses=n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", 2)),
+        law_lengths=lengths,
+        law_stiffnesses=stiffnesses,
         strut_range=(
             m_from_mm(float(_numbers(toml, "limits.strut_length", "min_mm", 1)[0])),
             m_from_mm(float(_numbers(toml, "limits.strut_length", "max_mm", 1)[0])),
@@ -160,6 +169,19 @@ def _numbers(toml: TomlReader, section: str, key: str, count: int) -> FloatArray
         found = f"{key} = {'missing' if given is None else repr(given)}"
         raise toml.error(found, f"{count} number{'s' * (count > 1)}", where=f"{section}.{key}")
     return values
+
+
+def _law(toml: TomlReader) -> tuple[FloatArray, FloatArray]:
+    """(p,) m and (p,) N/m of the strut law: a stiffness for each of two or more lengths, or one without a length."""
+    lengths, stiffnesses = (_section(toml, "strut_law").get(key) for key in ("length_mm", "stiffness_N_per_um"))
+    if lengths is None and not isinstance(stiffnesses, list):
+        one = n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", 1))
+        return np.zeros(1), one
+    count = max(2, len(lengths) if isinstance(lengths, list) else 0)
+    at = m_from_mm(_numbers(toml, "strut_law", "length_mm", count))
+    if count > 2 and not (np.diff(at) > 0.0).all():
+        raise toml.error(f"length_mm = {lengths!r}", "rising lengths", where="strut_law.length_mm")
+    return at, n_per_m_from_n_per_um(_numbers(toml, "strut_law", "stiffness_N_per_um", count))
 
 
 def _joints(toml: TomlReader, section: str) -> FloatArray:

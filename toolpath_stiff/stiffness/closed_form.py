@@ -1,4 +1,4 @@
-"""Tip compliance in closed form, many poses at a time, numpy alone; for linear struts on a rigid platform.
+"""Tip compliance in closed form, many poses at a time, numpy alone; for struts on a rigid platform.
 
 Equilibrium J^T f = w of the exact route, solved by 3 x 3 blocks instead of a pivoted 6 x 6: the struts are split into
 two triplets A and B, forces are eliminated first,
@@ -23,7 +23,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.machine.model import Machine
+from toolpath_stiff.machine.model import Machine, StrutLaw
 
 BLOCK = 2048  # poses; the nine-row work arrays (150 kB each) then stay in a core's second-level cache
 # Determinants of unit directions lie within 0 and 1. At 1e-3 the elimination loses three of sixteen digits.
@@ -43,6 +43,8 @@ class ClosedForm:
         (3, 6) m, joints in that order; platform joints relative to the tip, platform frame.
     intercept, slope
         Strut law k(L) = intercept + slope L, N/m and N/m per m.
+    table
+        The law where it is a table, which `intercept` and `slope` do not describe; None otherwise.
     arm
         m, size of the arms, which makes the second determinant a number without unit.
     """
@@ -52,6 +54,7 @@ class ClosedForm:
     platform: FloatArray
     intercept: float
     slope: float
+    table: StrutLaw | None
     arm: float
 
 
@@ -66,6 +69,7 @@ def prepare(machine: Machine, tool_length: float = np.nan) -> ClosedForm:
             platform=np.ascontiguousarray(machine.platform_joints_for(tool_length)[list(order)].T),
             intercept=machine.strut_law.intercept,
             slope=machine.strut_law.slope,
+            table=machine.strut_law if machine.strut_law.shape else None,
             arm=arm,
         )
     found: ClosedForm = machine.derived[key]
@@ -256,8 +260,11 @@ def _strut_compliances(kernel: ClosedForm, work: _Work) -> BoolArray:
 
     Beyond that the exact route says what is wrong.
     """
-    np.multiply(work.length, kernel.slope, out=work.six)
-    work.six += kernel.intercept
+    if kernel.table is None:
+        np.multiply(work.length, kernel.slope, out=work.six)
+        work.six += kernel.intercept
+    else:
+        work.six[:] = kernel.table.stiffness(work.length)
     law_holds = work.six.min(axis=0) > 0.0
     np.divide(1.0, work.six, out=work.six)
     return np.asarray(law_holds)

@@ -1,6 +1,6 @@
 """Which route computes the tip compliance: the exact LAPACK route, the closed form, or the compiled loops.
 
-For linear struts on a rigid platform all three give the same to rounding; the choice is made by the number of poses.
+For struts on a rigid platform all three give the same to rounding; the choice is made by the number of poses.
 Physical effects take the exact route. Poses at which the closed form is ill-conditioned go to the exact route, which
 pivots, by themselves.
 
@@ -43,7 +43,7 @@ IN_PLANE = 12  # over half a circle of the directions in which one strut is idle
 
 
 def is_closed_form(model: StiffnessModel) -> bool:
-    """Whether linear struts on a rigid platform are all that acts, so that the closed form holds."""
+    """Whether struts on a rigid platform are all that acts, so that the closed form holds."""
     acting = replace(model, effects=acting_effects(model))
     return acting.is_plain and bool(np.isinf(acting.platform_bars))
 
@@ -52,7 +52,7 @@ def choose_route(model: StiffnessModel, poses: int) -> str:
     """One of `ROUTES` for so many poses."""
     if poses < CLOSED_FORM_FROM or not is_closed_form(model):
         return "exact"
-    if poses < COMPILED_FROM:
+    if poses < COMPILED_FROM or model.machine.strut_law.shape:  # the compiled loops know straight lines only
         return "closed_form"
     from toolpath_stiff.stiffness import compiled
 
@@ -117,7 +117,7 @@ def _fast(
 ) -> FloatArray:
     """Closed form or compiled loops for one tool length; doubtful poses go to the exact route."""
     kernel = closed_form.prepare(model.machine, tool_length)
-    if route == "compiled":
+    if route == "compiled" and kernel.table is None:
         from toolpath_stiff.stiffness import compiled
 
         compliance, good = compiled.tip_compliance(kernel, position, rotation)
@@ -139,13 +139,13 @@ def compliance_along_columns(
     tool_length: float,
     route: str,
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Compliance of linear struts on a rigid platform along one direction a pose, with what the limits ask for.
+    """Compliance of struts on a rigid platform along one direction a pose, with what the limits ask for.
 
     Arguments and results as of `closed_form.compliance_along_columns`, of a machine with a tool of that length (m), by
     one of the fast routes. Where a pose is not good the exact route must be asked.
     """
     kernel = closed_form.prepare(machine, tool_length)
-    if route == "compiled":
+    if route == "compiled" and kernel.table is None:
         from toolpath_stiff.stiffness import compiled
 
         return compiled.compliance_along_columns(kernel, position, direction, rotation)

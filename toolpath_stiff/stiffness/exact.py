@@ -238,7 +238,7 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> Links:
 
 
 def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
-    """Raise `InputError` where the linear strut law gives (n, 6) struts no stiffness or less, or no number."""
+    """Raise `InputError` where the strut law gives (n, 6) struts no stiffness or less, or no number."""
     holds = (stiffness >= LEAST_STIFFNESS) & (stiffness < np.inf)
     lengths = path.struts.lengths
     holds |= np.isnan(lengths)  # a pose that is no number, which stays nan

@@ -21,7 +21,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
-from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Machine, with_parameter
+from toolpath_stiff.machine.model import EffectEntry, Machine, with_parameter
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.effects import find_effect, guard, known_effects
 from toolpath_stiff.stiffness.effects.contract import (
@@ -116,7 +116,7 @@ class StiffnessModel:
 
     @property
     def is_plain(self) -> bool:
-        """Whether linear struts and platform bars are all there is, so that the fast kernels apply."""
+        """Whether struts and platform bars are all there is, so that the fast kernels apply."""
         return all(type(active.effect) is PlatformFlexibility for active in self.effects)
 
 
@@ -212,7 +212,7 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     """
     if model.given is None:
         raise EffectError(f"a model without its machine has no parameter {name!r}")
-    if name in STRUT_LAW:
+    if name in model.given.strut_law.parameters:
         moved = with_parameter(model.given, name, change)
         return _assembled(moved, model.effects, model.instruments, model.conditions)
     owner, _, key = name.partition(".")

@@ -138,7 +138,7 @@ def structure_stiffness(machine: Machine, position: ArrayLike, rotation: ArrayLi
     for i in range(6):
         strut = nodes[i] - machine.frame_joints[i]
         length = np.sqrt(strut @ strut)
-        stiffness = law.stiffness_1 + law.slope * (length - law.length_1)
+        stiffness = law.stiffness(length)
         # The frame joint is held, so only the platform joint's block enters.
         at_i = slice(3 * i, 3 * i + 3)
         structure[at_i, at_i] += stiffness * axis_products(machine.frame_joints[i], nodes[i])

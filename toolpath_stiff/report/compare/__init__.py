@@ -263,12 +263,12 @@ def text(document: ComparisonDocument) -> str:
     base, refit = document["baseline"], document["baseline"]["strut_law_refitted"]
     if refit:
         gain = round(base["mean_abs_error_percent"] - refit["mean_abs_error_percent"], 2)
-        first, second = refit["strut_law"]["N_per_um"]
+        law = " / ".join(f"{stiffness:.1f}" for stiffness in refit["strut_law"]["N_per_um"])
         lines += [
             "",
             f"strut law refitted: {refit['mean_abs_error_percent']:.2f} % mean error, "
             f"{refit['bias_percent']:+.1f} % bias, rms {refit['rms_percent']:.1f} % "
-            f"({first:.1f} / {second:.1f} N/um)" + ("" if gain > 0.0 else ": nothing gained"),
+            f"({law} N/um)" + ("" if gain > 0.0 else ": nothing gained"),
         ]
     lines += ["", "findings"]
     lines += [f"  {plain(one['text'])} (p = {one['p_adjusted']:.2g})" for one in document["findings"]]

@@ -21,7 +21,7 @@ from toolpath_stiff.updating.correction.strut_law import bar_curve_csv
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
-    from toolpath_stiff.updating.correction.document import StepEntry, UpdateDocument
+    from toolpath_stiff.updating.correction.document import LawEntry, StepEntry, UpdateDocument
     from toolpath_stiff.updating.correction.ladder import Update
     from toolpath_stiff.updating.correction.strut_law import BarCurve
 
@@ -126,10 +126,15 @@ def _by_direction(document: UpdateDocument) -> Markup:
     return table(head, [("", row) for row in rows], range(1, len(head))) + markup('<p class="muted">{}</p>', remark)
 
 
+def _where(end: LawEntry) -> str:
+    """At which strut length a stiffness of the law is meant."""
+    return "at every length" if end["length_mm"] is None else f"at {end['length_mm']:.1f} mm"
+
+
 def _fitted(document: UpdateDocument) -> Markup:
     last = result_step(document)
     rows = [
-        ("strut law", f"at {end['length_mm']:.1f} mm", f"{end['stiffness']:.2f} N/um", f"sd {end['sd']:.2g} N/um")
+        ("strut law", _where(end), f"{end['stiffness']:.2f} N/um", f"sd {end['sd']:.2g} N/um")
         for end in last["strut_law_N_per_um"]
         if end["sd"] is not None
     ]
@@ -233,8 +238,7 @@ def _parameters(document: UpdateDocument) -> list[str]:
     found = []
     if last["strut_law_N_per_um"][0]["sd"] is not None:
         ends = " and ".join(
-            f"{end['stiffness']:.1f} +- {end['sd']:.1f} N/um at {end['length_mm']:.1f} mm"
-            for end in last["strut_law_N_per_um"]
+            f"{end['stiffness']:.1f} +- {end['sd']:.1f} N/um {_where(end)}" for end in last["strut_law_N_per_um"]
         )
         found.append(f"strut law  {ends}")
     for effect, entry in last["parameters"].items():

@@ -35,7 +35,11 @@ class StrutLawCurvature(Effect):
     )
 
     def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """Difference of the compliances with and without curvature."""
+        """Difference of the compliances with and without curvature.
+
+        On top of a table or a constant law as on top of a straight line; x of a constant law runs from one end of the
+        travel to the other.
+        """
         law = path.machine.strut_law
         length = path.struts.lengths
         x = (2.0 * length - law.length_1 - law.length_2) / (law.length_2 - law.length_1)

@@ -167,6 +167,8 @@ def compare(
     noises = noise_models(data, noise, strut_spread)
     checks, cannot = model_free_checks(machine, data)
     law_columns, place = predictor.law_columns(log_model), _places(data)
+    if machine.strut_law.constant:  # the second does nothing
+        law_columns = law_columns[:, :1]
 
     def answer(model: Noise) -> Answer:
         spread = covariance(model, predictor)

@@ -59,7 +59,7 @@ class PlaneFigures(Figures):
 
 
 class LawFigures(TypedDict):
-    """A strut law: N/um at two lengths."""
+    """A strut law: N/um at two lengths; of a constant law one stiffness and no length."""
 
     at_mm: list[float]
     N_per_um: list[float]
@@ -375,15 +375,16 @@ def _far_off_entries(
 
 
 def _refit_figures(predictor: Predictor, one: Answer) -> RefitFigures | None:
-    """What refitting the strut law's two constants would leave, as in a diagnosis; None with too few readings."""
+    """What refitting the strut law's constants would leave, as in a diagnosis; None with too few readings."""
     if one.law is None:
         return None
     law = scaled_law(predictor.machine.strut_law, one.law.law)
+    count = len(law.parameters)  # of a constant law one, which belongs to no length
     return {
         **error_figures(one.law.residual),
         "strut_law": {
-            "at_mm": [mm_from_m(law.length_1), mm_from_m(law.length_2)],
-            "N_per_um": [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6],
+            "at_mm": [] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)],
+            "N_per_um": [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6][:count],
         },
         "excess_scatter_percent": None if one.refitted is None else 100.0 * one.refitted.excess,
     }

@@ -27,7 +27,7 @@ UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing add
 
 
 class LawEntry(TypedDict):
-    """The strut law at one length, N/um."""
+    """The strut law at one length, N/um; None: at every length."""
 
     length_mm: float | None
     stiffness: float | None
@@ -269,11 +269,12 @@ def _step(update: Update, k: int) -> StepEntry:
 
 def _law(machine: Machine, step: Step, widening: float) -> list[LawEntry]:
     law = scaled_law(machine.strut_law, step.fit.law)
-    deviations = widening * np.sqrt(np.maximum(np.diag(step.fit.covariance)[:2], 0.0))
-    ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))
+    count = len(law.parameters)  # of a constant law one, which belongs to no length
+    deviations = widening * np.sqrt(np.maximum(np.diag(step.fit.covariance)[:count], 0.0))
+    ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))[:count]
     return [
         {
-            "length_mm": json_number(float(mm_from_m(length)), 7),
+            "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
             "stiffness": json_number(stiffness / 1e6),
             "sd": json_number(stiffness / 1e6 * float(deviation), 3) if step.fit.law_free else None,
         }

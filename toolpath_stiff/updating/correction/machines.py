@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.machine import Machine, StrutLaw, load_machine, solve_struts
-from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty
+from toolpath_stiff.machine.model import EffectEntry, Uncertainty
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.effects.contract import SETUP
 from toolpath_stiff.stiffness.model import build_model
@@ -86,9 +86,9 @@ def _uncertainty(machine: Machine, fit: Fit, widened: float) -> Uncertainty | No
     law = scaled_law(machine.strut_law, fit.law)
     names, slopes, rows = [], [], []
     if fit.law_free:
-        names += list(STRUT_LAW)
-        slopes += [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6]
-        rows += [0, 1]
+        names += list(law.parameters)
+        slopes += [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6][: len(names)]
+        rows += [0, 1][: len(names)]
     index = 0
     for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
         for component, size in zip(candidate.components, sizes, strict=True):

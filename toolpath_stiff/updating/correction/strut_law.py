@@ -24,7 +24,7 @@ from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, HeldOut, held_out
 from toolpath_stiff.updating.inference.noise import noise_models
-from toolpath_stiff.updating.inference.prediction import NO_CHANGE, Predictor, scaled_law
+from toolpath_stiff.updating.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
@@ -96,16 +96,19 @@ def minimise_mean_error(predictor: Predictor, seed: int = 0, starts: int = START
     _check(predictor.data)
     rng = np.random.default_rng(seed)
     begin = np.concatenate([np.zeros((1, 2)), rng.normal(0.0, START_SPREAD, (starts - 1, 2))])
-    ends, errors = zip(*(_search(predictor, start) for start in begin), strict=True)
+    given = predictor.machine.strut_law
+    begin = at_both_ends(given, begin)
+    found, errors = zip(*(_search(predictor, start) for start in begin), strict=True)
+    ends = at_both_ends(given, np.array(found))
     best = int(np.argmin(errors))
     law = ends[best]
     return StrutLawSearch(
         law=law,
-        strut_law=scaled_law(predictor.machine.strut_law, law),
+        strut_law=scaled_law(given, law),
         error=errors[best],
         error_before=mean_error(predictor),
         starts=begin,
-        ends=np.array(ends),
+        ends=ends,
         end_errors=np.array(errors),
     )
 

@@ -53,7 +53,7 @@ class HeldErrors(RoundedErrors):
 
 
 class LawEntry(TypedDict):
-    """The strut law at one length."""
+    """The strut law at one length; None: at every length."""
 
     length_mm: float | None
     stiffness_N_per_um: float | None
@@ -303,8 +303,10 @@ def rounded_errors(residual: FloatArray) -> RoundedErrors:
 def _baseline(diagnosis: Diagnosis) -> BaselineEntry:
     held = diagnosis.held_out_base
     law = diagnosis.machine.strut_law
-    factors = np.exp(diagnosis.base.law)
-    deviations = np.sqrt(np.diag(diagnosis.base.covariance)[:2])
+    count = len(law.parameters)  # of a constant law one, which belongs to no length
+    factors = np.exp(diagnosis.base.law[:count])
+    deviations = np.sqrt(np.diag(diagnosis.base.covariance)[:count])
+    ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))[:count]
     return {
         **rounded_errors(diagnosis.base.residual),
         "held_out_error_percent": json_number(100.0 * held.mean_error),
@@ -322,14 +324,12 @@ def _baseline(diagnosis: Diagnosis) -> BaselineEntry:
         },
         "law": [
             {
-                "length_mm": json_number(float(mm_from_m(length)), 7),
+                "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
                 "stiffness_N_per_um": json_number(stiffness * factor / 1e6),
                 "machine_file_N_per_um": json_number(stiffness / 1e6),
                 "sd_percent": json_number(100.0 * deviation, 3),
             }
-            for length, stiffness, factor, deviation in zip(
-                (law.length_1, law.length_2), (law.stiffness_1, law.stiffness_2), factors, deviations, strict=True
-            )
+            for (length, stiffness), factor, deviation in zip(ends, factors, deviations, strict=True)
         ],
     }
 

@@ -2,7 +2,8 @@
 
 Everything is on the logarithm of stiffness: effects are factors of a few to thirty per cent, and so is the noise. The
 strut law enters as the logarithms of the factors on its two stiffnesses, `law`, which are dimensionless: a
-least-squares fit of constants in N/m would stop at once, its gradient being tiny.
+least-squares fit of constants in N/m would stop at once, its gradient being tiny. Of a constant law the second does
+nothing, and its prior holds it at 0.
 """
 
 from __future__ import annotations
@@ -35,6 +36,11 @@ def scaled_law(law: StrutLaw, logs: ArrayLike) -> StrutLaw:
     """The strut law with its two stiffnesses multiplied by exp(logs)."""
     first, second = np.exp(np.asarray(logs, dtype=float)).tolist()
     return replace(law, stiffness_1=law.stiffness_1 * first, stiffness_2=law.stiffness_2 * second)
+
+
+def at_both_ends(law: StrutLaw, values: FloatArray) -> FloatArray:
+    """Values (..., 2) of a law's two logarithms at its two lengths: a constant law's first one at both."""
+    return values[..., [0, 0]] if law.constant else values
 
 
 @dataclass(frozen=True)
@@ -183,11 +189,11 @@ class Predictor:
         prepared = self._timeless
         rule = scaled_law(self.machine.strut_law, law)
         lengths = prepared.path.struts.lengths
-        second = (lengths - rule.length_1) / (rule.length_2 - rule.length_1)
+        first, second = rule.weights(lengths)
         stiffness = rule.stiffness(lengths)
         energy = prepared.products / stiffness**2
         columns = [
-            (energy * rule.stiffness_1 * (1.0 - second)).sum(axis=1),
+            (energy * rule.stiffness_1 * first).sum(axis=1),
             (energy * rule.stiffness_2 * second).sum(axis=1),
         ]
         return np.asarray(np.stack(columns, axis=1)[prepared.which] * np.exp(log_stiffness)[:, None])
@@ -219,10 +225,7 @@ class Predictor:
     @cached_property
     def _law_shares(self) -> tuple[FloatArray, FloatArray]:
         """(6, m) shares of the law's two constants in each strut's stiffness, by its length."""
-        rule = self.machine.strut_law
-        lengths = np.ascontiguousarray(self._timeless.path.struts.lengths.T)
-        second = (lengths - rule.length_1) / (rule.length_2 - rule.length_1)
-        return 1.0 - second, second
+        return self.machine.strut_law.weights(np.ascontiguousarray(self._timeless.path.struts.lengths.T))
 
     @cached_property
     def _squared_forces(self) -> FloatArray:
