@@ -40,6 +40,24 @@ def case_loop(workers: int, into: Path) -> Iterator[Collect]:
             yield lambda name, run, jobs: collect(name, pool.imap_unordered(run, jobs, chunksize=1), len(jobs))
 
 
+def document(
+    title: str, what: str, parts: Sequence[tuple[str, Sequence[str]]], broken: Sequence[Record], command: str
+) -> str:
+    """A page in markdown: parts under their headings, after the first the cases that broke, and the command."""
+    shown = list(parts)
+    if broken:
+        rows = [
+            f"- {' '.join(str(r[key]) for key in ('layout', 'group', 'hidden', 'seed') if key in r)}: "
+            f"`{r['error'].strip().splitlines()[-1]}`"
+            for r in broken
+        ]
+        shown.insert(1, ("Cases that broke", rows))
+    lines = [f"# {title}", "", what, ""]
+    for heading, body in shown:
+        lines += [*([f"## {heading}", ""] if heading else []), *body, ""]
+    return "\n".join([*lines, f"Made by `{command}`."]) + "\n"
+
+
 def read_records(file: Path) -> list[Record]:
     """The records of an earlier run."""
     return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]

@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.case_loop import Record, case_loop, read_records
+from benchmarks.case_loop import Record, case_loop, document, read_records
 from benchmarks.diagnosis_tables import bars_table, summary
 from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
 from benchmarks.portrait_cases import LAYOUTS, make_jobs, run
@@ -51,14 +51,8 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
         ("Probabilities", [_PROBABILITIES, "", *calibration_table(good)]),
         ("Cases that count against a bar", failures_table(good)),
     ]
-    if broken:
-        rows = [f"- {r['layout']} {r['hidden']} {r['seed']}: `{r['error'].strip().splitlines()[-1]}`" for r in broken]
-        parts.insert(1, ("Cases that broke", rows))
-    lines = ["# Descriptions of what is in no catalogue", "", _WHAT, ""]
-    for heading, body in parts:
-        lines += [*([f"## {heading}", ""] if heading else []), *body, ""]
-    lines.append(f"Made by `{command}`.")
-    return "\n".join(lines) + "\n", not broken and all(figure.cleared is not False for figure in found)
+    text = document("Descriptions of what is in no catalogue", _WHAT, parts, broken, command)
+    return text, not broken and all(figure.cleared is not False for figure in found)
 
 
 _WHAT = (

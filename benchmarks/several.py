@@ -18,7 +18,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.case_loop import Record, case_loop, read_records
+from benchmarks.case_loop import Record, case_loop, document, read_records
 from benchmarks.diagnosis_bars import JUST_SEEN, holds_truth
 from benchmarks.diagnosis_tables import bars_table, summary
 from benchmarks.several_bars import all_seen, false_name, figures, named_rows, slip_found, slip_visible
@@ -91,14 +91,8 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
         ("Slips", slips_table(good)),
         ("Cases that count against a bar", failures_table(good)),
     ]
-    if broken:
-        rows = [f"- {r['group']} {r['seed']}: `{r['error'].strip().splitlines()[-1]}`" for r in broken]
-        parts.insert(1, ("Cases that broke", rows))
-    lines = ["# Several effects, wild readings, wrong noise, mistyped rows", "", _WHAT, ""]
-    for heading, body in parts:
-        lines += [*([f"## {heading}", ""] if heading else []), *body, ""]
-    lines.append(f"Made by `{command}`.")
-    return "\n".join(lines) + "\n", not broken and all(figure.cleared is not False for figure in found)
+    text = document("Several effects, wild readings, wrong noise, mistyped rows", _WHAT, parts, broken, command)
+    return text, not broken and all(figure.cleared is not False for figure in found)
 
 
 _WHAT = (

@@ -150,7 +150,7 @@ UNFORESEEN = [
     (np.linalg.LinAlgError("Singular matrix"), r"\(LinAlgError, .*: Singular matrix"),
     (MemoryError("Unable to allocate 9. GiB"), r"out of memory \(Unable to allocate 9. GiB\): take a larger --step"),
     (RecursionError("maximum depth"), "nested too deeply"),
-    (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/tmp/x"), "'/tmp/x': No space left on device"),
+    (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "full/part.csv"), "'full/part.csv': No space left on device"),
     (OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG)), "error: File name too long"),
     (AssertionError(), "no more is known"),
 ]

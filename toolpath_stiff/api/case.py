@@ -13,13 +13,13 @@ The state is what the steps up to `done` have made of it; undo and redo move `do
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from toolpath_stiff.api.case_files import (
     copied,
+    first_name,
     free_name,
     machine_bytes,
     measurements_csv,
@@ -159,8 +159,7 @@ class Case(History):
         """Use an edited file in place of a file of own effects of the case (its name there). Its code is run."""
         if name not in self.state.effects:
             raise InputError(f"{name} is no file of own effects of this case", expected=", ".join(self.state.effects))
-        plain = re.sub(r"-\d+(?=\.py$)", "", Path(name).name)  # drag-2.py is followed by drag-3.py
-        new = copied(self.folder, plain, "effects", read_bytes(file, "the file"))
+        new = copied(self.folder, first_name(name), "effects", read_bytes(file, "the file"))
         text = f"own effects of {Path(name).name}, edited"
         self._take_effects(new, name, text, f"case.change_effects({name!r}, {str(file)!r})")
 

@@ -24,6 +24,12 @@ def free_name(folder: Path, name: str) -> str:
     return name
 
 
+def first_name(name: str) -> str:
+    """A file's name without the room and the number that a case gave it: "effects/drag-2.py" came as drag.py."""
+    path = Path(name)
+    return re.sub(r"-\d+$", "", path.stem) + path.suffix
+
+
 def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> None:
     """Write files of a folder, each whole or not at all."""
     from toolpath_stiff.files import write_atomically

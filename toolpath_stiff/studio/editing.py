@@ -6,13 +6,12 @@ be undone, each time it is saved without a fault. Code is run of those files alo
 
 from __future__ import annotations
 
-import re
 import threading
 from collections.abc import Callable
 from pathlib import Path
 
 from toolpath_stiff.api.case import Case
-from toolpath_stiff.api.case_files import free_name, sha256, write_files
+from toolpath_stiff.api.case_files import first_name, free_name, sha256, write_files
 from toolpath_stiff.errors import InputError, TpsError
 
 FOLDER = "edit"
@@ -37,7 +36,10 @@ class Editing:
         """Write the working copy of a file of the case and follow it from now on."""
         if name not in self.case.state.effects:
             raise InputError(f"{name} is no file of own effects of this case")
-        content, copy = (self.case.folder / name).read_bytes(), free_name(self.case.folder, f"{FOLDER}/{_plain(name)}")
+        content, copy = (
+            (self.case.folder / name).read_bytes(),
+            free_name(self.case.folder, f"{FOLDER}/{first_name(name)}"),
+        )
         write_files(self.case.folder, {copy: content})
         self._open[name], self.faults[name] = (self.case.folder / copy, sha256(content)), ""
 
@@ -93,8 +95,3 @@ class Editing:
     def close(self) -> None:
         """Stop following."""
         self._closing.set()
-
-
-def _plain(name: str) -> str:
-    """The name of a file without the number that a case has given it: "effects/drag-2.py" was drag.py."""
-    return re.sub(r"-\d+(?=\.py$)", "", Path(name).name)
