@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -13,6 +14,10 @@ from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
     from toolpath_stiff.machine import Machine
+    from toolpath_stiff.stiffness.effects import Effect
+    from toolpath_stiff.updating.inference import Judgement
+    from toolpath_stiff.updating.inference.evidence import Problem
+    from toolpath_stiff.updating.inference.noise import Noise
     from toolpath_stiff.updating.inference.prediction import Predictor
     from toolpath_stiff.updating.measurements import Measurements
 
@@ -32,6 +37,7 @@ sys.dont_write_bytecode = False
 
 def pytest_collection_finish() -> None:
     sys.dont_write_bytecode = AS_ASKED
+    gc.freeze()  # modules and thousands of tests stay to the end: the collector need not look at them again and again
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -62,4 +68,23 @@ def predictors_are_shared() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for module in (comparison, diagnosis, ladder):
             patch.setattr(module, "Predictor", shared)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def judgements_are_shared(predictors_are_shared: None) -> Iterator[None]:
+    """The same readings under the same noise are judged once a process, whichever test or command asks first.
+
+    Not with a user's own effects. A test of the judgement's own repeatability calls `inference.judge`.
+    """
+    from tests.updating import cases
+    from toolpath_stiff.updating import diagnosis, planning
+
+    def shared(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:
+        """`judge(...)`, of the caller's own problem and noise."""
+        return cases.judged_once(problem, noise, effects, seed)
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (cases, diagnosis, planning):
+            patch.setattr(module, "judge", shared)
         yield

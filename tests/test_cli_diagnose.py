@@ -97,19 +97,18 @@ def older_cpu():
 
 
 @pytest.mark.parametrize("command", ["diagnose", "compare", "plan"])
-def test_the_same_command_writes_the_same_bytes_on_another_cpu(command, files, tmp_path):
+def test_the_same_command_writes_the_same_bytes_on_another_cpu(command, files, tmp_path, monkeypatch, capsys):
     """Each into a folder of the same name; the campaign leaves the verdict ambiguous, so that a plan is made too."""
     given = ["--between", "spindle_compliance,table_compliance", "--n", "2"] if command == "plan" else ["spindle.csv"]
     told = [command, *given, "--no-plots", "--out", "found"]
-    folders = [shutil.copytree(files, tmp_path / name) for name in ("here", "there")]
-    runs = [
-        subprocess.Popen([sys.executable, "-m", "toolpath_stiff", *told], cwd=folder, env=env, stdout=subprocess.PIPE)
-        for folder, env in zip(folders, (os.environ.copy(), older_cpu()), strict=True)
-    ]
-    said = [run.communicate()[0] for run in runs]
-    assert [run.returncode for run in runs] == [0, 0] and said[0] == said[1]
-    here, there = ({file.name: file.read_bytes() for file in (one / "found").iterdir()} for one in folders)
-    assert here == there
+    here, there = (shutil.copytree(files, tmp_path / name) for name in ("here", "there"))
+    words = [sys.executable, "-m", "toolpath_stiff", *told]
+    older = subprocess.run(words, cwd=there, env=older_cpu(), stdout=subprocess.PIPE, check=True)
+    monkeypatch.chdir(here)
+    assert main(told) == 0
+    assert capsys.readouterr().out.encode() == older.stdout
+    found = [{file.name: file.read_bytes() for file in (one / "found").iterdir()} for one in (here, there)]
+    assert found[0] == found[1]
 
 
 def test_an_ambiguous_verdict_comes_with_what_to_measure_and_what_it_matters(spindle):

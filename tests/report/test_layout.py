@@ -69,11 +69,12 @@ def shown_texts(figure):
     figure.draw_without_rendering()
     texts = [one for one in figure.findobj(Text) if one.get_visible() and one.get_text().strip()]
     boxes = [(one.get_text(), one.get_window_extent()) for one in texts]
-    # Ticks beyond the limits of their axis have texts that are not drawn.
-    return [(text, box) for text, box in boxes if box.width > 0 and box.height > 0 and _drawn(figure, text)]
+    hidden = _beyond(figure)
+    return [(text, box) for text, box in boxes if box.width > 0 and box.height > 0 and text not in hidden]
 
 
-def _drawn(figure, text):
+def _beyond(figure):
+    """Words that are not drawn, at least not everywhere: of ticks beyond the limits of their axis."""
     hidden = set()
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
@@ -81,8 +82,8 @@ def _drawn(figure, text):
             slack = 1e-9 * (high - low)
             for tick in axis.get_major_ticks():
                 if not low - slack <= tick.get_loc() <= high + slack or not tick.label1.get_visible():
-                    hidden.add(id(tick.label1))
-    return not any(id(one) in hidden for one in figure.findobj(Text) if one.get_text() == text)
+                    hidden.add(tick.label1.get_text())
+    return hidden
 
 
 def assert_whole_and_apart(figure):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 import tempfile
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist
 from toolpath_stiff import rig
-from toolpath_stiff.machine import Machine
-from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.machine import Machine, machine_toml
+from toolpath_stiff.stiffness.effects import Effect, find_effect
 from toolpath_stiff.stiffness.model import ActiveEffect
+from toolpath_stiff.updating import inference
 from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
 from toolpath_stiff.updating.inference import Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
@@ -163,6 +164,37 @@ def predictor_for(data: Measurements) -> Predictor:
     idle = idle_on(found.base, data).values()
     found.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle))))
     return found
+
+
+JUDGEMENTS: dict[tuple[Any, ...], Judgement] = {}
+
+
+def judged_once(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:
+    """`inference.judge`; what was judged before is not judged again, wherever its readings were read."""
+    predictor = problem.predictor
+    if predictor.effect_files:
+        return inference.judge(problem, noise, effects, seed)
+    known = [_content(problem.observed), machine_toml(predictor.machine), seed, *(effect.name for effect in effects)]
+    for record, apart in ((predictor.data, ("file", "line", "notes", "warnings")), (noise, ())):
+        known += [_content(getattr(record, each.name)) for each in fields(record) if each.name not in apart]
+    if (key := tuple(known)) not in JUDGEMENTS:
+        JUDGEMENTS[key] = inference.judge(problem, noise, effects, seed)
+    found = JUDGEMENTS[key]
+    own = {name: dict(getattr(found, name)) for name in ("gates", "fits", "probability")}
+    return replace(found, problem=problem, noise=noise, **own)
+
+
+def _content(value: Any) -> Any:
+    """What two records must have in common to be the same."""
+    if isinstance(value, np.ndarray):
+        return value.shape, value.dtype.str, value.tobytes()
+    if is_dataclass(value):
+        return tuple(_content(getattr(value, each.name)) for each in fields(value))
+    if isinstance(value, Mapping):
+        return tuple((name, _content(one)) for name, one in value.items())
+    if isinstance(value, list | tuple):
+        return tuple(_content(one) for one in value)
+    return value
 
 
 @cache

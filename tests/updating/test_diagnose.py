@@ -12,6 +12,7 @@ import pytest
 
 from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
+from tests.updating import cases
 from tests.updating.cases import campaign, diagnosed, examined, readings_by_hand, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.effects import find_effect
@@ -144,8 +145,10 @@ def test_where_nothing_is_missing_the_detectable_sizes_are_named():
     assert weak["detectable"] and 1.0 < weak["rms_percent"] < 10.0
 
 
-def test_the_same_data_and_seed_give_the_same_document():
+def test_the_same_data_and_seed_give_the_same_document(monkeypatch):
     data = campaign(*CASES["ambiguous"])[0]
+    found("ambiguous")
+    monkeypatch.setattr(cases, "JUDGEMENTS", {})  # judged again, not remembered
     again = document(examined(nist(), data, command="tps diagnose measurements.csv"))
     assert json.dumps(again) == json.dumps(found("ambiguous"))
     other = document(examined(nist(), data, seed=5, command="tps diagnose measurements.csv"))

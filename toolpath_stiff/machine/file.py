@@ -8,7 +8,9 @@ fall back to a default; the message has section, key, value and bound.
 from __future__ import annotations
 
 import math
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -167,8 +169,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
     """
     known = packaged_machines()
     if str(name_or_file) in known:
-        path = known[str(name_or_file)]
-        return parse_machine(path.read_text(encoding="utf-8"), file=f"{name_or_file}.toml")
+        return deepcopy(_packaged(known[str(name_or_file)]))  # its arrays are the caller's own
     path = Path(name_or_file)
     if not is_file(path):
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
@@ -184,6 +185,12 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> Machine:
             f"not a text file (byte {error.start})", expected="a machine file (TOML, UTF-8)", file=str(path)
         ) from None
     return parse_machine(text, file=str(path))
+
+
+@cache
+def _packaged(path: Path) -> Machine:
+    """A machine that ships with the package, read once."""
+    return parse_machine(path.read_text(encoding="utf-8"), file=path.name)
 
 
 def parse_machine(text: str, file: str = "machine.toml") -> Machine:

@@ -9,7 +9,9 @@ geometry, commands a pose.
 from __future__ import annotations
 
 import math
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -99,7 +101,14 @@ def load_nominal(machine: str = defaults.MACHINE) -> Nominal:
     if not packaged.is_file():
         names = sorted(Path(item.name).stem for item in folder.iterdir() if item.name.endswith(".toml"))
         raise InputError(f"no machine {machine!r}", expected=f"{', '.join(names)}, or a file ending in .toml")
-    return parse_nominal(packaged.read_text("utf-8"), f"{machine}.toml")
+    return deepcopy(_packaged(machine))  # its arrays are the caller's own
+
+
+@cache
+def _packaged(machine: str) -> Nominal:
+    """A machine that ships with the package, read once."""
+    file = f"{machine}.toml"
+    return parse_nominal((resources.files("toolpath_stiff") / "data" / "machines" / file).read_text("utf-8"), file)
 
 
 def parse_nominal(text: str, file: str) -> Nominal:
