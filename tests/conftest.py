@@ -75,7 +75,7 @@ def predictors_are_shared() -> Iterator[None]:
 def judgements_are_shared(predictors_are_shared: None) -> Iterator[None]:
     """The same readings under the same noise are judged once a process, whichever test or command asks first.
 
-    Not with a user's own effects. A test of the judgement's own repeatability calls `inference.judge`.
+    A test of the judgement's own repeatability begins with an empty `cases.JUDGEMENTS`.
     """
     from tests.updating import cases
     from toolpath_stiff.updating import diagnosis, planning

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import email
+import json
 import os
 import subprocess
 import sys
@@ -40,10 +41,20 @@ def unpacked(built, tmp_path_factory) -> Path:
 
 
 def run(unpacked: Path, cwd: Path, *words: str) -> str:
-    """The tool as the wheel holds it, away from the checkout."""
+    """Python away from the checkout, with the tool as the wheel holds it."""
     environment = {**os.environ, "PYTHONPATH": str(unpacked)}
-    command = [sys.executable, "-m", "toolpath_stiff", *words]
+    command = [sys.executable, *words]
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+# Commands, as JSON, in one process; a form feed after what each prints.
+ONE_BY_ONE = """
+import json, sys
+from toolpath_stiff.cli.main import main
+for words in json.loads(sys.argv[1]):
+    assert main(words) == 0, words
+    print(end="\\f")
+"""
 
 
 def files(folder: Path) -> set[str]:
@@ -89,10 +100,14 @@ def test_sdist_holds_what_the_readme_shows(built):
 
 def test_the_tool_runs_from_the_wheel(unpacked, tmp_path):
     """Pages, templates, machines and readings are files of the package: each is read once."""
-    assert toolpath_stiff.__version__ in run(unpacked, tmp_path, "--version")
-    assert "pocket.nc" in run(unpacked, tmp_path, "analyze", str(ROOT / "programs" / "pocket.nc"), "--step", "5")
+    assert toolpath_stiff.__version__ in run(unpacked, tmp_path, "-m", "toolpath_stiff", "--version")
+    commands = [
+        ["analyze", str(ROOT / "programs" / "pocket.nc"), "--step", "5"],
+        ["machine", "new", "mine.toml"],
+        ["machine", "show", "mine.toml"],
+        ["effects", "new", "my_screw.py"],
+        ["compare", "nist-table1", "--no-plots"],
+    ]
+    said = run(unpacked, tmp_path, "-c", ONE_BY_ONE, json.dumps(commands)).split("\f")
+    assert "pocket.nc" in said[0] and "mine" in said[2] and "42 readings" in said[4]
     assert "<script" in (tmp_path / "reports" / "pocket" / "report.html").read_text("utf-8")
-    run(unpacked, tmp_path, "machine", "new", "mine.toml")
-    assert "mine" in run(unpacked, tmp_path, "machine", "show", "mine.toml")
-    run(unpacked, tmp_path, "effects", "new", "my_screw.py")
-    assert "42 readings" in run(unpacked, tmp_path, "compare", "nist-table1", "--no-plots")

@@ -172,9 +172,8 @@ JUDGEMENTS: dict[tuple[Any, ...], Judgement] = {}
 def judged_once(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) -> Judgement:
     """`inference.judge`; what was judged before is not judged again, wherever its readings were read."""
     predictor = problem.predictor
-    if predictor.effect_files:
-        return inference.judge(problem, noise, effects, seed)
     known = [_content(problem.observed), machine_toml(predictor.machine), seed, *(effect.name for effect in effects)]
+    known += [Path(file).read_bytes() for file in predictor.effect_files]
     for record, apart in ((predictor.data, ("file", "line", "notes", "warnings")), (noise, ())):
         known += [_content(getattr(record, each.name)) for each in fields(record) if each.name not in apart]
     if (key := tuple(known)) not in JUDGEMENTS:

@@ -148,6 +148,10 @@ class Predictor:
 
     def full_path(self) -> LoadPath:
         """What instruments see of every row."""
+        return self._full_path
+
+    @cached_property
+    def _full_path(self) -> LoadPath:
         prepared = self._timeless
         path = prepared.path.take(prepared.which)
         missing = self.data.missing
