@@ -26,6 +26,8 @@ OUTLIER_SPREAD, OUTLIER_ENDS = 1.5, (0.005, 0.20)
 FACTORS, SHARES = np.geomspace(0.3, 3.3, 61), np.geomspace(*OUTLIER_ENDS, 16)
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
 MOST_TRIMS = 8
+# Standard deviations as which a larger deviation counts: how far off the wildest reading is tells nothing of the others.
+FARTHEST = 1.5 * OUTLIER_WIDTH
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
@@ -116,7 +118,7 @@ def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, fl
     logarithms (the factor's prior is flat in its logarithm); the degrees of freedom are those of a chi-square whose
     logarithm is known as far: sd 1 / sqrt(2 x freedom) of the factor.
     """
-    squared, wide = deviations[:, None, None] ** 2, OUTLIER_WIDTH**2
+    squared, wide = np.minimum(deviations, FARTHEST)[:, None, None] ** 2, OUTLIER_WIDTH**2
     factors, shares = FACTORS[:, None], SHARES
     own = 1.0 - 1.0 / size[:, None, None]  # of the variance of a deviation
     total = np.zeros(np.broadcast_shapes(squared.shape, factors.shape, shares.shape))
