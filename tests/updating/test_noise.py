@@ -230,14 +230,14 @@ def pairs_of(seed: int, points: int):
     )
 
 
-@pytest.mark.parametrize("points", [4, 8, 24])
+@pytest.mark.parametrize("points", [4, 16])
 def test_how_far_repeats_tell_the_noise_is_what_is_said_of_it(points):
-    """ln of the estimate: its mean and its sd over 120 simulations are the true one and what `freedom` claims."""
-    found = [from_repeats(pairs_of(seed, points)) for seed in range(120)]
+    """The estimate's logarithm over 80 simulations: its mean is the true one, its sd what `freedom` claims."""
+    found = [from_repeats(pairs_of(seed, points)) for seed in range(80)]
     off = np.log([one.repeat / REPEAT for one in found])
     claimed = math.sqrt(np.mean([0.5 / one.freedom for one in found]))
     assert not any(one.clamps for one in found)
-    assert abs(off.mean()) < 3.0 * claimed / math.sqrt(120) + 0.03
+    assert abs(off.mean()) < 3.0 * claimed / math.sqrt(80) + 0.03
     assert 0.75 < off.std() / claimed < 1.25
 
 

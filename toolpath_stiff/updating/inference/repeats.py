@@ -26,7 +26,7 @@ OUTLIER_SPREAD, OUTLIER_ENDS = 1.5, (0.005, 0.20)
 FACTORS, SHARES = np.geomspace(0.3, 3.3, 61), np.geomspace(*OUTLIER_ENDS, 16)
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
 MOST_TRIMS = 8
-# Standard deviations as which a larger deviation counts: how far off the wildest reading is tells nothing of the others.
+# Standard deviations as which a larger deviation counts: how far off the wildest is tells nothing of the others.
 FARTHEST = 1.5 * OUTLIER_WIDTH
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
