@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def repeated(seed: int, repeat=REPEAT, clamping=CLAMPING, clamps_a_point=2, poin
 def mean_of_estimates(count=60, **how):
     """Root mean squares of the estimated repeat noise and clamping, and the degrees of freedom."""
     found = [from_repeats(repeated(seed, **how)) for seed in range(count)]
-    repeat, clamping, freedom, told, _ = zip(*(astuple(one) for one in found), strict=True)
+    repeat, clamping, freedom, told, _, _ = zip(*(astuple(one) for one in found), strict=True)
     assert all(told)
     return math.sqrt(np.mean(np.square(repeat))), math.sqrt(np.mean(np.square(clamping))), min(freedom)
 
@@ -210,3 +210,55 @@ def test_nothing_is_called_wild_without_need():
     assert never.with_wild(residual).wild == ()
     everywhere = correlated(n=40)[2] + 0.5 * (-1.0) ** np.arange(40)
     assert len(correlated(n=40)[0].with_wild(everywhere).wild) <= 0.05 * 40 + 1
+
+
+def pairs_of(seed: int, points: int):
+    """Each point along X, Y, Z twice within one clamping; 2 % a reading, 2 % of readings four times as wide."""
+    rng = np.random.default_rng(seed)
+    point, axis = np.tile(np.repeat(np.arange(points), 3), 2), np.tile(np.arange(3), 2 * points)
+    true = np.tile(rng.uniform(np.log(2e7), np.log(8e7), 3 * points), 2)
+    wide = np.where(rng.random(len(point)) < 0.02, 4.0, 1.0)
+    shared = 0.01 * rng.standard_normal(points)[point]
+    return readings_by_hand(
+        np.exp(true + shared + REPEAT * wide * rng.standard_normal(len(point))),
+        position=np.stack([0.01 * point, 0.0 * point, 0.8 + 0.0 * point], axis=1),
+        direction=np.eye(3)[axis],
+        point=point.tolist(),
+        clamp=point.tolist(),
+        minutes=np.arange(float(len(point))),
+        force=1000.0,
+    )
+
+
+@pytest.mark.parametrize("points", [4, 16])
+def test_how_far_repeats_tell_the_noise_is_what_is_said_of_it(points):
+    """The estimate's logarithm over 80 simulations: its mean is the true one, its sd what `freedom` claims."""
+    found = [from_repeats(pairs_of(seed, points)) for seed in range(80)]
+    off = np.log([one.repeat / REPEAT for one in found])
+    claimed = math.sqrt(np.mean([0.5 / one.freedom for one in found]))
+    assert not any(one.clamps for one in found)
+    assert abs(off.mean()) < 3.0 * claimed / math.sqrt(80) + 0.03
+    assert 0.75 < off.std() / claimed < 1.25
+
+
+def test_readings_that_state_their_scatter_keep_it_beside_others_that_were_repeated():
+    """A file with sd_N_per_mm and another with repeats: two estimates of one thing, or each for its own."""
+    data = pairs_of(5, 4)
+    first = np.arange(len(data)) < 9
+    sd = np.where(first, 0.025 * data.stiffness, np.nan)
+    (noise,) = noise_models(replace(data, sd=sd))
+    alone = from_repeats(data).repeat
+    stated = math.sqrt(0.025**2 - 0.01**2)
+    assert min(alone, stated) < noise.repeat[-1] < max(alone, stated)
+    assert noise.freedom > 50.0 and "sd_N_per_mm of 9 readings" in noise.origin
+    (noise,) = noise_models(replace(data, sd=np.where(first, 0.2 * data.stiffness, np.nan)))
+    assert "used for the readings that state nothing" in noise.remark
+    assert noise.reading[0] == pytest.approx(0.2, rel=0.01) and noise.repeat[-1] == pytest.approx(alone)
+
+
+def test_readings_that_do_not_state_their_scatter_are_taken_for_as_good_as_the_others():
+    data = campaign(1, "paper")[0]
+    some = replace(data, sd=np.where(np.arange(len(data)) < 30, data.sd, np.nan))
+    (noise,) = noise_models(some)
+    assert noise.name == "stated" and "12 readings do not state it" in noise.origin
+    assert noise.repeat[-1] == pytest.approx(math.sqrt(np.mean(noise.repeat[:30] ** 2)))

@@ -51,6 +51,8 @@ LEAST = 1e-3
 # Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
 # states it, within a third where it is guessed; assumed.
 STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
+USED_INSTEAD = "what the repeats show is used instead"
+USED_ELSEWHERE = "what the repeats show is used for the readings that state nothing"
 CONTRADICTED = 3.3  # standard deviations of the logarithm of their ratio from which repeats overrule a stated noise
 
 
@@ -187,24 +189,31 @@ def _noise_of_tip(
             wild = OUTLIERS if repeats is None else repeats.wild
             return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}", wild),)
     relative = data.sd / data.stiffness
-    column = stated is None and not np.isnan(relative).any()
+    rows = np.isfinite(relative) & (stated is None)  # that state how far they scatter
     if repeats is not None:
-        if column:
-            total = float(np.sqrt(np.mean(relative**2)))
+        if rows.any():
+            total = float(np.sqrt(np.mean(relative[rows] ** 2)))
             remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file")
-        origin = f"estimated from {repeats.freedom} differences between repeats: "
+        origin = f"estimated from {repeats.differences} differences between repeats: "
         origin += _percent(repeats.repeat, repeats.clamping)
         origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
-        repeat = np.full(n, repeats.repeat)
-        return (model("measured", repeat, repeats.clamping, float(repeats.freedom), origin, repeats.wild, remark),)
-    if column:
-        clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
-        repeat = np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2))
+        repeat, freedom = np.full(n, repeats.repeat), repeats.freedom
+        if rows.any() and not rows.all():  # of other readings, mostly: both count
+            repeat, freedom = _both(relative, rows, repeats, trusted=not remark)
+            remark = remark.replace(USED_INSTEAD, USED_ELSEWHERE)
+            origin += f", and from sd_N_per_mm of {int(rows.sum())} readings, {_percent(*_shared(total))}"
+        return (model("measured", repeat, repeats.clamping, freedom, origin, repeats.wild, remark),)
+    if rows.any():
+        repeat, clamping = _parts(relative[rows])
+        every = np.full(n, np.sqrt(np.mean(repeat**2)))
+        every[rows] = repeat
         origin = (
-            f"sd_N_per_mm of the readings, {100 * float(np.sqrt(np.mean(relative**2))):.2g} % in the mean, of which "
-            f"{100 * clamping:.2g} % is assumed to be clamping"
+            f"sd_N_per_mm of the readings, {100 * float(np.sqrt(np.mean(relative[rows] ** 2))):.2g} % in the mean, of "
+            f"which {100 * clamping:.2g} % is assumed to be clamping"
         )
-        return (model("stated", repeat, float(clamping), STATED_FREEDOM, origin),)
+        if not rows.all():
+            origin += f"; {n - int(rows.sum())} readings do not state it and are assumed to scatter as the others do"
+        return (model("stated", every, clamping, STATED_FREEDOM, origin),)
     why = "the repeats agree exactly, as copies do" if copied(data) else "the data hold neither repeats nor sd_N_per_mm"
     guesses = []
     for name, guess in (("low", LOW_GUESS), ("high", HIGH_GUESS)):
@@ -212,6 +221,30 @@ def _noise_of_tip(
         origin = f"a {name} guess, {_percent(*both)}: {why}"
         guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
     return tuple(guesses)
+
+
+def _parts(relative: FloatArray) -> tuple[FloatArray, float]:
+    """Stated relative sds (n,) as repeat noise (n,) and clamping."""
+    clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
+    return np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2)), float(clamping)
+
+
+def _both(relative: FloatArray, rows: NDArray[np.bool_], repeats: Repeats, trusted: bool) -> tuple[FloatArray, float]:
+    """Repeat noise (n,) where some `rows` state theirs, and what it is worth.
+
+    Two estimates of one thing are weighed by their degrees of freedom. Where they contradict each other, each stands
+    for its own readings, and both are trusted as far as the less certain one.
+    """
+    repeat = np.full(len(relative), repeats.repeat)
+    repeat[rows] = _parts(relative[rows])[0]
+    if not trusted:
+        return repeat, min(STATED_FREEDOM, repeats.freedom)
+    level = float(np.sqrt(np.mean(repeat[rows] ** 2)))
+    freedom = STATED_FREEDOM + repeats.freedom
+    pooled = float(np.sqrt((STATED_FREEDOM * level**2 + repeats.freedom * repeats.repeat**2) / freedom))
+    repeat[rows] *= pooled / level
+    repeat[~rows] = pooled
+    return repeat, freedom
 
 
 def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -> str:
@@ -228,8 +261,8 @@ def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -
         return ""
     small = ratio > 1.0
     return (
-        f"the {what} is too {'small' if small else 'large'}: {100 * told:.2g} %, where {repeats.freedom} differences "
-        f"between repeats scatter {ratio:.2g} times as much; what the repeats show is used instead"
+        f"the {what} is too {'small' if small else 'large'}: {100 * told:.2g} %, where {repeats.differences} "
+        f"differences between repeats scatter {ratio:.2g} times as much; {USED_INSTEAD}"
     )
 
 

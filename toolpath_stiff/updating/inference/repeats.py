@@ -22,8 +22,12 @@ FloatArray = NDArray[np.float64]
 # share is expected about the assumed one (sd of its logarithm), within the ends.
 OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0
 OUTLIER_SPREAD, OUTLIER_ENDS = 1.5, (0.005, 0.20)
+# The grid on which scatter and share are weighed: factors on the first estimate of the scatter, shares.
+FACTORS, SHARES = np.geomspace(0.3, 3.3, 61), np.geomspace(*OUTLIER_ENDS, 16)
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
 MOST_TRIMS = 8
+# Standard deviations as which a larger deviation counts: how far off the wildest is tells nothing of the others.
+FARTHEST = 1.5 * OUTLIER_WIDTH
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
@@ -47,21 +51,36 @@ def copied(data: Measurements) -> bool:
 
 @dataclass(frozen=True)
 class Repeats:
-    """What repeats tell: relative sds, degrees of freedom, whether clamping was estimated, share of wild readings."""
+    """What repeats tell.
+
+    Attributes
+    ----------
+    repeat, clamping
+        Relative standard deviations.
+    differences
+        Differences between repeats: degrees of freedom if no reading were wild.
+    clamps
+        Whether clamping was estimated.
+    wild
+        Share of wild readings.
+    freedom
+        Degrees of freedom that the estimated scatter is worth: fewer than differences, as any of them may be wild.
+    """
 
     repeat: float
     clamping: float
-    freedom: int
+    differences: int
     clamps: bool
     wild: float
+    freedom: float
 
 
 def from_repeats(data: Measurements) -> Repeats | None:
     """Noise from repeats, or None without enough of them.
 
     What differs between repeats beside chance, the time since zeroing and the order, is projected out first, so that
-    a drift is not taken for noise. Differences beyond `WILD` standard deviations are set aside as wild; what
-    that leaves of the scatter, and the share of wild readings, are those of the likeliest mixture.
+    a drift is not taken for noise. Differences beyond `WILD` standard deviations are set aside as wild for a first
+    estimate; scatter and share of wild readings are then weighed together over all differences.
     """
     groups = repeat_groups(data)
     every = kept = np.bincount(groups)[groups] > 1
@@ -74,7 +93,7 @@ def from_repeats(data: Measurements) -> Repeats | None:
         if contrasts.count < FEWEST_CONTRASTS:
             break
         repeat, clamping, found = _maximum_likelihood(contrasts)
-        result = Repeats(repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found, OUTLIERS)
+        result = Repeats(repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found, OUTLIERS, 0.0)
         wild = contrasts.deviations(result.repeat, result.clamping) > WILD
         if not wild.any():
             break
@@ -84,19 +103,23 @@ def from_repeats(data: Measurements) -> Repeats | None:
     if result is None:
         return None
     whole = _Contrasts.of(data.select(every), groups[every])
-    factor, share = _mixture(whole.deviations(result.repeat, result.clamping), np.bincount(groups)[groups[every]])
-    return replace(result, repeat=factor * result.repeat, wild=share)
+    factor, share, worth = _mixture(
+        whole.deviations(result.repeat, result.clamping), np.bincount(groups)[groups[every]]
+    )
+    freedom = min(float(result.differences), worth)
+    return replace(result, repeat=factor * result.repeat, wild=share, freedom=freedom)
 
 
-def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, float]:
-    """Factor on the scatter, and share of wild readings, that make deviations (n,) of repeats likeliest.
+def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, float, float]:
+    """Factor on the scatter, share of wild readings, and degrees of freedom, from deviations (n,) of repeats.
 
     A reading's deviation from the others of its group of `size` (n,) is wild with itself or with one of them; for pairs
-    that is exact. Each group counts with its degrees of freedom.
+    that is exact. Each group counts with its degrees of freedom. Factor and share are the posterior means of their
+    logarithms (the factor's prior is flat in its logarithm); the degrees of freedom are those of a chi-square whose
+    logarithm is known as far: sd 1 / sqrt(2 x freedom) of the factor.
     """
-    squared, wide = deviations[:, None, None] ** 2, OUTLIER_WIDTH**2
-    factors = np.linspace(0.6, 1.3, 36)[:, None]
-    shares = np.geomspace(*OUTLIER_ENDS, 30)
+    squared, wide = np.minimum(deviations, FARTHEST)[:, None, None] ** 2, OUTLIER_WIDTH**2
+    factors, shares = FACTORS[:, None], SHARES
     own = 1.0 - 1.0 / size[:, None, None]  # of the variance of a deviation
     total = np.zeros(np.broadcast_shapes(squared.shape, factors.shape, shares.shape))
     for mine, chance in ((wide, shares), (1.0, 1.0 - shares)):
@@ -105,8 +128,11 @@ def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, fl
             total = total + chance * odds * np.exp(-0.5 * squared / sd**2) / sd
     logs = (np.log(np.maximum(total, 1e-300)) * own).sum(axis=0)
     logs = logs - 0.5 * (np.log(shares / OUTLIERS) / OUTLIER_SPREAD) ** 2
-    at = np.unravel_index(int(np.argmax(logs)), logs.shape)
-    return float(factors[at[0], 0]), float(shares[at[1]])
+    weights = np.exp(logs - logs.max())
+    of_factor, of_share = weights.sum(axis=1) / weights.sum(), weights.sum(axis=0) / weights.sum()
+    mean = float(of_factor @ np.log(FACTORS))
+    spread = float(of_factor @ (np.log(FACTORS) - mean) ** 2)
+    return float(np.exp(mean)), float(np.exp(of_share @ np.log(SHARES))), 0.5 / max(spread, 1e-9)
 
 
 @dataclass(frozen=True)
@@ -123,9 +149,11 @@ class _Contrasts:
         (n,) M y; diagonal of M.
     reached, values
         (n, k) M Z E for eigenvectors E of Z^T M Z, and its eigenvalues (k,) that are not 0. None where every reading
-        was clamped by itself, which cannot be told from repeat noise.
+        was clamped by itself, which cannot be told from repeat noise, or where all repeats are of one clamping.
     count
         Rank of M: degrees of freedom.
+    alone
+        Whether every reading was clamped by itself: the differences then hold clamping too.
     """
 
     left: FloatArray
@@ -133,6 +161,7 @@ class _Contrasts:
     reached: FloatArray
     values: FloatArray
     count: int
+    alone: bool
 
     @classmethod
     def of(cls, data: Measurements, groups: NDArray[np.int64]) -> _Contrasts:
@@ -153,9 +182,17 @@ class _Contrasts:
         n, count = len(groups), len(groups) - means.count - fixed.shape[1]
         clamped = np.zeros((n, 0)) if clamps.alone else left((clamps.of[:, None] == np.arange(clamps.count)) * 1.0)
         values, vectors = np.linalg.eigh(clamped.T @ clamped)
-        kept = values > values.max(initial=0.0) * n * np.finfo(float).eps
+        largest = np.bincount(clamps.of).max(initial=0)  # of the eigenvalues, if nothing were projected out
+        kept = values > largest * n * np.finfo(float).eps
         own = 1.0 - 1.0 / np.bincount(means.of)[means.of] - (fixed**2).sum(axis=1)
-        return cls(left(np.log(data.stiffness)[:, None])[:, 0], own, clamped @ vectors[:, kept], values[kept], count)
+        return cls(
+            left(np.log(data.stiffness)[:, None])[:, 0],
+            own,
+            clamped @ vectors[:, kept],
+            values[kept],
+            count,
+            clamps.alone,
+        )
 
     @property
     def tells(self) -> bool:
@@ -171,8 +208,8 @@ class _Contrasts:
 
     def deviations(self, repeat: float, clamping: float) -> FloatArray:
         """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
-        repeat, alone = max(repeat, 1e-12), self.reached.shape[1] == 0
-        ratio, own = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if alone else 0.0)
+        repeat = max(repeat, 1e-12)
+        ratio, own = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if self.alone else 0.0)
         weights = ratio / (1.0 + ratio * self.values)
         pull = (self.left - self.reached @ (weights * (self.left @ self.reached))) / own
         scale = np.sqrt(np.maximum(self.own - self.reached**2 @ weights, 0.0) / own)
