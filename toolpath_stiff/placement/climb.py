@@ -30,6 +30,8 @@ SLACKEST = 1e3
 PERTURBATION, TOLERANCE = 1e-10, 1e-10  # of costs and of rows, both of the order of one
 MOST_PIVOTS = 500  # some thirty are usual
 SOME_STIFFNESS = 5e7  # N/m, the order of a machine tool's: where no climb begins within reach
+NO_SLOPE = np.zeros((1, 1))
+_Block = tuple[FloatArray, tuple[float, float, float, float], FloatArray | float]  # (free, j) slopes, L H t slack, bound
 Rank = tuple[float, float, float]  # more is better, the first that differs decides: rules, floors, value
 
 
@@ -276,8 +278,7 @@ class Climber:
         k, g, scale = self._stiffness(rows, gradient)
         matrix, right = self._constraints(rows, gradient, k, g, scale, goal, region)
         cost = np.zeros(d + 4)
-        weight = self.evaluator.path.weight[self.evaluator.path.headline]
-        slope = g @ weight / weight.sum()
+        slope = g @ self._weight
         if goal.weights is None:
             cost[d + 2] = -1.0
         else:
@@ -297,12 +298,19 @@ class Climber:
 
     def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray, float]:
         """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean, N/m."""
-        head = self.evaluator.path.headline
+        head = self.evaluator.head
         values = rows.stiffness[0, head]
-        scale = float(np.mean(values))
+        scale = float(values.sum() / max(len(values), 1))
         if not np.isfinite(scale):  # a cut out of reach: no figures, the limits alone guide
             return np.ones(len(values)), np.zeros((len(self.free), len(values))), scale
-        return values / scale, np.nan_to_num(gradient.stiffness[:, head] / scale), scale
+        slopes = gradient.stiffness[:, head] / scale
+        return values / scale, slopes if np.isfinite(slopes.sum()) else np.nan_to_num(slopes), scale
+
+    @cached_property
+    def _weight(self) -> FloatArray:
+        """(h,) share of the path's length that each headline sample stands for."""
+        raw = self.evaluator.path.weight[self.evaluator.head]
+        return np.asarray(raw / raw.sum())
 
     def _constraints(
         self,
@@ -317,36 +325,34 @@ class Climber:
         """A x <= b in the variables step, L, H, t, slack; rows that cannot bind within the region are left out."""
         d = len(self.free)
         reach = region * np.abs(g).sum(axis=0)
-        low, high = (k - reach <= (k + reach).min()), (k + reach >= (k - reach).max())
-        blocks = [_block(-g[:, low], [1.0, 0.0, 0.0, 0.0]), _block(g[:, high], [0.0, -1.0, 0.0, 0.0])]
-        rights = [k[low], -k[high]]
+        low = np.flatnonzero(k - reach <= (k + reach).min(initial=np.inf))
+        high = np.flatnonzero(k + reach >= (k - reach).max(initial=-np.inf))
+        blocks: list[_Block] = [
+            (-g[:, low], (1.0, 0.0, 0.0, 0.0), k[low]),
+            (g[:, high], (0.0, -1.0, 0.0, 0.0), -k[high]),
+        ]
         for values, slopes, least in self._kept(rows, gradient):
-            near = values - region * np.abs(slopes).sum(axis=0) < least + INSIDE
-            blocks.append(_block(-slopes[:, near], [0.0, 0.0, 0.0, -1.0]))
-            rights.append(values[near] - least - INSIDE)
-        raw = self.evaluator.path.weight[self.evaluator.path.headline]
-        weight = raw / raw.sum()
+            near = np.flatnonzero(values - region * np.abs(slopes).sum(axis=0) < least + INSIDE)
+            blocks.append((-slopes[:, near], (0.0, 0.0, 0.0, -1.0), values[near] - least - INSIDE))
         floors = (goal.floors / scale) + (0.0 if goal.weights is None else INSIDE)
         soft = (1.0, 0.0) if goal.weights is None else (0.0, -1.0)  # the common surplus t, or the slack
         if np.isfinite(scale):
             if np.isfinite(floors[0]):
-                blocks.append(np.array([[*(-(g @ weight)), 0.0, 0.0, *soft]]))
-                rights.append(np.array([float(k @ weight) - floors[0]]))
+                mean = float(k @ self._weight) - floors[0]
+                blocks.append((-(g @ self._weight)[:, None], (0.0, 0.0, *soft), mean))
             if np.isfinite(floors[1]):
-                blocks.append(np.array([[*np.zeros(d), -1.0, 1.0, *soft]]))
-                rights.append(np.array([-floors[1]]))
+                blocks.append((NO_SLOPE, (-1.0, 1.0, *soft), -floors[1]))
             if np.isfinite(floors[2]):
-                blocks.append(np.array([[*np.zeros(d), -1.0, 0.0, *soft]]))
-                rights.append(np.array([-floors[2]]))
-        blocks.append(np.array([[*np.zeros(d), 1.0, -1.0, 0.0, 0.0], [*np.zeros(d + 2), 1.0, 0.0]]))
-        return np.concatenate(blocks), np.concatenate([*rights, [0.0, SLACKEST]])
+                blocks.append((NO_SLOPE, (-1.0, 0.0, *soft), -floors[2]))
+        blocks += [(NO_SLOPE, (1.0, -1.0, 0.0, 0.0), 0.0), (NO_SLOPE, (0.0, 0.0, 1.0, 0.0), SLACKEST)]
+        return _joined(blocks, d)
 
     def _kept(self, rows: PlacedRows, gradient: PlacedRows) -> list[tuple[FloatArray, FloatArray, float]]:
         """Values, derivatives and least value of what the rules keep, sample by sample."""
         kept = [(rows.margin[0], gradient.margin, self.rules.margin)]
         if self.evaluator.keepouts:
             kept.append((rows.clearance[0], gradient.clearance, 0.0))
-        cutting = self.evaluator.path.cutting
+        cutting = self.evaluator.cuts
         law = rows.law[0, cutting]
         if np.isfinite(self.rules.extrapolated) and len(law):
             inside = law >= 0.0
@@ -372,31 +378,41 @@ def least_cost(
     rows = np.concatenate([matrix, np.eye(n), -np.eye(n)])
     bounds = np.concatenate([right, high, -low])
     working = len(matrix) + np.where(leaning < 0.0, np.arange(n), np.arange(n, 2 * n))
-    inverse = np.diag(np.where(leaning < 0.0, 1.0, -1.0))
+    state = np.empty((n + 1, n + 1))  # the inverse of the working set and x beside it; the multipliers below
+    ratio, change = np.empty(n), np.empty(n + 1)
     for pivot in range(MOST_PIVOTS):
-        if pivot % 20 == 19:  # what the updates have rounded away
+        if pivot % 20 == 0:  # afresh: what the updates have rounded away
             inverse = np.linalg.inv(rows[working])
-        x = inverse @ bounds[working]
-        broken = rows @ x - bounds
+            state[:n, :n], state[:n, n], state[n, :n] = inverse, inverse @ bounds[working], -leaning @ inverse
+        broken = rows @ state[:n, n]
+        broken -= bounds
         worst = int(broken.argmax())
         if broken[worst] <= TOLERANCE:
-            return np.asarray(x)
-        multipliers, share = -leaning @ inverse, rows[worst] @ inverse
-        ratio = np.where(share > TOLERANCE, np.maximum(multipliers, 0.0) / np.maximum(share, TOLERANCE), np.inf)
+            return state[:n, n].copy()
+        share = rows[worst] @ state[:n, :n]
+        ratio.fill(np.inf)
+        np.divide(np.maximum(state[n, :n], 0.0), share, out=ratio, where=share > TOLERANCE)
         out = int(ratio.argmin())
-        if not np.isfinite(ratio[out]):
+        if not ratio[out] < np.inf:
             return None
         working[out] = worst
-        change = share.copy()
+        change[:n], change[n] = share, broken[worst]
         change[out] -= 1.0
-        inverse = inverse - np.outer(inverse[:, out] / share[out], change)
+        state -= (state[:, out] / share[out])[:, None] * change
     return None
 
 
-def _block(slopes: FloatArray, rest: list[float]) -> FloatArray:
-    """Rows (n, free + 4) of one kind of constraint from derivatives (free, n)."""
-    n = slopes.shape[1]
-    return np.concatenate([slopes.T, np.tile(np.array(rest), (n, 1))], axis=1)
+def _joined(blocks: list[_Block], free: int) -> tuple[FloatArray, FloatArray]:
+    """A (m, free + 4) and b (m,) of constraints A x <= b."""
+    m = sum(slopes.shape[1] for slopes, _, _ in blocks)
+    matrix, right, start = np.empty((free + 4, m)), np.empty(m), 0
+    for slopes, rest, bound in blocks:
+        rows = slice(start, start + slopes.shape[1])
+        matrix[:free, rows], right[rows] = slopes, bound
+        for row, value in zip(matrix[free:], rest, strict=True):
+            row[rows] = value
+        start = rows.stop
+    return matrix.T, right
 
 
 def front_rows(figures: PlacementFigures, kept: BoolArray) -> IntArray:

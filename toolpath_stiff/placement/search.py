@@ -191,15 +191,15 @@ def search_placements(
     held = present is not None and bounds.holds(present)
     if present is not None and held:
         scouts = np.vstack([present, scouts])
-    unmended = _let_go(search, scouts)
-    search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, now))
+    known, unmended = _let_go(search, scouts)
+    search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, known, now))
     report(1, 4)
-    candidates = _evolved(search, scouts, rng)
+    archive, figures = _evolved(search, scouts, known, rng)
     report(2, 4)
-    ends = _climbed(search, np.vstack([candidates, scouts]), now)
+    ends = _climbed(search, np.vstack([archive, scouts]), PlacementFigures.joined([figures, known]), now)
     report(3, 4)
     candidates = np.vstack(
-        [_for_the_front(search, candidates), ends] + ([present[None]] if present is not None and held else [])
+        [_for_the_front(search, archive), ends] + ([present[None]] if present is not None and held else [])
     )
     found = _result(search, candidates, now, unmended)
     report(4, 4)
@@ -240,15 +240,15 @@ def _result(
     )
 
 
-def _let_go(search: _Search, scouts: FloatArray) -> tuple[tuple[int, str], ...]:
-    """Drop anchored rapids that no placement keeps within reach where the cuts are; returns their lines and why."""
+def _let_go(search: _Search, scouts: FloatArray) -> tuple[PlacementFigures, tuple[tuple[int, str], ...]]:
+    """Drop anchored rapids that no placement keeps within reach where the cuts are.
+
+    Returns the figures of the scouts on few samples, and the lines of these rapids and why.
+    """
     few = search.evaluators["few"]
-    anchored = few.path.anchored
-    if not len(anchored):
-        return ()
-    found = few.rows(scouts)
-    m, rule = len(few.path), search.rules.margin
-    room = np.minimum(found.margin - rule, found.clearance)
+    m, rule, anchored = len(few.path), search.rules.margin, few.path.anchored
+    found = [(few.summary(rows), np.minimum(rows.margin - rule, rows.clearance)) for rows in few.groups(scouts)]
+    figures, room = PlacementFigures.joined([part for part, _ in found]), np.concatenate([part for _, part in found])
     cuts = room[:, :m][:, few.path.cutting].min(axis=1, initial=np.inf)
     possible = np.flatnonzero(cuts >= 0.0) if (cuts >= 0.0).any() else np.arange(len(scouts))
     gone, told = [], []
@@ -263,7 +263,8 @@ def _let_go(search: _Search, scouts: FloatArray) -> tuple[tuple[int, str], ...]:
     if gone:
         kept = ~np.isin(search.path.anchored.move, gone)
         search.sampled(replace(search.path, anchored=search.path.anchored.take(kept)))
-    return tuple(told)
+        figures = search.evaluators["few"].figures(scouts)
+    return figures, tuple(told)
 
 
 def _breaks(search: _Search, path: WorkPath, placement: FloatArray, columns: IntArray) -> str:
@@ -282,13 +283,17 @@ def _breaks(search: _Search, path: WorkPath, placement: FloatArray, columns: Int
     return stand.describe(worst)
 
 
-def _extrapolation_allowed(search: _Search, scouts: FloatArray, now: PlacementFigures | None) -> float:
-    """Largest share of samples outside the strut law: as now; where that is out of reach, the least that was found."""
+def _extrapolation_allowed(
+    search: _Search, scouts: FloatArray, few: PlacementFigures, now: PlacementFigures | None
+) -> float:
+    """Largest share of samples outside the strut law: as now; where that is out of reach, the least that was found.
+
+    `few` are the figures of the scouts on few samples.
+    """
     if search.asked.allow_extrapolation or now is None:
         return np.inf
     if now.margin[0] >= 0.0:
         return float(now.extrapolated[0])
-    few = search.evaluators["few"].figures(scouts)
     possible = np.flatnonzero(search.kept(few))
     if not len(possible):
         return np.inf
@@ -296,16 +301,18 @@ def _extrapolation_allowed(search: _Search, scouts: FloatArray, now: PlacementFi
     return float(search.evaluators["whole"].figures(scouts[least]).extrapolated.min())
 
 
-def _evolved(search: _Search, scouts: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """An archive of placements that nothing dominates, from the scouts on, on few samples.
+def _evolved(
+    search: _Search, scouts: FloatArray, known: PlacementFigures, rng: np.random.Generator
+) -> tuple[FloatArray, PlacementFigures]:
+    """An archive of placements that nothing dominates, from the scouts on, with their figures on few samples.
 
-    Each generation moves members of the archive at random, by steps that shrink, and along the difference of two
+    `known` are the figures of the scouts. Each generation moves members of the archive at random, by steps that shrink, and along the difference of two
     others, as differential evolution does; what is dominated goes, and so does what is crowded.
     """
     few, bounds = search.evaluators["few"], search.bounds
-    archive, figures = _survivors(search, scouts, few.figures(scouts))
+    archive, figures = _survivors(search, scouts, known)
     if not len(bounds.free):
-        return archive
+        return archive, figures
     for spread in np.geomspace(WIDE, NARROW, GENERATIONS):
         parents, one, other = (bounds.unit(archive[rng.integers(len(archive), size=CHILDREN)]) for _ in range(3))
         step = spread * rng.normal(size=parents.shape) * (rng.uniform(size=parents.shape) < 0.7)
@@ -313,7 +320,7 @@ def _evolved(search: _Search, scouts: FloatArray, rng: np.random.Generator) -> F
         children = bounds.placements(parents + step + along * (one - other))
         found = PlacementFigures.joined([figures, few.figures(children)])
         archive, figures = _survivors(search, np.vstack([archive, children]), found)
-    return archive
+    return archive, figures
 
 
 def _survivors(
@@ -329,10 +336,11 @@ def _survivors(
     return placements[rows], figures.take(rows)
 
 
-def _climbed(search: _Search, candidates: FloatArray, now: PlacementFigures | None) -> FloatArray:
-    """The recommendation and the ends of the front, climbed to from several of the candidates."""
+def _climbed(
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, now: PlacementFigures | None
+) -> FloatArray:
+    """The recommendation and the ends of the front, climbed to from several candidates with figures on few samples."""
     asked = defaults.OBJECTIVES[search.asked.objective]
-    figures = search.evaluators["few"].figures(candidates)
     ends = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
     if now is not None and now.margin[0] >= 0.0:
         goal = Goal(asked, now.objectives[0])
