@@ -373,32 +373,33 @@ def least_cost(
     thousand rows it takes a tenth of the time of a general solver, most of which sets up. None where nothing keeps all
     rows, or no end is found.
     """
-    n = len(cost)
+    n, m = len(cost), len(matrix)
     leaning = cost + PERTURBATION * np.arange(1, n + 1)  # equal multipliers could go round in a circle
-    rows = np.concatenate([matrix, np.eye(n), -np.eye(n)])
-    bounds = np.concatenate([right, high, -low])
-    working = len(matrix) + np.where(leaning < 0.0, np.arange(n), np.arange(n, 2 * n))
-    state = np.empty((n + 1, n + 1))  # the inverse of the working set and x beside it; the multipliers below
-    ratio, change = np.empty(n), np.empty(n + 1)
+    rows = np.concatenate([matrix.T, np.eye(n), -np.eye(n)], axis=1)
+    rows = np.concatenate([rows, np.concatenate([-right, -high, low])[None]])  # (x, 1) @ rows: how far each is broken
+    working = m + np.where(leaning < 0.0, np.arange(n), np.arange(n, 2 * n))
+    state = np.zeros((n + 2, n + 1))  # the inverse of the working set and x beside it; 0 and 1; the multipliers
+    state[n, n] = 1.0
     for pivot in range(MOST_PIVOTS):
         if pivot % 20 == 0:  # afresh: what the updates have rounded away
-            inverse = np.linalg.inv(rows[working])
-            state[:n, :n], state[:n, n], state[n, :n] = inverse, inverse @ bounds[working], -leaning @ inverse
-        broken = rows @ state[:n, n]
-        broken -= bounds
+            inverse = np.linalg.inv(rows[:n, working].T)
+            state[:n, :n], state[:n, n] = inverse, -inverse @ rows[n, working]
+            state[n + 1, :n] = -leaning @ inverse
+        broken = state[: n + 1, n] @ rows
         worst = int(broken.argmax())
         if broken[worst] <= TOLERANCE:
             return state[:n, n].copy()
-        share = rows[worst] @ state[:n, :n]
-        ratio.fill(np.inf)
-        np.divide(np.maximum(state[n, :n], 0.0), share, out=ratio, where=share > TOLERANCE)
-        out = int(ratio.argmin())
-        if not ratio[out] < np.inf:
+        change = rows[:, worst] @ state[: n + 1]
+        out, least = -1, np.inf
+        for i, (share, multiplier) in enumerate(zip(change[:n].tolist(), state[n + 1, :n].tolist(), strict=True)):
+            if share > TOLERANCE and max(multiplier, 0.0) / share < least:
+                out, least = i, max(multiplier, 0.0) / share
+        if out < 0:
             return None
         working[out] = worst
-        change[:n], change[n] = share, broken[worst]
+        column = state[:, out] / change[out]
         change[out] -= 1.0
-        state -= (state[:, out] / share[out])[:, None] * change
+        state -= column[:, None] * change
     return None
 
 
