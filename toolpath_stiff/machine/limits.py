@@ -300,8 +300,11 @@ class Extremes:
         for span, limits in self.gauge.by_span:  # as `Limit.margin`, but divided once
             nearest.fill(np.inf)
             for limit in limits:
-                pair = (self.of(limit), limit.bound)
-                np.subtract(*(pair if limit.lower else pair[::-1]), out=apart)
+                value = self.of(limit)
+                if limit.lower:
+                    np.subtract(value, limit.bound, out=apart)
+                else:
+                    np.subtract(limit.bound, value, out=apart)
                 np.minimum(nearest, apart, out=nearest)
             nearest /= span
             np.minimum(margin, nearest, out=margin)

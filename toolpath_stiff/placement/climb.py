@@ -12,6 +12,7 @@ A front holds what nothing beats in mean, range and weakest place.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -31,7 +32,10 @@ PERTURBATION, TOLERANCE = 1e-10, 1e-10  # of costs and of rows, both of the orde
 MOST_PIVOTS = 500  # some thirty are usual
 SOME_STIFFNESS = 5e7  # N/m, the order of a machine tool's: where no climb begins within reach
 NO_SLOPE = np.zeros((1, 1))
-_Block = tuple[FloatArray, tuple[float, float, float, float], FloatArray | float]  # (free, j) slopes, L H t slack, bound
+Programme = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]  # cost, matrix, right, low, high
+_Block = tuple[
+    FloatArray, tuple[float, float, float, float], FloatArray | float
+]  # (free, j) slopes, L H t slack, bound
 Rank = tuple[float, float, float]  # more is better, the first that differs decides: rules, floors, value
 
 
@@ -135,6 +139,7 @@ class Goal:
 class _Climb:
     """One climb: where it is, the best that it met, how far the next linear programme may go."""
 
+    goal: Goal
     here: FloatArray
     rows: PlacedRows
     merit: float
@@ -189,18 +194,19 @@ class Climber:
         free = self.bounds.free
         return free[free != 2] if self.bounds.heights else free
 
-    def climb(self, first: FloatArray, goal: Goal, steps: int, region: float = 0.05) -> FloatArray:
+    def climb(self, first: FloatArray, goal: Goal | Sequence[Goal], steps: int, region: float = 0.05) -> FloatArray:
         """The best placements (k, 6) on the ways up from `first` (k, 6): rules first, then floors, then value.
 
-        All climb in step, so that each trial evaluates k placements at once.
+        One goal for all, or one for each. All climb in step, so that each trial evaluates k placements at once.
         """
         if not len(self.free):
             return first
         rows = self.evaluator.rows(first)
         scale = float(np.nanmean(rows.stiffness)) if np.isfinite(rows.stiffness).any() else SOME_STIFFNESS
-        judged = self._judged(rows, goal, scale)
+        goals = [goal] * len(first) if isinstance(goal, Goal) else list(goal)
+        judged = self._judged(rows, goals, scale)
         climbs = [
-            _Climb(first[i], rows.take(i), merit, first[i], rank, region, merit)
+            _Climb(goals[i], first[i], rows.take(i), merit, first[i], rank, region, merit)
             for i, (merit, rank) in enumerate(judged)
         ]
         for _ in range(steps):
@@ -208,25 +214,25 @@ class Climber:
             if not going:
                 break
             self._differentiate([climb for climb in going if climb.gradient is None])
-            for climb in going:
-                climb.step = self._step(climb, climb.rows, goal)
-            missed = self._try(going, goal, scale)
-            for climb in missed:  # corrected for the curvature of what was found
-                climb.step = self._step(climb, climb.bent(), goal)
-            for climb in self._try(missed, goal, scale):
+            missed = self._try(going, [climb.rows for climb in going], scale)
+            # Corrected for the curvature of what was found.
+            for climb in self._try(missed, [climb.bent() for climb in missed], scale):
                 climb.shrink(region)
         return np.array([climb.best for climb in climbs])
 
-    def _try(self, climbs: list[_Climb], goal: Goal, scale: float) -> list[_Climb]:
-        """Evaluate the next step of each climb and take it where it gains; those where it does not."""
+    def _try(self, climbs: list[_Climb], rows: list[PlacedRows], scale: float) -> list[_Climb]:
+        """Evaluate the next step of each climb, foretold from `rows`, and take it where it gains; the others."""
         if not climbs:
             return []
+        programmes = [self._programme(climb, values) for climb, values in zip(climbs, rows, strict=True)]
+        for climb, found in zip(climbs, least_costs(programmes), strict=True):
+            climb.step = np.zeros(len(self.free)) if found is None else found[: len(self.free)]
         there = np.array([self._moved(climb.here, climb.step) for climb in climbs])
-        rows = self.evaluator.rows(there)
+        placed = self.evaluator.rows(there)
         missed = []
-        for i, (merit, rank) in enumerate(self._judged(rows, goal, scale)):
+        for i, (merit, rank) in enumerate(self._judged(placed, [climb.goal for climb in climbs], scale)):
             climb = climbs[i]
-            climb.tried = rows.take(i)
+            climb.tried = placed.take(i)
             if rank > climb.best_rank:
                 climb.best, climb.best_rank = there[i], rank
             if merit > climb.merit + SMALLEST_GAIN:
@@ -235,11 +241,16 @@ class Climber:
                 missed.append(climb)
         return missed
 
-    def _judged(self, rows: PlacedRows, goal: Goal, scale: float) -> list[tuple[float, Rank]]:
-        """Of each placement the merit, value less penalties in units of `scale` (N/m), and its rank."""
+    def _judged(self, rows: PlacedRows, goals: list[Goal], scale: float) -> list[tuple[float, Rank]]:
+        """Of each placement the merit for its goal, value less penalties in units of `scale` (N/m), and its rank."""
         figures = self.evaluator.summary(rows)
-        ranks = zip(-self.rules.violation(figures), -goal.worsening(figures), goal.value(figures), strict=True)
-        return [(_merit(rank, scale), rank) for rank in ((float(a), float(b), float(c)) for a, b, c in ranks)]
+        ranks = np.empty((len(goals), 3))
+        ranks[:, 0] = -self.rules.violation(figures)
+        for goal in {id(goal): goal for goal in goals}.values():
+            same = np.array([other is goal for other in goals])
+            some = figures.take(same)
+            ranks[same, 1], ranks[same, 2] = -goal.worsening(some), goal.value(some)
+        return [(_merit(rank, scale), rank) for rank in ((a, b, c) for a, b, c in ranks.tolist())]
 
     def _inwards(self, placement: FloatArray) -> FloatArray:
         """(free,) 1 or -1, the sense that leads away from the nearer bound."""
@@ -270,9 +281,9 @@ class Climber:
             there = found.take(slice(i * d, (i + 1) * d))
             climb.gradient = there.slopes(climb.rows, sign * DIFFERENCE)
 
-    def _step(self, climb: _Climb, rows: PlacedRows, goal: Goal) -> FloatArray:
-        """(free,) the linear programme's step within the region; variables step, L, H, t, slack."""
-        here, region, gradient = climb.here, climb.region, climb.gradient
+    def _programme(self, climb: _Climb, rows: PlacedRows) -> Programme:
+        """The linear programme of the step within the region; variables step (free,), L, H, t, slack."""
+        here, region, gradient, goal = climb.here, climb.region, climb.gradient, climb.goal
         assert gradient is not None
         d = len(self.free)
         k, g, scale = self._stiffness(rows, gradient)
@@ -293,8 +304,7 @@ class Climber:
             for i, s, (below, above) in zip(self.free, span, room, strict=True)
         ]
         low, high = np.array([*box, *[(-SLACKEST, SLACKEST)] * 3, (0.0, SLACKEST)]).T
-        found = least_cost(cost, matrix, right, low, high)
-        return np.zeros(d) if found is None else found[:d]
+        return cost, matrix, right, low, high
 
     def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray, float]:
         """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean, N/m."""
@@ -362,45 +372,77 @@ class Climber:
         return kept
 
 
-def least_cost(
-    cost: FloatArray, matrix: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray
-) -> FloatArray | None:
-    """The x (n,) of least `cost` . x with `matrix` x <= `right` (m rows) and `low` <= x <= `high`, all finite.
+def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
+    """Of each programme the x (n,) of least `cost` . x with `matrix` x <= `right` and `low` <= x <= `high`, all finite.
 
     The dual simplex method in the form of a working set: n rows that hold as equations, at first the bounds that the
     cost leans on; the row that is broken most comes in, the one whose multiplier reaches zero first goes out (Nocedal
     and Wright, Numerical Optimization, 2006, chapter 13, problem 13.6; Lemke 1954). For some ten unknowns and a
-    thousand rows it takes a tenth of the time of a general solver, most of which sets up. None where nothing keeps all
-    rows, or no end is found.
+    thousand rows it takes a tenth of the time of a general solver, most of which sets up; all programmes, of one n,
+    take their steps at once. None where nothing keeps all rows, or no end is found.
     """
-    n, m = len(cost), len(matrix)
-    leaning = cost + PERTURBATION * np.arange(1, n + 1)  # equal multipliers could go round in a circle
-    rows = np.concatenate([matrix.T, np.eye(n), -np.eye(n)], axis=1)
-    rows = np.concatenate([rows, np.concatenate([-right, -high, low])[None]])  # (x, 1) @ rows: how far each is broken
-    working = m + np.where(leaning < 0.0, np.arange(n), np.arange(n, 2 * n))
-    state = np.zeros((n + 2, n + 1))  # the inverse of the working set and x beside it; 0 and 1; the multipliers
-    state[n, n] = 1.0
+    rows, state, working = _set_up(programmes)
+    n = state.shape[2] - 1
+    leaning = np.array([_leaning(programme[0]) for programme in programmes])
+    found: list[FloatArray | None] = [None] * len(programmes)
+    number, going = np.arange(len(programmes)), np.ones(len(programmes), dtype=bool)
     for pivot in range(MOST_PIVOTS):
-        if pivot % 20 == 0:  # afresh: what the updates have rounded away
-            inverse = np.linalg.inv(rows[:n, working].T)
-            state[:n, :n], state[:n, n] = inverse, -inverse @ rows[n, working]
-            state[n + 1, :n] = -leaning @ inverse
-        broken = state[: n + 1, n] @ rows
-        worst = int(broken.argmax())
-        if broken[worst] <= TOLERANCE:
-            return state[:n, n].copy()
-        change = rows[:, worst] @ state[: n + 1]
-        out, least = -1, np.inf
-        for i, (share, multiplier) in enumerate(zip(change[:n].tolist(), state[n + 1, :n].tolist(), strict=True)):
-            if share > TOLERANCE and max(multiplier, 0.0) / share < least:
-                out, least = i, max(multiplier, 0.0) / share
-        if out < 0:
-            return None
-        working[out] = worst
-        column = state[:, out] / change[out]
-        change[out] -= 1.0
-        state -= column[:, None] * change
-    return None
+        if going.sum() <= 0.6 * len(going):  # those that are done cost time
+            number, working = number[going], working[going]
+            rows, state, leaning = rows[going], state[going], leaning[going]
+            going = np.ones(len(number), dtype=bool)
+        if not len(going):
+            break
+        if pivot % 20 == 19:  # what the updates have rounded away
+            held = np.take_along_axis(rows, working[:, None], axis=2)
+            inverse = np.linalg.inv(held[:, :n].swapaxes(1, 2))
+            state[:, :n, :n], state[:, :n, n] = inverse, -(inverse @ held[:, n, :, None])[..., 0]
+            state[:, n + 1, :n] = -(leaning[:, None] @ inverse)[:, 0]
+        each = np.arange(len(going))
+        broken = (state[:, None, : n + 1, n] @ rows)[:, 0]
+        worst = broken.argmax(axis=1)
+        done = going & (broken[each, worst] <= TOLERANCE)
+        for i in np.flatnonzero(done):
+            found[number[i]] = state[i, :n, n].copy()
+        change = (rows[each, :, worst][:, None] @ state[:, : n + 1])[:, 0]
+        share = change[:, :n]
+        ratio = np.full(share.shape, np.inf)
+        np.divide(np.maximum(state[:, n + 1, :n], 0.0), share, out=ratio, where=share > TOLERANCE)
+        out = ratio.argmin(axis=1)
+        going = going & ~done & (ratio[each, out] < np.inf)
+        working[each[going], out[going]] = worst[going]
+        column = state[each, :, out] / np.where(going, change[each, out], np.inf)[:, None]
+        change[each, out] -= 1.0
+        state -= column[:, :, None] * change[:, None]
+    return found
+
+
+def _leaning(cost: FloatArray) -> FloatArray:
+    """Costs of which no two are equal: with equal multipliers the method could go round in a circle."""
+    return np.asarray(cost + PERTURBATION * np.arange(1, len(cost) + 1))
+
+
+def _set_up(programmes: Sequence[Programme]) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Rows, state and working sets (k, n) to start from.
+
+    (x, 1) @ `rows` (k, n + 1, m) says by how much each row is broken, the bounds last. `state` (k, n + 2, n + 1) has
+    the inverse of the working set and x beside it; 0 and 1; the multipliers.
+    """
+    k, n = len(programmes), len(programmes[0][0])
+    m = max(len(right) for _, _, right, _, _ in programmes)
+    rows, state = np.zeros((k, n + 1, m + 2 * n)), np.zeros((k, n + 2, n + 1))
+    rows[:, n], state[:, n, n] = -1.0, 1.0  # fewer rows than others: rows that nothing breaks
+    rows[:, :n, m : m + n], rows[:, :n, m + n :] = np.eye(n), -np.eye(n)
+    working = np.empty((k, n), dtype=np.int64)
+    for i, (cost, matrix, right, low, high) in enumerate(programmes):
+        leaning = _leaning(cost)
+        up = leaning < 0.0
+        rows[i, :n, : len(right)], rows[i, n, : len(right)] = matrix.T, -right
+        rows[i, n, m : m + n], rows[i, n, m + n :] = -high, low
+        state[i, np.arange(n), np.arange(n)] = np.where(up, 1.0, -1.0)
+        state[i, :n, n], state[i, n + 1, :n] = np.where(up, high, low), np.abs(leaning)
+        working[i] = m + np.where(up, np.arange(n), np.arange(n, 2 * n))
+    return rows, state, working
 
 
 def _joined(blocks: list[_Block], free: int) -> tuple[FloatArray, FloatArray]:

@@ -385,9 +385,7 @@ def drawn_path(
     beside = plunging_rows(load, few.tangent, few.abc, counting)
     beside &= ~headline_rows(load, few.tangent, few.abc, counting)
     axis = rotation_matrices(few.abc)[:, :, 2]
-    return DrawnPath(
-        few.position, axis, few.s, cut[chosen], beside, stiffness.reshape(len(placements), -1), len(rows)
-    )
+    return DrawnPath(few.position, axis, few.s, cut[chosen], beside, stiffness.reshape(len(placements), -1), len(rows))
 
 
 def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:
