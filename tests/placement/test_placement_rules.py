@@ -22,8 +22,9 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, least_costs
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
 from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
 from toolpath_stiff.stiffness.model import build_model
