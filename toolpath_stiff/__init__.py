@@ -21,6 +21,8 @@ from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.case import Case as Case
+    from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
+    from toolpath_stiff.api.case_studies import case_study as case_study
     from toolpath_stiff.api.correction import Plan as Plan
     from toolpath_stiff.api.correction import Reduction as Reduction
     from toolpath_stiff.api.correction import Update as Update
@@ -53,12 +55,10 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.many import analyze_many as analyze_many
     from toolpath_stiff.api.next_visits import NextVisit as NextVisit
     from toolpath_stiff.api.next_visits import next_visit as next_visit
-    from toolpath_stiff.api.placements import CaseStudy as CaseStudy
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
-    from toolpath_stiff.api.placements import case_study as case_study
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
     from toolpath_stiff.api.placements import try_placement as try_placement
@@ -93,6 +93,7 @@ __version__ = _VERSION
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
     "api.case": ("Case",),
+    "api.case_studies": ("CaseStudy", "case_study"),
     "api.effects": (
         "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "check_effects", "draft_effect",
         "effect_template", "effects",
@@ -106,8 +107,7 @@ _PUBLIC = {
     "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "Preview", "compare", "diagnose", "preview"),
     "api.next_visits": ("NextVisit", "next_visit"),
     "api.placements": (
-        "CaseStudy", "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "case_study", "place", "rewrite",
-        "try_placement",
+        "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
     ),
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),

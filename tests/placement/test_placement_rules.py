@@ -22,8 +22,9 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, least_cost
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
 from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
 from toolpath_stiff.stiffness.model import build_model
@@ -229,12 +230,28 @@ def test_the_linear_programmes_are_those_of_highs(seed, n, m):
     cost, matrix = rng.normal(size=n) * (rng.uniform(size=n) < 0.7), rng.normal(size=(m, n)).round(1)
     low, high = -rng.uniform(0.0, 2.0, n), rng.uniform(0.0, 2.0, n)
     right = matrix @ rng.uniform(low, high) + rng.choice([0.0, 0.3, -0.2], m)  # degenerate, and now and then impossible
-    ours = least_cost(cost, matrix, right, low, high)
+    ours = least_costs([(cost, matrix, right, low, high)])[0]
     theirs = linprog(cost, matrix, right, bounds=np.stack([low, high], axis=1), method="highs")
     assert (ours is None) == (theirs.x is None)
     if ours is not None:
         assert cost @ ours == pytest.approx(theirs.fun, abs=1e-7)
         assert (matrix @ ours <= right + 1e-8).all() and (low - 1e-8 <= ours).all() and (ours <= high + 1e-8).all()
+
+
+def test_linear_programmes_solved_together_are_those_solved_alone():
+    rng = np.random.default_rng(8)
+    programmes = []
+    for m in (3, 40, 1, 200, 12, 25):
+        matrix, bound = rng.normal(size=(m, 6)), rng.uniform(0.5, 2.0, 6)
+        programmes.append((rng.normal(size=6), matrix, rng.uniform(-0.1, 0.4, m), -bound, bound))
+    programmes[4] = (*programmes[4][:2], np.full(12, -50.0), *programmes[4][3:])  # impossible
+    together = least_costs(programmes)
+    assert together[4] is None
+    for programme, ours in zip(programmes, together, strict=True):
+        alone = least_costs([programme])[0]
+        assert (ours is None) == (alone is None)
+        if ours is not None:
+            np.testing.assert_allclose(ours, alone, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize(

@@ -243,7 +243,7 @@ def _region(text: str) -> tuple[str, list[float]]:
 
 def case_study(args: argparse.Namespace) -> int:
     """Analyze the regions and write the files."""
-    from toolpath_stiff.api.placements import case_study
+    from toolpath_stiff.api.case_studies import case_study
     from toolpath_stiff.report.case_study import names
 
     regions = dict(args.region)

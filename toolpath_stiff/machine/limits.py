@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -202,20 +203,24 @@ class Gauge:
     axes: tuple[FloatArray, FloatArray]
     determinant: float
 
-    def margin(
+    def extremes(
         self,
         position: FloatArray,
         lengths: FloatArray,
         determinant: FloatArray,
         rotation: FloatArray | None,
         tool: float,
-    ) -> FloatArray:
-        """(n,) smallest margin to any limit, inf without limits; the arguments as of `reach`."""
-        extremes = _Extremes(self, position, lengths, determinant, rotation, tool)
-        margin = np.full(position.shape[1], np.inf)
-        for limit, _ in self.distinct:
-            np.minimum(margin, limit.margin(extremes.of(limit)), out=margin)
-        return margin
+    ) -> Extremes:
+        """What comes nearest to the limits at n poses with one tool; the arguments as of `reach`."""
+        return Extremes(self, position, lengths, determinant, rotation, tool)
+
+    @cached_property
+    def by_span(self) -> list[tuple[float, list[Limit]]]:
+        """The distinct limits whose margins are counted in the same span."""
+        return [
+            (span, [limit for limit, _ in self.distinct if limit.span == span])
+            for span in dict.fromkeys(limit.span for limit, _ in self.distinct)
+        ]
 
     def reach(
         self,
@@ -246,7 +251,7 @@ class Gauge:
             As of `reach`; (n,) false where an angle too small for its cosine decides, and `reach` must be asked.
         """
         n = position.shape[1]
-        extremes = _Extremes(self, position, lengths, determinant, rotation, tool)
+        extremes = self.extremes(position, lengths, determinant, rotation, tool)
         margin, value, which = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
         for number, (limit, _) in enumerate(self.distinct):
             found = extremes.of(limit)
@@ -265,7 +270,7 @@ class Gauge:
 
 
 @dataclass
-class _Extremes:
+class Extremes:
     """The values of n poses that come nearest to a limit, found once for each kind of limit; arguments of `Gauge`."""
 
     gauge: Gauge
@@ -275,13 +280,42 @@ class _Extremes:
     rotation: FloatArray | None
     tool: float
     cosines: dict[str, FloatArray] = field(default_factory=dict)
+    angles: dict[str, FloatArray] = field(default_factory=dict)
+
+    @cached_property
+    def shortest(self) -> FloatArray:
+        """(n,) m, the shortest strut."""
+        return np.asarray(self.lengths.min(axis=0))
+
+    @cached_property
+    def longest(self) -> FloatArray:
+        """(n,) m, the longest strut."""
+        return np.asarray(self.lengths.max(axis=0))
+
+    @cached_property
+    def margin(self) -> FloatArray:
+        """(n,) smallest margin to any limit, inf without limits."""
+        n = self.position.shape[1]
+        margin, nearest, apart = np.full(n, np.inf), np.empty(n), np.empty(n)
+        for span, limits in self.gauge.by_span:  # as `Limit.margin`, but divided once
+            nearest.fill(np.inf)
+            for limit in limits:
+                value = self.of(limit)
+                if limit.lower:
+                    np.subtract(value, limit.bound, out=apart)
+                else:
+                    np.subtract(limit.bound, value, out=apart)
+                np.minimum(nearest, apart, out=nearest)
+            nearest /= span
+            np.minimum(margin, nearest, out=margin)
+        return margin
 
     def of(self, limit: Limit) -> FloatArray:
         """(n,) the extreme values of a limit's quantity."""
         if limit.quantity == STRUT:
-            return np.asarray(self.lengths.min(axis=0) if limit.lower else self.lengths.max(axis=0))
+            return self.shortest if limit.lower else self.longest
         if limit.quantity in (FRAME, PLATFORM):
-            return np.asarray(np.arccos(np.clip(self._cosine(limit.quantity).min(axis=0), -1.0, 1.0)))
+            return self._angle(limit.quantity)
         if limit.quantity == SINGULARITY:
             return np.asarray(self.determinant / self.gauge.determinant)
         return np.asarray(self.position[AXES.index(limit.quantity)])
@@ -293,13 +327,25 @@ class _Extremes:
         lowest = limit.lower or limit.quantity != STRUT  # the smallest cosine is the largest angle
         return np.asarray(some.argmin(axis=1) if lowest else some.argmax(axis=1))
 
+    def _angle(self, quantity: str) -> FloatArray:
+        """(n,) rad, the largest angle of the frame's or the platform's joints."""
+        name = self._name(quantity)
+        if name not in self.angles:
+            smallest = self._cosine(quantity).min(axis=0)
+            self.angles[name] = np.arccos(np.clip(smallest, -1.0, 1.0, out=smallest), out=smallest)
+        return self.angles[name]
+
+    def _name(self, quantity: str) -> str:
+        """The joints whose angles are those of a quantity's."""
+        axes = self.gauge.axes
+        return FRAME if self.rotation is None and bool((axes[0] == axes[1]).all()) else quantity
+
     def _cosine(self, quantity: str) -> FloatArray:
         """(6, n) cosines of the angles of the frame's or the platform's joints."""
-        axes = self.gauge.axes
-        same = self.rotation is None and bool((axes[0] == axes[1]).all())
-        name = FRAME if same else quantity
+        name = self._name(quantity)
         if name not in self.cosines:
-            self.cosines[name] = self._along_axes(axes[name == PLATFORM], name == PLATFORM) / self.lengths
+            along = self._along_axes(self.gauge.axes[name == PLATFORM], name == PLATFORM)
+            self.cosines[name] = np.divide(along, self.lengths, out=along)
         return self.cosines[name]
 
     def _along_axes(self, axes: FloatArray, of_platform: bool) -> FloatArray:

@@ -12,6 +12,7 @@ A front holds what nothing beats in mean, range and weakest place.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.placement.evaluator import Evaluator, PlacedRows, PlacementFigures
+from toolpath_stiff.placement.linear_programmes import Programme, least_costs
 
 DIFFERENCE = 1e-6  # of each range, for the derivatives
 PENALTY = 100.0  # what a shortfall costs, in units of the objective
@@ -27,9 +29,11 @@ SMALLEST_REGION = 1e-5  # of each range
 SMALLEST_GAIN = 1e-9  # of the mean stiffness
 WORTH_A_RESTART = 1e-5  # of the mean stiffness: with a region as wide as at first, which kinks may have closed early
 SLACKEST = 1e3
-PERTURBATION, TOLERANCE = 1e-10, 1e-10  # of costs and of rows, both of the order of one
-MOST_PIVOTS = 500  # some thirty are usual
 SOME_STIFFNESS = 5e7  # N/m, the order of a machine tool's: where no climb begins within reach
+NO_SLOPE = np.zeros((1, 1))
+_Block = tuple[
+    FloatArray, tuple[float, float, float, float], FloatArray | float
+]  # (free, j) slopes, L H t slack, bound
 Rank = tuple[float, float, float]  # more is better, the first that differs decides: rules, floors, value
 
 
@@ -133,6 +137,7 @@ class Goal:
 class _Climb:
     """One climb: where it is, the best that it met, how far the next linear programme may go."""
 
+    goal: Goal
     here: FloatArray
     rows: PlacedRows
     merit: float
@@ -187,18 +192,19 @@ class Climber:
         free = self.bounds.free
         return free[free != 2] if self.bounds.heights else free
 
-    def climb(self, first: FloatArray, goal: Goal, steps: int, region: float = 0.05) -> FloatArray:
+    def climb(self, first: FloatArray, goal: Goal | Sequence[Goal], steps: int, region: float = 0.05) -> FloatArray:
         """The best placements (k, 6) on the ways up from `first` (k, 6): rules first, then floors, then value.
 
-        All climb in step, so that each trial evaluates k placements at once.
+        One goal for all, or one for each. All climb in step, so that each trial evaluates k placements at once.
         """
         if not len(self.free):
             return first
         rows = self.evaluator.rows(first)
         scale = float(np.nanmean(rows.stiffness)) if np.isfinite(rows.stiffness).any() else SOME_STIFFNESS
-        judged = self._judged(rows, goal, scale)
+        goals = [goal] * len(first) if isinstance(goal, Goal) else list(goal)
+        judged = self._judged(rows, goals, scale)
         climbs = [
-            _Climb(first[i], rows.take(i), merit, first[i], rank, region, merit)
+            _Climb(goals[i], first[i], rows.take(i), merit, first[i], rank, region, merit)
             for i, (merit, rank) in enumerate(judged)
         ]
         for _ in range(steps):
@@ -206,25 +212,25 @@ class Climber:
             if not going:
                 break
             self._differentiate([climb for climb in going if climb.gradient is None])
-            for climb in going:
-                climb.step = self._step(climb, climb.rows, goal)
-            missed = self._try(going, goal, scale)
-            for climb in missed:  # corrected for the curvature of what was found
-                climb.step = self._step(climb, climb.bent(), goal)
-            for climb in self._try(missed, goal, scale):
+            missed = self._try(going, [climb.rows for climb in going], scale)
+            # Corrected for the curvature of what was found.
+            for climb in self._try(missed, [climb.bent() for climb in missed], scale):
                 climb.shrink(region)
         return np.array([climb.best for climb in climbs])
 
-    def _try(self, climbs: list[_Climb], goal: Goal, scale: float) -> list[_Climb]:
-        """Evaluate the next step of each climb and take it where it gains; those where it does not."""
+    def _try(self, climbs: list[_Climb], rows: list[PlacedRows], scale: float) -> list[_Climb]:
+        """Evaluate the next step of each climb, foretold from `rows`, and take it where it gains; the others."""
         if not climbs:
             return []
+        programmes = [self._programme(climb, values) for climb, values in zip(climbs, rows, strict=True)]
+        for climb, found in zip(climbs, least_costs(programmes), strict=True):
+            climb.step = np.zeros(len(self.free)) if found is None else found[: len(self.free)]
         there = np.array([self._moved(climb.here, climb.step) for climb in climbs])
-        rows = self.evaluator.rows(there)
+        placed = self.evaluator.rows(there)
         missed = []
-        for i, (merit, rank) in enumerate(self._judged(rows, goal, scale)):
+        for i, (merit, rank) in enumerate(self._judged(placed, [climb.goal for climb in climbs], scale)):
             climb = climbs[i]
-            climb.tried = rows.take(i)
+            climb.tried = placed.take(i)
             if rank > climb.best_rank:
                 climb.best, climb.best_rank = there[i], rank
             if merit > climb.merit + SMALLEST_GAIN:
@@ -233,11 +239,16 @@ class Climber:
                 missed.append(climb)
         return missed
 
-    def _judged(self, rows: PlacedRows, goal: Goal, scale: float) -> list[tuple[float, Rank]]:
-        """Of each placement the merit, value less penalties in units of `scale` (N/m), and its rank."""
+    def _judged(self, rows: PlacedRows, goals: list[Goal], scale: float) -> list[tuple[float, Rank]]:
+        """Of each placement the merit for its goal, value less penalties in units of `scale` (N/m), and its rank."""
         figures = self.evaluator.summary(rows)
-        ranks = zip(-self.rules.violation(figures), -goal.worsening(figures), goal.value(figures), strict=True)
-        return [(_merit(rank, scale), rank) for rank in ((float(a), float(b), float(c)) for a, b, c in ranks)]
+        ranks = np.empty((len(goals), 3))
+        ranks[:, 0] = -self.rules.violation(figures)
+        for goal in {id(goal): goal for goal in goals}.values():
+            same = np.array([other is goal for other in goals])
+            some = figures.take(same)
+            ranks[same, 1], ranks[same, 2] = -goal.worsening(some), goal.value(some)
+        return [(_merit(rank, scale), rank) for rank in ((a, b, c) for a, b, c in ranks.tolist())]
 
     def _inwards(self, placement: FloatArray) -> FloatArray:
         """(free,) 1 or -1, the sense that leads away from the nearer bound."""
@@ -268,16 +279,15 @@ class Climber:
             there = found.take(slice(i * d, (i + 1) * d))
             climb.gradient = there.slopes(climb.rows, sign * DIFFERENCE)
 
-    def _step(self, climb: _Climb, rows: PlacedRows, goal: Goal) -> FloatArray:
-        """(free,) the linear programme's step within the region; variables step, L, H, t, slack."""
-        here, region, gradient = climb.here, climb.region, climb.gradient
+    def _programme(self, climb: _Climb, rows: PlacedRows) -> Programme:
+        """The linear programme of the step within the region; variables step (free,), L, H, t, slack."""
+        here, region, gradient, goal = climb.here, climb.region, climb.gradient, climb.goal
         assert gradient is not None
         d = len(self.free)
         k, g, scale = self._stiffness(rows, gradient)
         matrix, right = self._constraints(rows, gradient, k, g, scale, goal, region)
         cost = np.zeros(d + 4)
-        weight = self.evaluator.path.weight[self.evaluator.path.headline]
-        slope = g @ weight / weight.sum()
+        slope = g @ self._weight
         if goal.weights is None:
             cost[d + 2] = -1.0
         else:
@@ -292,17 +302,23 @@ class Climber:
             for i, s, (below, above) in zip(self.free, span, room, strict=True)
         ]
         low, high = np.array([*box, *[(-SLACKEST, SLACKEST)] * 3, (0.0, SLACKEST)]).T
-        found = least_cost(cost, matrix, right, low, high)
-        return np.zeros(d) if found is None else found[:d]
+        return cost, matrix, right, low, high
 
     def _stiffness(self, rows: PlacedRows, gradient: PlacedRows) -> tuple[FloatArray, FloatArray, float]:
         """(h,) and (free, h) stiffness of the headline samples and its derivatives, in units of their mean, N/m."""
-        head = self.evaluator.path.headline
+        head = self.evaluator.head
         values = rows.stiffness[0, head]
-        scale = float(np.mean(values))
+        scale = float(values.sum() / max(len(values), 1))
         if not np.isfinite(scale):  # a cut out of reach: no figures, the limits alone guide
             return np.ones(len(values)), np.zeros((len(self.free), len(values))), scale
-        return values / scale, np.nan_to_num(gradient.stiffness[:, head] / scale), scale
+        slopes = gradient.stiffness[:, head] / scale
+        return values / scale, slopes if np.isfinite(slopes.sum()) else np.nan_to_num(slopes), scale
+
+    @cached_property
+    def _weight(self) -> FloatArray:
+        """(h,) share of the path's length that each headline sample stands for."""
+        raw = self.evaluator.path.weight[self.evaluator.head]
+        return np.asarray(raw / raw.sum())
 
     def _constraints(
         self,
@@ -317,36 +333,34 @@ class Climber:
         """A x <= b in the variables step, L, H, t, slack; rows that cannot bind within the region are left out."""
         d = len(self.free)
         reach = region * np.abs(g).sum(axis=0)
-        low, high = (k - reach <= (k + reach).min()), (k + reach >= (k - reach).max())
-        blocks = [_block(-g[:, low], [1.0, 0.0, 0.0, 0.0]), _block(g[:, high], [0.0, -1.0, 0.0, 0.0])]
-        rights = [k[low], -k[high]]
+        low = np.flatnonzero(k - reach <= (k + reach).min(initial=np.inf))
+        high = np.flatnonzero(k + reach >= (k - reach).max(initial=-np.inf))
+        blocks: list[_Block] = [
+            (-g[:, low], (1.0, 0.0, 0.0, 0.0), k[low]),
+            (g[:, high], (0.0, -1.0, 0.0, 0.0), -k[high]),
+        ]
         for values, slopes, least in self._kept(rows, gradient):
-            near = values - region * np.abs(slopes).sum(axis=0) < least + INSIDE
-            blocks.append(_block(-slopes[:, near], [0.0, 0.0, 0.0, -1.0]))
-            rights.append(values[near] - least - INSIDE)
-        raw = self.evaluator.path.weight[self.evaluator.path.headline]
-        weight = raw / raw.sum()
+            near = np.flatnonzero(values - region * np.abs(slopes).sum(axis=0) < least + INSIDE)
+            blocks.append((-slopes[:, near], (0.0, 0.0, 0.0, -1.0), values[near] - least - INSIDE))
         floors = (goal.floors / scale) + (0.0 if goal.weights is None else INSIDE)
         soft = (1.0, 0.0) if goal.weights is None else (0.0, -1.0)  # the common surplus t, or the slack
         if np.isfinite(scale):
             if np.isfinite(floors[0]):
-                blocks.append(np.array([[*(-(g @ weight)), 0.0, 0.0, *soft]]))
-                rights.append(np.array([float(k @ weight) - floors[0]]))
+                mean = float(k @ self._weight) - floors[0]
+                blocks.append((-(g @ self._weight)[:, None], (0.0, 0.0, *soft), mean))
             if np.isfinite(floors[1]):
-                blocks.append(np.array([[*np.zeros(d), -1.0, 1.0, *soft]]))
-                rights.append(np.array([-floors[1]]))
+                blocks.append((NO_SLOPE, (-1.0, 1.0, *soft), -floors[1]))
             if np.isfinite(floors[2]):
-                blocks.append(np.array([[*np.zeros(d), -1.0, 0.0, *soft]]))
-                rights.append(np.array([-floors[2]]))
-        blocks.append(np.array([[*np.zeros(d), 1.0, -1.0, 0.0, 0.0], [*np.zeros(d + 2), 1.0, 0.0]]))
-        return np.concatenate(blocks), np.concatenate([*rights, [0.0, SLACKEST]])
+                blocks.append((NO_SLOPE, (-1.0, 0.0, *soft), -floors[2]))
+        blocks += [(NO_SLOPE, (1.0, -1.0, 0.0, 0.0), 0.0), (NO_SLOPE, (0.0, 0.0, 1.0, 0.0), SLACKEST)]
+        return _joined(blocks, d)
 
     def _kept(self, rows: PlacedRows, gradient: PlacedRows) -> list[tuple[FloatArray, FloatArray, float]]:
         """Values, derivatives and least value of what the rules keep, sample by sample."""
         kept = [(rows.margin[0], gradient.margin, self.rules.margin)]
         if self.evaluator.keepouts:
             kept.append((rows.clearance[0], gradient.clearance, 0.0))
-        cutting = self.evaluator.path.cutting
+        cutting = self.evaluator.cuts
         law = rows.law[0, cutting]
         if np.isfinite(self.rules.extrapolated) and len(law):
             inside = law >= 0.0
@@ -356,47 +370,17 @@ class Climber:
         return kept
 
 
-def least_cost(
-    cost: FloatArray, matrix: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray
-) -> FloatArray | None:
-    """The x (n,) of least `cost` . x with `matrix` x <= `right` (m rows) and `low` <= x <= `high`, all finite.
-
-    The dual simplex method in the form of a working set: n rows that hold as equations, at first the bounds that the
-    cost leans on; the row that is broken most comes in, the one whose multiplier reaches zero first goes out (Nocedal
-    and Wright, Numerical Optimization, 2006, chapter 13, problem 13.6; Lemke 1954). For some ten unknowns and a
-    thousand rows it takes a tenth of the time of a general solver, most of which sets up. None where nothing keeps all
-    rows, or no end is found.
-    """
-    n = len(cost)
-    leaning = cost + PERTURBATION * np.arange(1, n + 1)  # equal multipliers could go round in a circle
-    rows = np.concatenate([matrix, np.eye(n), -np.eye(n)])
-    bounds = np.concatenate([right, high, -low])
-    working = len(matrix) + np.where(leaning < 0.0, np.arange(n), np.arange(n, 2 * n))
-    inverse = np.diag(np.where(leaning < 0.0, 1.0, -1.0))
-    for pivot in range(MOST_PIVOTS):
-        if pivot % 20 == 19:  # what the updates have rounded away
-            inverse = np.linalg.inv(rows[working])
-        x = inverse @ bounds[working]
-        broken = rows @ x - bounds
-        worst = int(broken.argmax())
-        if broken[worst] <= TOLERANCE:
-            return np.asarray(x)
-        multipliers, share = -leaning @ inverse, rows[worst] @ inverse
-        ratio = np.where(share > TOLERANCE, np.maximum(multipliers, 0.0) / np.maximum(share, TOLERANCE), np.inf)
-        out = int(ratio.argmin())
-        if not np.isfinite(ratio[out]):
-            return None
-        working[out] = worst
-        change = share.copy()
-        change[out] -= 1.0
-        inverse = inverse - np.outer(inverse[:, out] / share[out], change)
-    return None
-
-
-def _block(slopes: FloatArray, rest: list[float]) -> FloatArray:
-    """Rows (n, free + 4) of one kind of constraint from derivatives (free, n)."""
-    n = slopes.shape[1]
-    return np.concatenate([slopes.T, np.tile(np.array(rest), (n, 1))], axis=1)
+def _joined(blocks: list[_Block], free: int) -> tuple[FloatArray, FloatArray]:
+    """A (m, free + 4) and b (m,) of constraints A x <= b."""
+    m = sum(slopes.shape[1] for slopes, _, _ in blocks)
+    matrix, right, start = np.empty((free + 4, m)), np.empty(m), 0
+    for slopes, rest, bound in blocks:
+        rows = slice(start, start + slopes.shape[1])
+        matrix[:free, rows], right[rows] = slopes, bound
+        for row, value in zip(matrix[free:], rest, strict=True):
+            row[rows] = value
+        start = rows.stop
+    return matrix.T, right
 
 
 def front_rows(figures: PlacementFigures, kept: BoolArray) -> IntArray:

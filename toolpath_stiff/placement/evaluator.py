@@ -7,6 +7,7 @@ platform under a load that the geometry alone directs. Everything else asks `ana
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -134,6 +135,9 @@ class Evaluator:
         self.turned = np.ascontiguousarray(np.moveaxis(rotation_matrices(abc), 0, -1)) if abc.any() else None
         tool_length = np.concatenate([path.tool_length, path.anchored.tool_length])
         self.of_one_tool = _groups(tool_length)
+        cutting = np.concatenate([path.cutting, np.zeros(len(path.anchored), dtype=bool)])
+        self.head, self.rest = _columns(path.headline), _columns(~path.headline)
+        self.cuts, self.rapids = _columns(cutting), _columns(~cutting)
 
     def __len__(self) -> int:
         """Samples, the anchored ones among them."""
@@ -141,13 +145,13 @@ class Evaluator:
 
     def figures(self, placements: FloatArray) -> PlacementFigures:
         """Figures of placements (k, 6) m and rad."""
+        return PlacementFigures.joined([self.summary(rows) for rows in self.groups(placements)])
+
+    def groups(self, placements: FloatArray) -> Iterator[PlacedRows]:
+        """The rows of placements (k, 6) m and rad, some of the placements at a time."""
         group = max(1, POSES_AT_A_TIME // max(len(self), 1))
-        return PlacementFigures.joined(
-            [
-                self.summary(self.rows(placements[start : start + group]))
-                for start in range(0, max(len(placements), 1), group)
-            ]
-        )
+        for start in range(0, max(len(placements), 1), group):
+            yield self.rows(placements[start : start + group])
 
     def rows(self, placements: FloatArray) -> PlacedRows:
         """What each sample does at placements (k, 6) m and rad; all in memory at once."""
@@ -155,41 +159,49 @@ class Evaluator:
         m, n = len(path), len(self)
         self.poses += k * n
         turn = rotation_matrices(placements[:, 3:])
-        position, motion = np.empty((3, k, n)), np.zeros((3, k, n))
+        position, motion = np.empty((3, k, n)), np.empty((3, k, n))
         np.add(_turned(turn, self.position), placements[:, :3].T[:, :, None], out=position[:, :, :m])
         position[:, :, m:] = np.moveaxis(path.anchored.placed(turn, placements[:, :3]), -1, 0)
-        motion[:, :, :m], motion[2, :, m:] = _turned(turn, self.tangent), 1.0
+        motion[:, :, :m], motion[:, :, m:] = _turned(turn, self.tangent), np.array([0.0, 0.0, 1.0])[:, None, None]
         rotation = self._orientations(placements, turn)
-        along, margin, law = (np.empty((k, n)) for _ in range(3))
+        parts = []
         for rows, tool in self.of_one_tool:
             some = None if rotation is None else rotation[:, :, rows].reshape(9, -1)
             tip, towards = position[:, :, rows].reshape(3, -1), motion[:, :, rows].reshape(3, -1)
-            for target, values in zip((along, margin, law), self._kernel_rows(tool, tip, towards, some), strict=True):
-                target[:, rows] = values.reshape(k, -1)
-        stiffness = np.full((k, m), np.nan)
-        head = path.headline
+            parts.append([values.reshape(k, -1) for values in self._kernel_rows(tool, tip, towards, some)])
+        along, margin, law = (self._in_order(list(part)) for part in zip(*parts, strict=True))
         if self.direct:
             with np.errstate(divide="ignore"):
-                np.divide(1.0, along[:, :m], out=stiffness, where=head)
+                stiffness = np.divide(1.0, along[:, :m])
+            stiffness[:, self.rest] = np.nan
         else:
-            stiffness[:, head] = self._asked(position[:, :, :m], motion[:, :, :m], rotation, margin[:, :m])
-        clearance = np.full((k, n), np.inf)
+            stiffness = np.full((k, m), np.nan)
+            stiffness[:, self.head] = self._asked(position[:, :, :m], motion[:, :, :m], rotation, margin[:, :m])
+        clearance = np.broadcast_to(np.inf, (k, n))
         for box in self.keepouts:
-            np.minimum(clearance, clearances(box, np.moveaxis(position, 0, -1)), out=clearance)
+            clearance = np.minimum(clearance, clearances(box, np.moveaxis(position, 0, -1)))
         return PlacedRows(stiffness, law[:, :m], margin, clearance)
+
+    def _in_order(self, parts: list[FloatArray]) -> FloatArray:
+        """(k, n) of all samples from those of each tool."""
+        if len(parts) == 1:
+            return parts[0]
+        found = np.empty((len(parts[0]), len(self)))
+        for (rows, _), values in zip(self.of_one_tool, parts, strict=True):
+            found[:, rows] = values
+        return found
 
     def summary(self, rows: PlacedRows) -> PlacementFigures:
         """Figures of placements from what each of their samples does."""
-        path, m, k = self.path, len(self.path), len(rows.margin)
-        cutting = np.concatenate([path.cutting, np.zeros(len(path.anchored), dtype=bool)])
-        margin = rows.margin[:, cutting].min(axis=1, initial=np.inf)
-        rapid = rows.margin[:, ~cutting].min(axis=1, initial=np.inf)
+        path, k = self.path, len(rows.margin)
+        margin = rows.margin[:, self.cuts].min(axis=1, initial=np.inf)
+        rapid = rows.margin[:, self.rapids].min(axis=1, initial=np.inf)
         within = margin >= 0.0
-        values, weight = rows.stiffness[:, path.headline], path.weight[path.headline]
+        values, weight = rows.stiffness[:, self.head], path.weight[self.head]
         length = max(float(weight.sum()), 1e-300)
         low = values.min(axis=1, initial=np.inf)
         high = values.max(axis=1, initial=-np.inf)
-        outside = (rows.law[:, cutting[:m]] < 0.0).mean(axis=1) if path.cutting.any() else np.zeros(k)
+        outside = (rows.law[:, self.cuts] < 0.0).mean(axis=1) if path.cutting.any() else np.zeros(k)
         with np.errstate(divide="ignore", invalid="ignore"):
             compliance = (1.0 / values) @ weight / length
         return PlacementFigures(
@@ -199,7 +211,7 @@ class Evaluator:
             compliance=np.where(within, compliance, np.nan),
             margin=margin,
             rapid_margin=rapid,
-            clearance=rows.clearance.min(axis=1, initial=np.inf),
+            clearance=rows.clearance.min(axis=1, initial=np.inf) if self.keepouts else np.full(k, np.inf),
             extrapolated=outside,
         )
 
@@ -241,8 +253,8 @@ class Evaluator:
         along, determinant, lengths, good = core.compliance_along_columns(
             machine, tip, direction, rotation, tool, "closed_form"
         )
-        margin = gauge_of(machine).margin(tip, lengths, determinant, rotation, tool)
-        law = machine.strut_law.room_of(lengths.min(axis=0), lengths.max(axis=0))
+        extremes = gauge_of(machine).extremes(tip, lengths, determinant, rotation, tool)
+        margin, law = extremes.margin, machine.strut_law.room_of(extremes.shortest, extremes.longest)
         doubtful = np.flatnonzero(~good & ~(margin < 0.0))  # ill-conditioned for the closed form: pivot
         if len(doubtful):
             there = tip[:, doubtful].T
@@ -257,10 +269,10 @@ class Evaluator:
     ) -> FloatArray:
         """(k, h) stiffness at the headline samples by `analysis.poses.evaluate`, where all cuts are within reach."""
         path = self.path
-        found = np.full((len(margin), int(path.headline.sum())), np.nan)
-        possible = np.flatnonzero((margin[:, path.cutting] >= 0.0).all(axis=1))
+        head = np.flatnonzero(path.headline)
+        found = np.full((len(margin), len(head)), np.nan)
+        possible = np.flatnonzero((margin[:, self.cuts] >= 0.0).all(axis=1))
         if len(possible):
-            head = np.flatnonzero(path.headline)
 
             def some(columns: FloatArray) -> FloatArray:
                 """Rows of the headline samples at the possible placements."""
@@ -283,6 +295,14 @@ def _turned(turn: FloatArray, columns: FloatArray) -> FloatArray:
     """(3, k, n) the columns (3, n) turned by k rotations (k, 3, 3)."""
     k = len(turn)
     return np.asarray(turn.swapaxes(0, 1).reshape(3 * k, 3) @ columns).reshape(3, k, -1)
+
+
+def _columns(those: BoolArray) -> IntArray | slice:
+    """The columns that are true; a slice, which copies nothing, where they follow each other."""
+    columns = np.flatnonzero(those)
+    if len(columns) and columns[-1] - columns[0] + 1 == len(columns):
+        return slice(int(columns[0]), int(columns[-1]) + 1)
+    return columns
 
 
 def _groups(tool_length: FloatArray) -> list[tuple[IntArray | slice, float]]:

@@ -377,15 +377,15 @@ def drawn_path(
     cut = np.unique(np.cumsum(~samples.cutting)[rows], return_inverse=True)[1]
     chosen = thinned_rows(samples.take(rows), cut, points)
     few = samples.take(rows[chosen])
-    stiffness = []
-    for placement in placements:
-        position, tangent, abc = placed_path(few, placement)
-        stiffness.append(evaluate(model, position, abc, tangent, few.tool_length, load, force).stiffness)
+    placed = zip(*(placed_path(few, placement) for placement in placements), strict=True)
+    position, tangent, abc = (np.concatenate(parts) for parts in placed)
+    tools = np.tile(few.tool_length, len(placements))
+    stiffness = evaluate(model, position, abc, tangent, tools, load, force).stiffness
     counting = few.weight > 0.0
     beside = plunging_rows(load, few.tangent, few.abc, counting)
     beside &= ~headline_rows(load, few.tangent, few.abc, counting)
     axis = rotation_matrices(few.abc)[:, :, 2]
-    return DrawnPath(few.position, axis, few.s, cut[chosen], beside, np.array(stiffness), len(rows))
+    return DrawnPath(few.position, axis, few.s, cut[chosen], beside, stiffness.reshape(len(placements), -1), len(rows))
 
 
 def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:

@@ -31,7 +31,7 @@ SCOUTS = 250  # placements tried at random before the evolution, for each that i
 GENERATIONS, CHILDREN, ARCHIVE = 36, 60, 120
 WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last generation
 # Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
-STARTS, FINALISTS = 6, 4
+STARTS, FINALISTS, END_FINALISTS = 6, 4, 2
 HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 10, 6
 APART = 0.1  # of each range, where they start
 BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
@@ -191,15 +191,15 @@ def search_placements(
     held = present is not None and bounds.holds(present)
     if present is not None and held:
         scouts = np.vstack([present, scouts])
-    unmended = _let_go(search, scouts)
-    search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, now))
+    known, unmended = _let_go(search, scouts)
+    search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, known, now))
     report(1, 4)
-    candidates = _evolved(search, scouts, rng)
+    archive, figures = _evolved(search, scouts, known, rng)
     report(2, 4)
-    ends = _climbed(search, np.vstack([candidates, scouts]), now)
+    ends = _climbed(search, np.vstack([archive, scouts]), PlacementFigures.joined([figures, known]), now)
     report(3, 4)
     candidates = np.vstack(
-        [_for_the_front(search, candidates), ends] + ([present[None]] if present is not None and held else [])
+        [_for_the_front(search, archive), ends] + ([present[None]] if present is not None and held else [])
     )
     found = _result(search, candidates, now, unmended)
     report(4, 4)
@@ -240,15 +240,15 @@ def _result(
     )
 
 
-def _let_go(search: _Search, scouts: FloatArray) -> tuple[tuple[int, str], ...]:
-    """Drop anchored rapids that no placement keeps within reach where the cuts are; returns their lines and why."""
+def _let_go(search: _Search, scouts: FloatArray) -> tuple[PlacementFigures, tuple[tuple[int, str], ...]]:
+    """Drop anchored rapids that no placement keeps within reach where the cuts are.
+
+    Returns the figures of the scouts on few samples, and the lines of these rapids and why.
+    """
     few = search.evaluators["few"]
-    anchored = few.path.anchored
-    if not len(anchored):
-        return ()
-    found = few.rows(scouts)
-    m, rule = len(few.path), search.rules.margin
-    room = np.minimum(found.margin - rule, found.clearance)
+    m, rule, anchored = len(few.path), search.rules.margin, few.path.anchored
+    found = [(few.summary(rows), np.minimum(rows.margin - rule, rows.clearance)) for rows in few.groups(scouts)]
+    figures, room = PlacementFigures.joined([part for part, _ in found]), np.concatenate([part for _, part in found])
     cuts = room[:, :m][:, few.path.cutting].min(axis=1, initial=np.inf)
     possible = np.flatnonzero(cuts >= 0.0) if (cuts >= 0.0).any() else np.arange(len(scouts))
     gone, told = [], []
@@ -263,7 +263,8 @@ def _let_go(search: _Search, scouts: FloatArray) -> tuple[tuple[int, str], ...]:
     if gone:
         kept = ~np.isin(search.path.anchored.move, gone)
         search.sampled(replace(search.path, anchored=search.path.anchored.take(kept)))
-    return tuple(told)
+        figures = search.evaluators["few"].figures(scouts)
+    return figures, tuple(told)
 
 
 def _breaks(search: _Search, path: WorkPath, placement: FloatArray, columns: IntArray) -> str:
@@ -282,13 +283,17 @@ def _breaks(search: _Search, path: WorkPath, placement: FloatArray, columns: Int
     return stand.describe(worst)
 
 
-def _extrapolation_allowed(search: _Search, scouts: FloatArray, now: PlacementFigures | None) -> float:
-    """Largest share of samples outside the strut law: as now; where that is out of reach, the least that was found."""
+def _extrapolation_allowed(
+    search: _Search, scouts: FloatArray, few: PlacementFigures, now: PlacementFigures | None
+) -> float:
+    """Largest share of samples outside the strut law: as now; where that is out of reach, the least that was found.
+
+    `few` are the figures of the scouts on few samples.
+    """
     if search.asked.allow_extrapolation or now is None:
         return np.inf
     if now.margin[0] >= 0.0:
         return float(now.extrapolated[0])
-    few = search.evaluators["few"].figures(scouts)
     possible = np.flatnonzero(search.kept(few))
     if not len(possible):
         return np.inf
@@ -296,16 +301,19 @@ def _extrapolation_allowed(search: _Search, scouts: FloatArray, now: PlacementFi
     return float(search.evaluators["whole"].figures(scouts[least]).extrapolated.min())
 
 
-def _evolved(search: _Search, scouts: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """An archive of placements that nothing dominates, from the scouts on, on few samples.
+def _evolved(
+    search: _Search, scouts: FloatArray, known: PlacementFigures, rng: np.random.Generator
+) -> tuple[FloatArray, PlacementFigures]:
+    """An archive of placements that nothing dominates, from the scouts on, with their figures on few samples.
 
-    Each generation moves members of the archive at random, by steps that shrink, and along the difference of two
-    others, as differential evolution does; what is dominated goes, and so does what is crowded.
+    `known` are the figures of the scouts. Each generation moves members of the archive at random, by steps that shrink,
+    and along the difference of two others, as differential evolution does; what is dominated goes, and so does what is
+    crowded.
     """
     few, bounds = search.evaluators["few"], search.bounds
-    archive, figures = _survivors(search, scouts, few.figures(scouts))
+    archive, figures = _survivors(search, scouts, known)
     if not len(bounds.free):
-        return archive
+        return archive, figures
     for spread in np.geomspace(WIDE, NARROW, GENERATIONS):
         parents, one, other = (bounds.unit(archive[rng.integers(len(archive), size=CHILDREN)]) for _ in range(3))
         step = spread * rng.normal(size=parents.shape) * (rng.uniform(size=parents.shape) < 0.7)
@@ -313,7 +321,7 @@ def _evolved(search: _Search, scouts: FloatArray, rng: np.random.Generator) -> F
         children = bounds.placements(parents + step + along * (one - other))
         found = PlacementFigures.joined([figures, few.figures(children)])
         archive, figures = _survivors(search, np.vstack([archive, children]), found)
-    return archive
+    return archive, figures
 
 
 def _survivors(
@@ -329,41 +337,60 @@ def _survivors(
     return placements[rows], figures.take(rows)
 
 
-def _climbed(search: _Search, candidates: FloatArray, now: PlacementFigures | None) -> FloatArray:
-    """The recommendation and the ends of the front, climbed to from several of the candidates."""
-    asked = defaults.OBJECTIVES[search.asked.objective]
-    figures = search.evaluators["few"].figures(candidates)
+def _climbed(
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, now: PlacementFigures | None
+) -> FloatArray:
+    """The recommendation and the ends of the front, climbed to from several candidates with figures on few samples."""
+    held = now is not None and bool(now.margin[0] >= 0.0)
+    floors = now.objectives[0] if now is not None and held else NO_FLOORS
+    goal = Goal(defaults.OBJECTIVES[search.asked.objective], floors)
     ends = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
-    if now is not None and now.margin[0] >= 0.0:
-        goal = Goal(asked, now.objectives[0])
-        found = _climbed_to(search, candidates, figures, goal)
-        if goal.worsening(search.evaluators["whole"].figures(found)).min() > 0.0:
-            found = np.vstack([found, _climbed_to(search, candidates, figures, Goal(None, goal.floors))])
-    else:
-        found = _climbed_to(search, candidates, figures, Goal(asked, NO_FLOORS))
-    return np.vstack([found, *(_climbed_to(search, candidates, figures, goal, end=True) for goal in ends)])
+    found = _climbed_to(search, candidates, figures, [goal, *ends])
+    if held and goal.worsening(search.evaluators["whole"].figures(found[0])).min() > 0.0:
+        found[1:1] = _climbed_to(search, candidates, figures, [Goal(None, floors)])
+    return np.vstack(found)
 
 
 def _climbed_to(
-    search: _Search, candidates: FloatArray, figures: PlacementFigures, goal: Goal, end: bool = False
-) -> FloatArray:
-    """Where climbs from the best candidates end: many on few samples, few on more, one on the whole path.
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, goals: list[Goal]
+) -> list[FloatArray]:
+    """Where climbs from the best candidates to each goal end: many on few samples, few on more, one on the whole path.
 
     `figures` are those of the candidates on few samples. There are several hills, and a slope that few samples show is
-    not always the whole path's. An `end` of the front is worth fewer climbs than the recommendation.
+    not always the whole path's. The first goal, the recommendation, is worth more climbs than the others, the ends of
+    the front. All climb together, each to its own goal.
     """
     few, middle, whole = (search.climber(name) for name in ("few", "middle", "whole"))
     free = len(search.bounds.free)
-    starts, finalists = (free, 2) if end else (STARTS * free, FINALISTS)
-    found = _best_apart(search, candidates, figures, goal, starts, APART)
+    starts, finalists = [STARTS * free, *[free] * len(goals[1:])], [FINALISTS, *[END_FINALISTS] * len(goals[1:])]
+    found = [
+        _best_apart(search, candidates, figures, goal, count, APART) for goal, count in zip(goals, starts, strict=True)
+    ]
     for _ in range(HEATS):  # the better half of the climbs, those up the same hill counted once, goes on
-        climbed = few.climb(found, goal, CLIMB_STEPS)
-        starts = max((len(found) + 1) // 2, finalists)
-        found = _best_apart(search, climbed, few.evaluator.figures(climbed), goal, starts, BASIN)
+        climbed = _together(few, found, goals, CLIMB_STEPS)
+        known = few.evaluator.figures(np.vstack(climbed))
+        ends = np.cumsum([0, *map(len, climbed)])
+        found = [
+            _best_apart(search, climbed[i], known.take(slice(ends[i], ends[i + 1])), goal, count, BASIN)
+            for i, goal in enumerate(goals)
+            for count in (max((len(climbed[i]) + 1) // 2, finalists[i]),)
+        ]
     if middle.evaluator is not few.evaluator:
-        found = middle.climb(found[:finalists], goal, POLISH_STEPS)
-    best = found[_ranked(search, goal, whole.evaluator.figures(found))[0]]
-    return np.vstack([found, _finished(search, best, goal)])
+        some = [placements[:count] for placements, count in zip(found, finalists, strict=True)]
+        found = _together(middle, some, goals, POLISH_STEPS)
+    best = [
+        placements[_ranked(search, goal, whole.evaluator.figures(placements))[0]]
+        for placements, goal in zip(found, goals, strict=True)
+    ]
+    last = _finished(search, best, goals)
+    return [np.vstack(pair) for pair in zip(found, last, strict=True)]
+
+
+def _together(climber: Climber, first: list[FloatArray], goals: list[Goal], steps: int) -> list[FloatArray]:
+    """Where climbs from placements (k, 6) to each goal end."""
+    each = [goal for goal, placements in zip(goals, first, strict=True) for _ in placements]
+    climbed = climber.climb(np.vstack(first), each, steps)
+    return np.split(climbed, np.cumsum([len(placements) for placements in first])[:-1])
 
 
 def _best_apart(
@@ -374,25 +401,28 @@ def _best_apart(
     return ranked[apart(search.bounds, ranked, count, distance)]
 
 
-def _finished(search: _Search, best: FloatArray, goal: Goal) -> FloatArray:
-    """(k, 6) the end of a climb on the whole path, from near its top.
+def _finished(search: _Search, best: list[FloatArray], goals: list[Goal]) -> list[FloatArray]:
+    """For each goal (k, 6) the end of a climb on the whole path, from a placement (6,) near its top.
 
     A long path is climbed on samples that stand for it, to which those are added that decide on it there: the extremes
     of each of its stretches (an exchange method of semi-infinite programming; Hettich and Kortanek, SIAM Review 35
     (1993) 380).
     """
-    whole = search.climber("whole")
     if len(search.path) <= SHORT:
-        return whole.climb(best[None], goal, FINAL_STEPS, FINAL_REGION)
-    found = best[None]
+        climbed = search.climber("whole").climb(np.array(best), goals, FINAL_STEPS, FINAL_REGION)
+        return [placement[None] for placement in climbed]
     middle, everything = search.evaluators["middle"], search.evaluators["whole"]
-    for _ in range(ROUNDS):
-        deciding = everything.deciding_rows(found[-1], STRETCHES)
-        evaluator = search.evaluator(with_rows(middle.path, search.path, deciding))
-        climber = Climber(evaluator, search.bounds, search.rules)
-        found = np.vstack([found, climber.climb(found[-1:], goal, FINAL_STEPS, FINAL_REGION)])
-        middle.poses += evaluator.poses
-    return found[1:]
+    ends = []
+    for first, goal in zip(best, goals, strict=True):
+        found = first[None]
+        for _ in range(ROUNDS):
+            deciding = everything.deciding_rows(found[-1], STRETCHES)
+            evaluator = search.evaluator(with_rows(middle.path, search.path, deciding))
+            climber = Climber(evaluator, search.bounds, search.rules)
+            found = np.vstack([found, climber.climb(found[-1:], goal, FINAL_STEPS, FINAL_REGION)])
+            middle.poses += evaluator.poses
+        ends.append(found[1:])
+    return ends
 
 
 def _ranked(search: _Search, goal: Goal, figures: PlacementFigures) -> IntArray:

@@ -94,9 +94,10 @@ def _drawn(path: DrawnPath) -> dict[str, Any]:
     low, high = _scale(finite, length)
     digits = max(0, 5 - int(np.log10(max(float(finite.max()), 1.0))))  # six digits
     leaning = bool((path.axis[:, 2] < 1.0 - 1e-12).any())
-    values = [[None if np.isnan(v) else round(v, digits) for v in row] for row in stiffness.tolist()]
-    if digits == 0:
-        values = [[None if v is None else int(v) for v in row] for row in values]
+    rounded = np.round(stiffness, digits)
+    values = (rounded if digits else np.nan_to_num(rounded).astype(np.int64)).tolist()
+    for row, column in np.argwhere(np.isnan(stiffness)):
+        values[row][column] = None
     return {
         "position": np.round(mm_from_m(path.position), 3).tolist(),
         "axis": np.round(path.axis, 5).tolist() if leaning else None,
