@@ -303,7 +303,7 @@ class Gates:
 
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
-    """The model alone, then single effects, then all pairs, then triples where nothing else passes."""
+    """The model alone, then single effects, then all pairs, then triples where no single effect passes."""
     simulator = Simulator.of(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
@@ -329,10 +329,11 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
     tried, search = search_pairs(problem, families, base)
     pairs, tried = _standing(tried, evidence, fits, passes)
-    if not singles and not pairs:
+    if not singles:
+        # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
         evidence |= {pair.names: pair.log_evidence for pair in tried}
-        pairs, triples = _standing(search_triples(problem, search, base), evidence, fits, passes)
-        tried = [*tried, *triples]
+        triples, found = _standing(search_triples(problem, search, base, bool(pairs)), evidence, fits, passes)
+        pairs, tried = [*pairs, *triples], [*tried, *found]
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
     none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
     return Gates(alone, none_stands, tuple(f.name for f in singles), tuple(pairs), tuple(tried), by_name)
@@ -382,20 +383,43 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
         return Probabilities(_posterior(problem, noise, candidates, True, [f.name for f in families]))
     if gates.singles:
         found = _posterior(problem, noise, candidates, gates.none_stands, gates.singles, gates.pairs)
-        if sum(weight for name, weight in found.items() if " + " in name) < POSITIVE * found[gates.singles[0]]:
+        if _too_faint(found, 1, gates.singles[0]):
             found = _posterior(problem, noise, candidates, gates.none_stands, gates.singles)
         return Probabilities(found)
-    outside, form = -np.inf, ""
-    for fit in (candidates.base, *(f.best for f in candidates.offered[:2] if f.best is not None)):
-        evidence, words = discrepancy_evidence(problem, fit, candidates.forms)
-        if evidence > outside:
-            outside, form = evidence, words
-    evidences = {OUTSIDE: outside} | {pair.name: pair.log_evidence for pair in gates.pairs}
-    prior = {OUTSIDE: PRIOR_OUTSIDE} | {pair.name: _prior(families, len(pair.names)) for pair in gates.pairs}
-    found = probabilities(evidences, prior)
+    outside, form = _outside(problem, candidates)
+
+    def posterior(standing: Sequence[Combination]) -> dict[str, float]:
+        evidences = {OUTSIDE: outside} | {one.name: one.log_evidence for one in standing}
+        prior = {OUTSIDE: PRIOR_OUTSIDE} | {one.name: _prior(families, len(one.names)) for one in standing}
+        return probabilities(evidences, prior)
+
+    found = posterior(gates.pairs)
+    pairs = [one for one in gates.pairs if len(one.names) == 2]
+    if pairs and _too_faint(found, 2, max((one.name for one in pairs), key=lambda name: found[name])):
+        found = posterior(pairs)
     if found[OUTSIDE] < STANDS and gates.pairs:  # ruled out
         del found[OUTSIDE]
     return Probabilities(found, form)
+
+
+def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
+    """Log evidence that something outside the catalogue is missing, and the likeliest form of it.
+
+    Alone, or beside one of the two best effects. That a further one is missing beside an effect is as rare as of two
+    effects, and it may be any of them: who picks the best of fifteen without that price makes the unknown too likely.
+    """
+    beside = PRIOR_PAIRS / PRIOR_SINGLES / max(len(candidates.families), 1)
+    found = [discrepancy_evidence(problem, candidates.base, candidates.forms)]
+    for family in candidates.offered[:2]:
+        assert family.best is not None
+        evidence, words = discrepancy_evidence(problem, family.best, candidates.forms)
+        found.append((evidence + float(np.log(beside)), words))
+    return float(np.logaddexp.reduce([evidence for evidence, _ in found])), max(found, key=lambda one: one[0])[1]
+
+
+def _too_faint(found: Mapping[str, float], count: int, best: str) -> bool:
+    """Whether explanations by more than `count` effects are not likelier enough than the best of those with so many."""
+    return sum(weight for name, weight in found.items() if name.count(" + ") >= count) < POSITIVE * found[best]
 
 
 def _posterior(
@@ -454,14 +478,15 @@ def decide(gates: Gates, weighed: Probabilities) -> tuple[str, tuple[str, ...]]:
         return "adequate" if posterior[NONE] > 0.5 else named, _smallest_set(posterior)
     if OUTSIDE in posterior:
         return "unexplained", ()
-    standing = [name for name, weight in posterior.items() if weight > STANDS]
-    return "identified" if len(standing) == 1 else "ambiguous", _smallest_set(posterior)
+    if max(posterior.values()) >= NAMED and sum(weight > STANDS for weight in posterior.values()) == 1:
+        return "identified", _smallest_set(posterior)
+    return "ambiguous", _smallest_set(posterior, named=HELD)
 
 
-def _smallest_set(posterior: dict[str, float]) -> tuple[str, ...]:
-    """The one hypothesis that holds `NAMED`, else the fewest that hold `HELD`."""
+def _smallest_set(posterior: dict[str, float], named: float = NAMED) -> tuple[str, ...]:
+    """The one hypothesis that holds `named`, else the fewest that hold `HELD`."""
     ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
-    if ranked and ranked[0][1] >= NAMED:
+    if ranked and ranked[0][1] >= named:
         return (ranked[0][0],)
     found: list[str] = []
     held = 0.0
