@@ -9,8 +9,9 @@ import pytest
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign
-from toolpath_stiff.updating.inference.doubts import suspect_entries, suspect_rows
+from toolpath_stiff.updating.inference.doubts import noise_doubt, suspect_entries, suspect_rows
 from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.noise import noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.inference.repeats import from_repeats
@@ -85,3 +86,23 @@ def test_the_share_of_wild_readings_is_estimated() -> None:
     assert before is not None
     assert np.mean([one.wild for one in found if one]) > 0.045 > before.wild
     assert np.mean([one.repeat for one in found if one]) < 1.35 * before.repeat
+
+
+@pytest.mark.parametrize(
+    ("factor", "verdict", "said"),
+    [(1.0, "adequate", ""), (0.5, "unexplained", "too small"), (0.5, "identified", ""), (4.0, "adequate", "too large")],
+)
+def test_a_stated_noise_that_nothing_but_the_misfit_contradicts(factor: float, verdict: str, said: str) -> None:
+    """A sound machine without repeats: 2 % a reading and 1 % a clamping are what the rig has put there."""
+    data = campaign(78, "paper", "none")[0]
+    (noise,) = noise_models(data, (0.02 * factor, 0.01 * factor))
+    problem = Problem.of(Predictor(nist(), data), noise)
+    base = problem.score_base()
+    forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
+    gate = absolute_gate(
+        problem, base.residual, base.jacobian, Simulator.of(noise, problem.scatter.covariance, 0), forms
+    )
+    words, times = noise_doubt(problem, noise, gate, verdict, 0)
+    assert said in words and bool(words) == bool(said)
+    # What was stated times what is said comes to what is there: squares of 42 readings tell it within 11 %.
+    assert times == pytest.approx(1.0 / factor if said else 1.0, rel=0.33)

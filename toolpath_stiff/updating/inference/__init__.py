@@ -98,8 +98,9 @@ class Judgement:
         The form of discrepancy that stands out, in words; "" if none was looked for.
     question
         Whether these are readings of this machine, and why it is asked; "" where nothing says that they are not.
-    doubt
-        That the noise is not what was stated; "" where nothing says so.
+    doubt, noise_factor
+        That the noise is not what was stated; "" where nothing says so. And how many times as large a stated one would
+        have to be for the model alone to leave what it leaves; 1 where it may be right, or repeats tell.
     drawn
         How the answer stands if its form was read off these readings; None otherwise.
     """
@@ -118,6 +119,7 @@ class Judgement:
     form: str
     question: str = ""
     doubt: str = ""
+    noise_factor: float = 1.0
     drawn: Drawn | None = None
 
     @property
@@ -156,14 +158,14 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     weighed = weigh(problem, noise, candidates, gates)
     asked = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
-    doubt = "" if asked else noise_doubt(problem, noise, gates.base, verdict == "unexplained", seed)
+    doubt, factor = ("", 1.0) if asked else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
         described = drawn(fits.made[explanations[0]], {NONE: candidates.base, **fits.made}, problem.predictor.data)
         verdict = verdict if described is None or described.confirmed else "described"
     return Judgement(
         verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, noise.remark or doubt, described,
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, noise.remark or doubt, factor, described,
     )  # fmt: skip
 
 
