@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign
-from toolpath_stiff.updating.inference.doubts import noise_doubt, suspect_entries, suspect_rows
+from tests.updating.cases import campaign, predictor_for, simple_noise
+from toolpath_stiff.updating.inference.doubts import noise_doubt, slips_that_show, suspect_entries, suspect_rows
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.noise import noise_models
@@ -61,6 +61,24 @@ def test_a_wrong_sign_in_all_rows_of_a_clamping_is_named() -> None:
     (found,) = suspects(replace(DATA, angles=angles))
     assert set(found.rows) == set(rows.tolist()) and found.column == "b_deg" and found.clear
     assert float(found.meant) == pytest.approx(np.degrees(DATA.angles[rows[0], 1]))
+
+
+@pytest.mark.parametrize(("scatter", "shows"), [(0.003, True), (0.08, False)])
+def test_a_slip_is_found_where_it_is_said_to_show(scatter: float, shows: bool) -> None:
+    """All of two clampings typed 1 degree off in b, one at a time, on a machine that is as modelled."""
+    rng, noise, found = np.random.default_rng(5), simple_noise(len(DATA), scatter, outliers=0.02), 0
+    true = predictor_for(DATA).log_stiffness() + scatter * rng.standard_normal(len(DATA))
+    for number in (7, 20):
+        rows, angles = clamping(DATA, number), DATA.angles.copy()
+        angles[rows, 1] += np.radians(1.0)
+        problem = Problem.of(Predictor(nist(), replace(DATA, angles=angles, stiffness=np.exp(true))), noise)
+        base = problem.score_base()
+        found += any(set(one.rows) == set(rows.tolist()) for one in suspect_rows(problem, base))
+    sizes = {one.column: one.size for one in slips_that_show(problem, base)}
+    assert (sizes["b_deg"] < 0.5) == shows and (sizes["b_deg"] > 1.5) == (not shows)
+    assert found == (2 if shows else 0)
+    # Less scatter, smaller slips; a coordinate of the whole table shows far later than an angle.
+    assert 10.0 * sizes["b_deg"] < sizes["x_mm"]
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])

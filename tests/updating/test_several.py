@@ -56,7 +56,8 @@ def test_triples_hold_one_of_the_best_pairs() -> None:
     problem = problem_with(WEAK, TABLE, DRIFT)
     base = problem.score_base()
     _, search = search_pairs(problem, families_of(problem), base)
-    assert search_triples(problem, search, base, only_better=True)[0].names == ("table_compliance", "thermal_drift", "weak_strut")
+    best = search_triples(problem, search, base, only_better=True)[0]
+    assert best.names == ("table_compliance", "thermal_drift", "weak_strut")
 
 
 def test_sizes_within_bounds_are_those_of_least_squares() -> None:

@@ -56,8 +56,8 @@ LABELS = ("repeat", "point")  # any text
 WORDS = ("setup", "loop")
 RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm", "displacement_um")
 
-# Claims, verdicts of a diagnosis among them: that nothing is hidden, and that something is which the catalogue lacks. Of
-# a `described` effect the form was drawn from the readings: it is none of the catalogue.
+# Claims, verdicts of a diagnosis among them: that nothing is hidden, and that something is which the catalogue lacks.
+# Of a `described` effect the form was drawn from the readings: it is none of the catalogue.
 SOUND, OTHER = ("none", "adequate"), ("outside", "unexplained", "described")
 
 MEASUREMENTS, MACHINE, SEALED = FILES = "measurements.csv", "machine.toml", "sealed.bin"

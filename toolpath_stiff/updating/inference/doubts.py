@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.units import n_per_mm_from_n_per_m, rad_from_deg
+from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
 from toolpath_stiff.updating.inference.covariances import Groups, Precision
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.hypotheses import POWER_80
 from toolpath_stiff.updating.inference.noise import Noise, Scatter
 from toolpath_stiff.updating.inference.prediction import scaled_law
 from toolpath_stiff.updating.measurements import Measurements, model_stiffness
@@ -100,6 +101,11 @@ TINY = 1e-9
 SET_ASIDE = 1e2  # variance of ln k of a row that is left out
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 COORDINATES, ANGLES = ("x_mm", "y_mm", "z_mm"), ("a_deg", "b_deg", "c_deg")
+# Columns, field of the readings, usual slip, SI value of its unit, and that unit.
+POSE_STEPS = (
+    (COORDINATES, "position", STEP_MM, float(m_from_mm(1.0)), "mm"),
+    (ANGLES, "angles", STEP_DEG, float(rad_from_deg(1.0)), "deg"),
+)
 
 
 @dataclass(frozen=True)
@@ -230,6 +236,43 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
     return tuple(found)
 
 
+@dataclass(frozen=True)
+class SlipSize:
+    """By how much a column of all readings of a clamping must be off for these to show it, four times of five.
+
+    `size` in mm or degrees, for the median clamping; nan where no clamping has several readings, or where the machine
+    cannot take a pose that is off by the usual slip.
+    """
+
+    column: str
+    unit: str
+    size: float
+
+
+def slips_that_show(problem: Problem, fit: Fit) -> tuple[SlipSize, ...]:
+    """How large a slip of each coordinate and angle must be to stand out as `suspect_rows` asks.
+
+    That one looks for slips of 10 mm and 1 degree: where the size is larger, they pass unseen, and do as little harm.
+    Mending a slip of whitened length s gains s^2 / 2, in proportion to the square of its size, and has to pay for every
+    slip that is tried.
+    """
+    data = problem.predictor.data
+    tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))
+    wanted = float(np.sqrt(2.0 * np.log(tried / SLIPPED))) + POWER_80
+    projected = problem.scatter.precision.beside(fit.jacobian.T, _prior(fit))
+    blocks = [(rows, projected.block(rows)) for rows in Groups.by(data.clamp).members() if len(rows) > 1]
+    found = []
+    for names, field, step, si, unit in POSE_STEPS:
+        for k, name in enumerate(names):
+            moved = getattr(data, field) + step * si * np.eye(3)[k]
+            slip = _Slip.of(data, np.arange(len(data)), name, "", "", **{field: moved})
+            (change,) = _changes(problem, fit, [slip])
+            squares = np.array([change[rows] @ block @ change[rows] for rows, block in blocks])
+            middle = float(np.sqrt(np.median(squares))) if blocks else np.nan
+            found.append(SlipSize(name, unit, step * wanted / middle if middle > TINY else np.nan))
+    return tuple(found)
+
+
 def _suspect(data: Measurements, ways: Sequence[_Slip], odds: float) -> Suspect:
     first = ways[0]
     several = len(first.rows) > 1
@@ -295,10 +338,7 @@ def _slips_of_row(data: Measurements, row: Rows) -> Iterator[_Slip]:
 
 def _slips_of_pose(data: Measurements, rows: Rows) -> Iterator[_Slip]:
     """A coordinate or an angle with the wrong sign, or off by 10 mm or 1 degree; the same in all rows."""
-    for names, field, step, si in (
-        (COORDINATES, "position", STEP_MM, 1e-3),
-        (ANGLES, "angles", STEP_DEG, float(rad_from_deg(1.0))),
-    ):
+    for names, field, step, si, _ in POSE_STEPS:
         values = getattr(data, field)[rows]
         for k, name in enumerate(names):
             if float(np.ptp(values[:, k])) > TINY:
