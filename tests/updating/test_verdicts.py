@@ -22,7 +22,7 @@ from toolpath_stiff.updating.inference import (
     OUTSIDE,
     Probabilities,
     _smallest_set,
-    _too_faint,
+    _sparing,
     decide,
 )
 from toolpath_stiff.updating.inference.evidence import Problem
@@ -200,10 +200,26 @@ def test_a_pair_is_named_where_no_other_is_left(weights, verdict, explanations):
     assert decide(SimpleNamespace(enough=False, singles=()), Probabilities(weights)) == (verdict, explanations)
 
 
-def test_a_further_effect_needs_odds_of_three_to_one():
-    assert _too_faint({"a + b": 0.3, "a + b + c": 0.7}, 2, "a + b")
-    assert not _too_faint({"a + b": 0.2, "a + b + c": 0.4, "a + b + d": 0.4}, 2, "a + b")
-    assert _too_faint({NONE: 0.1, "a": 0.4, "a + b": 0.5}, 1, "a")
+@pytest.mark.parametrize(
+    ("weights", "kept"),
+    [
+        ({"a": 0.3, "a + b": 0.7}, {"a"}),
+        ({"a": 0.1, "a + b": 0.9}, {"a", "a + b"}),
+        ({"a + b": 0.3, "a + b + c": 0.7}, {"a + b"}),
+        ({"a + b": 0.2, "a + b + c": 0.4, "a + b + d": 0.4}, {"a + b", "a + b + c", "a + b + d"}),
+        # Neither is far enough ahead of what it adds to.
+        ({"a": 0.3, "a + b": 0.3, "a + b + c": 0.4}, {"a"}),
+        ({"a + b + c": 1.0}, {"a + b + c"}),
+    ],
+)
+def test_a_further_effect_needs_odds_of_three_to_one(weights, kept):
+    several = [SimpleNamespace(name=name, names=name.split(" + ")) for name in weights if " + " in name]
+    gates = SimpleNamespace(singles=[name for name in weights if " + " not in name], pairs=several)
+
+    def posterior(standing):
+        return {name: weights[name] for name in [*gates.singles, *(one.name for one in standing)]}
+
+    assert set(_sparing(gates, posterior)) == kept
 
 
 def test_probabilities_are_probabilities():

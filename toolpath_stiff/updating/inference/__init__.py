@@ -305,7 +305,7 @@ class Gates:
 
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
-    """The model alone, then single effects, then all pairs, then triples where no single effect passes."""
+    """The model alone, then single effects, then all pairs, then triples where no single effect is enough."""
     simulator = Simulator.of(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
@@ -331,7 +331,8 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
     tried, search = search_pairs(problem, families, base)
     pairs, tried = _standing(tried, evidence, fits, passes)
-    if not singles:
+    least = singles[0].log_evidence + _price_of_another(families, 1) if singles else -np.inf
+    if not singles or any(pair.log_evidence > least for pair in pairs):
         # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
         evidence |= {pair.names: pair.log_evidence for pair in tried}
         triples, found = _standing(search_triples(problem, search, base, bool(pairs)), evidence, fits, passes)
@@ -379,29 +380,39 @@ class Probabilities:
 
 
 def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) -> Probabilities:
-    """Probabilities of the explanations that pass: of single effects where one does, else of pairs and of others."""
+    """Probabilities of the explanations that pass, a further effect at odds of 3 to 1 only.
+
+    Where no single effect passes, something outside the catalogue is weighed, too.
+    """
     families = candidates.families
     if gates.enough:
         return Probabilities(_posterior(problem, noise, candidates, True, [f.name for f in families]))
-    if gates.singles:
-        found = _posterior(problem, noise, candidates, gates.none_stands, gates.singles, gates.pairs)
-        if _too_faint(found, 1, gates.singles[0]):
-            found = _posterior(problem, noise, candidates, gates.none_stands, gates.singles)
-        return Probabilities(found)
-    outside, form = _outside(problem, candidates)
+    outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
 
     def posterior(standing: Sequence[Combination]) -> dict[str, float]:
+        if gates.singles:
+            return _posterior(problem, noise, candidates, gates.none_stands, gates.singles, standing)
         evidences = {OUTSIDE: outside} | {one.name: one.log_evidence for one in standing}
         prior = {OUTSIDE: PRIOR_OUTSIDE} | {one.name: _prior(families, len(one.names)) for one in standing}
         return probabilities(evidences, prior)
 
-    found = posterior(gates.pairs)
-    pairs = [one for one in gates.pairs if len(one.names) == 2]
-    if pairs and _too_faint(found, 2, max((one.name for one in pairs), key=lambda name: found[name])):
-        found = posterior(pairs)
-    if found[OUTSIDE] < STANDS and gates.pairs:  # ruled out
+    found = _sparing(gates, posterior)
+    if gates.pairs and found.get(OUTSIDE, 1.0) < STANDS:  # ruled out
         del found[OUTSIDE]
     return Probabilities(found, form)
+
+
+def _sparing(gates: Gates, posterior: Callable[[Sequence[Combination]], dict[str, float]]) -> dict[str, float]:
+    """Probabilities without triples that are not likelier enough than the best pair, and pairs than the best effect."""
+    standing: Sequence[Combination] = gates.pairs
+    found = posterior(standing)
+    for count in (2, 1):
+        fewer = gates.singles if count == 1 else [one.name for one in standing if len(one.names) == count]
+        more = sum(found[one.name] for one in standing if len(one.names) > count)
+        if fewer and more < POSITIVE * max(found[name] for name in fewer):
+            standing = [one for one in standing if len(one.names) <= count]
+            found = posterior(standing)
+    return found
 
 
 def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
@@ -417,11 +428,6 @@ def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
         evidence, words = discrepancy_evidence(problem, family.best, candidates.forms)
         found.append((evidence + float(np.log(beside)), words))
     return float(np.logaddexp.reduce([evidence for evidence, _ in found])), max(found, key=lambda one: one[0])[1]
-
-
-def _too_faint(found: Mapping[str, float], count: int, best: str) -> bool:
-    """Whether explanations by more than `count` effects are not likelier enough than the best of those with so many."""
-    return sum(weight for name, weight in found.items() if name.count(" + ") >= count) < POSITIVE * found[best]
 
 
 def _posterior(
@@ -440,7 +446,7 @@ def _posterior(
 
     found = {f.name: evidence(f.log_evidence, f.best or base) for f in families}
     found |= {pair.name: evidence(pair.log_evidence, pair.score) for pair in pairs}
-    prior = {name: PRIOR_SINGLES / max(len(families), 1) for name in names}
+    prior = {name: _prior(families, 1) for name in names}
     prior |= {pair.name: _prior(families, len(pair.names)) for pair in pairs}
     return probabilities(
         {NONE: evidence(base.log_evidence, base)} | found, prior | ({NONE: PRIOR_NONE} if none else {})
@@ -448,8 +454,13 @@ def _posterior(
 
 
 def _prior(families: Sequence[Family], count: int) -> float:
-    """Prior probability of one pair or triple of effects."""
-    return {2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
+    """Prior probability of one effect, pair or triple of effects."""
+    return {1: PRIOR_SINGLES, 2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
+
+
+def _price_of_another(families: Sequence[Family], count: int) -> float:
+    """Log evidence that an effect beside `count` others must add to be considered: its prior, and odds of 3 to 1."""
+    return float(np.log(POSITIVE * _prior(families, count) / _prior(families, count + 1)))
 
 
 def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:
