@@ -77,7 +77,7 @@ def test_a_slip_is_found_where_it_is_said_to_show(scatter: float, shows: bool) -
     sizes = {one.column: one.size for one in slips_that_show(problem, base)}
     assert (sizes["b_deg"] < 0.5) == shows and (sizes["b_deg"] > 1.5) == (not shows)
     assert found == (2 if shows else 0)
-    # Less scatter, smaller slips; a coordinate of the whole table shows far later than an angle.
+    # The platform's place shows far later than its tilt.
     assert 10.0 * sizes["b_deg"] < sizes["x_mm"]
 
 

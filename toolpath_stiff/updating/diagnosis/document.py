@@ -182,7 +182,7 @@ class DetectableEntry(TypedDict):
 
 
 class SlipSizeEntry(TypedDict):
-    """By how much a column of a clamping's readings must be off to stand out; None where that cannot be told."""
+    """By how much a column of a clamping's readings must be off to stand out; None where none would, or nobody knows."""
 
     column: str
     unit: str

@@ -94,6 +94,7 @@ FAR_OFF = 16.0  # squared deviation of a row from which on it is looked at
 MOST_ROWS, MOST_CLAMPS, MOST_SLIPS = 12, 6, 3
 NEAR = 3.0  # standard deviations within which the mended rows must lie, root mean square
 STEP_MM, STEP_DEG = 10.0, 1.0
+MOST_STEPS = 10.0  # times these up to which a change is in proportion to the slip
 LBF_PER_IN = 25.4 / 4.4482216152605  # of 1 N/mm; the inch is 25.4 mm, the pound-force 4.448... N, both exactly
 # What a stiffness may have been written in -> written over true.
 UNITS = {"lbf/in": LBF_PER_IN, "N/um": 1e-3}
@@ -240,8 +241,8 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
 class SlipSize:
     """By how much a column of all readings of a clamping must be off for these to show it, four times of five.
 
-    `size` in mm or degrees, for the median clamping; nan where no clamping has several readings, or where the machine
-    cannot take a pose that is off by the usual slip.
+    `size` in mm or degrees, for the median clamping; inf where not even ten times the usual slip would show; nan where
+    no clamping has several readings, or where the machine cannot take a pose that is off by the usual slip.
     """
 
     column: str
@@ -269,7 +270,8 @@ def slips_that_show(problem: Problem, fit: Fit) -> tuple[SlipSize, ...]:
             (change,) = _changes(problem, fit, [slip])
             squares = np.array([change[rows] @ block @ change[rows] for rows, block in blocks])
             middle = float(np.sqrt(np.median(squares))) if blocks else np.nan
-            found.append(SlipSize(name, unit, step * wanted / middle if middle > TINY else np.nan))
+            size = np.inf if middle * MOST_STEPS < wanted else step * wanted / middle
+            found.append(SlipSize(name, unit, size))
     return tuple(found)
 
 
