@@ -182,7 +182,7 @@ class DetectableEntry(TypedDict):
 
 
 class SlipSizeEntry(TypedDict):
-    """By how much a column of a clamping's readings must be off to stand out; None where none would, or nobody knows."""
+    """By how much a column of a clamping's readings must be off to stand out; None where that is not known."""
 
     column: str
     unit: str
