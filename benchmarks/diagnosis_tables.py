@@ -18,7 +18,7 @@ from benchmarks.diagnosis_bars import (
     wilson,
 )
 
-VERDICTS = ("adequate", "identified", "ambiguous", "unexplained")
+VERDICTS = ("adequate", "identified", "described", "ambiguous", "unexplained")
 PROBABILITIES = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98, 1.0 + 1e-9)
 DETECTABILITIES = (0.0, 4.5, 6.0, 9.0, 15.0, 30.0, float("inf"))
 BAR_HEADING = ["| layout | figure | value | 95 % interval | bar | |", "| --- | --- | --- | --- | --- | --- |"]
@@ -45,7 +45,8 @@ def _ratio(count: int, of: int) -> str:
 
 def verdicts_table(records: Sequence[Record]) -> list[str]:
     """Verdicts by what was hidden."""
-    lines = ["| layout | hidden | cases | " + " | ".join(VERDICTS) + " |", "| --- | --- " + "| ---: " * 5 + "|"]
+    lines = ["| layout | hidden | cases | " + " | ".join(VERDICTS) + " |"]
+    lines.append("| --- | --- " + "| ---: " * (1 + len(VERDICTS)) + "|")
     for layout in ("tilted", "paper"):
         for group in ("none", "one", "two", "outside"):
             mine = [r["verdict"] for r in records if (r["layout"], r["group"]) == (layout, group)]

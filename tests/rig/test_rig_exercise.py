@@ -90,6 +90,8 @@ def test_reveal_scores_and_tells(blind, capsys):
         (["weak_strut", "strut_law"], ["strut_law", "weak_strut"], "right"),
         (["weak_strut", "strut_law"], ["strut_law"], "partly"),
         (["cracked_bed"], ["unexplained"], "right"),
+        (["cracked_bed"], ["described"], "right"),
+        (["weak_strut"], ["described"], "wrong"),
         (["cracked_bed"], ["cracked_bed"], "right"),
         (["cracked_bed"], ["table_compliance"], "wrong"),
         (["cracked_bed", "strut_law"], ["outside"], "partly"),

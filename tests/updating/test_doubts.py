@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign
-from toolpath_stiff.updating.inference.doubts import suspect_entries, suspect_rows
+from tests.updating.cases import campaign, predictor_for, simple_noise
+from toolpath_stiff.updating.inference.doubts import noise_doubt, slips_that_show, suspect_entries, suspect_rows
 from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.noise import noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.inference.repeats import from_repeats
@@ -62,6 +63,24 @@ def test_a_wrong_sign_in_all_rows_of_a_clamping_is_named() -> None:
     assert float(found.meant) == pytest.approx(np.degrees(DATA.angles[rows[0], 1]))
 
 
+@pytest.mark.parametrize(("scatter", "shows"), [(0.003, True), (0.08, False)])
+def test_a_slip_is_found_where_it_is_said_to_show(scatter: float, shows: bool) -> None:
+    """All of two clampings typed 1 degree off in b, one at a time, on a machine that is as modelled."""
+    rng, noise, found = np.random.default_rng(5), simple_noise(len(DATA), scatter, outliers=0.02), 0
+    true = predictor_for(DATA).log_stiffness() + scatter * rng.standard_normal(len(DATA))
+    for number in (7, 20):
+        rows, angles = clamping(DATA, number), DATA.angles.copy()
+        angles[rows, 1] += np.radians(1.0)
+        problem = Problem.of(Predictor(nist(), replace(DATA, angles=angles, stiffness=np.exp(true))), noise)
+        base = problem.score_base()
+        found += any(set(one.rows) == set(rows.tolist()) for one in suspect_rows(problem, base))
+    sizes = {one.column: one.size for one in slips_that_show(problem, base)}
+    assert (sizes["b_deg"] < 0.5) == shows and (sizes["b_deg"] > 1.5) == (not shows)
+    assert found == (2 if shows else 0)
+    # The platform's place shows far later than its tilt.
+    assert 10.0 * sizes["b_deg"] < sizes["x_mm"]
+
+
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_repeats_overrule_a_stated_noise(factor: float) -> None:
     told = from_repeats(DATA)
@@ -85,3 +104,23 @@ def test_the_share_of_wild_readings_is_estimated() -> None:
     assert before is not None
     assert np.mean([one.wild for one in found if one]) > 0.045 > before.wild
     assert np.mean([one.repeat for one in found if one]) < 1.35 * before.repeat
+
+
+@pytest.mark.parametrize(
+    ("factor", "verdict", "said"),
+    [(1.0, "adequate", ""), (0.5, "unexplained", "too small"), (0.5, "identified", ""), (4.0, "adequate", "too large")],
+)
+def test_a_stated_noise_that_nothing_but_the_misfit_contradicts(factor: float, verdict: str, said: str) -> None:
+    """A sound machine without repeats: 2 % a reading and 1 % a clamping are what the rig has put there."""
+    data = campaign(78, "paper", "none")[0]
+    (noise,) = noise_models(data, (0.02 * factor, 0.01 * factor))
+    problem = Problem.of(Predictor(nist(), data), noise)
+    base = problem.score_base()
+    forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
+    gate = absolute_gate(
+        problem, base.residual, base.jacobian, Simulator.of(noise, problem.scatter.covariance, 0), forms
+    )
+    words, times = noise_doubt(problem, noise, gate, verdict, 0)
+    assert said in words and bool(words) == bool(said)
+    # What was stated times what is said comes to what is there: squares of 42 readings tell it within 11 %.
+    assert times == pytest.approx(1.0 / factor if said else 1.0, rel=0.33)

@@ -41,19 +41,23 @@ DRIFT = active("thermal_drift", rate=2e-9)
 
 def test_the_best_pair_and_its_components_are_found_among_all() -> None:
     problem = problem_with(WEAK, TABLE)
-    pairs, search = search_pairs(problem, families_of(problem), problem.score_base())
+    base = problem.score_base()
+    pairs, search = search_pairs(problem, families_of(problem), base)
     assert pairs[0].names == ("table_compliance", "weak_strut")
     sizes = {c.name: (dict(c.choice), s) for c, s in zip(pairs[0].score.candidates, pairs[0].score.sizes, strict=True)}
     assert sizes["weak_strut"][0]["strut"] == 4
     assert sizes["table_compliance"][1] == pytest.approx([2e-9, 0.0, 1e-9, 0.0], abs=1e-10)
     assert len(search.ranked) == len(NAMES) * (len(NAMES) - 1) // 2  # every pair of effects, each once
+    assert search_triples(problem, search, base, only_better=True) == []  # a third effect would add nothing
 
 
 def test_triples_hold_one_of_the_best_pairs() -> None:
+    """Likelier than every pair: they are found where a pair stands already, too."""
     problem = problem_with(WEAK, TABLE, DRIFT)
     base = problem.score_base()
     _, search = search_pairs(problem, families_of(problem), base)
-    assert search_triples(problem, search, base)[0].names == ("table_compliance", "thermal_drift", "weak_strut")
+    best = search_triples(problem, search, base, only_better=True)[0]
+    assert best.names == ("table_compliance", "thermal_drift", "weak_strut")
 
 
 def test_sizes_within_bounds_are_those_of_least_squares() -> None:

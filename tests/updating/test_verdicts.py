@@ -16,7 +16,15 @@ from scipy.stats import binom
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
 from toolpath_stiff.updating.diagnosis import common_verdict
-from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, _smallest_set
+from toolpath_stiff.updating.inference import (
+    FALSE_ALARM,
+    NONE,
+    OUTSIDE,
+    Probabilities,
+    _smallest_set,
+    _sparing,
+    decide,
+)
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.noise import Scatter, covariance
@@ -175,6 +183,43 @@ def test_the_plausible_set_is_the_smallest_that_holds_95_percent():
     assert _smallest_set({"b": 0.3, "a": 0.6, "c": 0.06, "d": 0.04}) == ("a", "b", "c")
     assert _smallest_set({"a": 0.5, "b": 0.5, "c": 0.0}) == ("a", "b")
     assert _smallest_set({"a": 0.0}) == ()
+
+
+@pytest.mark.parametrize(
+    ("weights", "verdict", "explanations"),
+    [
+        ({"a + b": 0.97, "c + d": 0.03}, "identified", ("a + b",)),
+        # A rival of more than 5 % is not ruled out, and then it is said, too.
+        ({"a + b": 0.92, "c + d": 0.08}, "ambiguous", ("a + b", "c + d")),
+        # Many small rivals are no answer either.
+        ({"a + b": 0.85, "c + d": 0.05, "e + f": 0.05, "g + h": 0.05}, "ambiguous", ("a + b", "c + d", "e + f")),
+        ({"a + b": 0.9, OUTSIDE: 0.1}, "unexplained", ()),
+    ],
+)
+def test_a_pair_is_named_where_no_other_is_left(weights, verdict, explanations):
+    assert decide(SimpleNamespace(enough=False, singles=()), Probabilities(weights)) == (verdict, explanations)
+
+
+@pytest.mark.parametrize(
+    ("weights", "kept"),
+    [
+        ({"a": 0.3, "a + b": 0.7}, {"a"}),
+        ({"a": 0.1, "a + b": 0.9}, {"a", "a + b"}),
+        ({"a + b": 0.3, "a + b + c": 0.7}, {"a + b"}),
+        ({"a + b": 0.2, "a + b + c": 0.4, "a + b + d": 0.4}, {"a + b", "a + b + c", "a + b + d"}),
+        # Neither is far enough ahead of what it adds to.
+        ({"a": 0.3, "a + b": 0.3, "a + b + c": 0.4}, {"a"}),
+        ({"a + b + c": 1.0}, {"a + b + c"}),
+    ],
+)
+def test_a_further_effect_needs_odds_of_three_to_one(weights, kept):
+    several = [SimpleNamespace(name=name, names=name.split(" + ")) for name in weights if " + " in name]
+    gates = SimpleNamespace(singles=[name for name in weights if " + " not in name], pairs=several)
+
+    def posterior(standing):
+        return {name: weights[name] for name in [*gates.singles, *(one.name for one in standing)]}
+
+    assert set(_sparing(gates, posterior)) == kept
 
 
 def test_probabilities_are_probabilities():

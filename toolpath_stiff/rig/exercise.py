@@ -56,6 +56,10 @@ LABELS = ("repeat", "point")  # any text
 WORDS = ("setup", "loop")
 RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm", "displacement_um")
 
+# Claims, verdicts of a diagnosis among them: that nothing is hidden, and that something is which the catalogue lacks.
+# Of a `described` effect the form was drawn from the readings: it is none of the catalogue.
+SOUND, OTHER = ("none", "adequate"), ("outside", "unexplained", "described")
+
 MEASUREMENTS, MACHINE, SEALED = FILES = "measurements.csv", "machine.toml", "sealed.bin"
 NO_OTHER = Rules(fresh=True)
 
@@ -123,13 +127,12 @@ def _scrambled(body: bytes, nonce: bytes) -> bytes:
 def score(hidden: list[str], claim: list[str]) -> str:
     """`right`, `partly`, `wrong` or `correctly none`.
 
-    Nothing hidden is claimed as `none` or `adequate`; something outside the catalogue as `outside` or `unexplained`,
-    or by its own name.
+    Nothing hidden is claimed by one of `SOUND`, something outside the catalogue by one of `OTHER` or by its own name.
     """
-    claimed = {name for name in claim if name not in ("none", "adequate")}
+    claimed = set(claim) - set(SOUND)
     truth = set(hidden)
-    if claimed & {"outside", "unexplained"}:
-        claimed = (claimed - {"outside", "unexplained"}) | ((truth & {*OUTSIDE, *UNKNOWNS}) or {"outside"})
+    if claimed & set(OTHER):
+        claimed = (claimed - set(OTHER)) | ((truth & {*OUTSIDE, *UNKNOWNS}) or {"outside"})
     if not truth:
         return "wrong" if claimed else "correctly none"
     if claimed == truth:
@@ -306,11 +309,11 @@ def measure_again(folder: str | Path, plan_file: str, out: str | Path, visit: in
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
-    known = ("none", "adequate", "outside", "unexplained", *CATALOGUE, *OUTSIDE, *UNKNOWNS)
+    known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *UNKNOWNS)
     for name in claims:
         if name not in known:
             raise InputError(f"a claim {name!r}", expected=f"one or several of {', '.join(known)}")
-    if not claims or (len(claims) > 1 and {"none", "adequate"} & set(claims)):
+    if not claims or (len(claims) > 1 and set(SOUND) & set(claims)):
         raise InputError(f"a claim {claim!r}", expected="names of effects, or none alone")
     case, sealed = unseal(Path(folder) / SEALED)
     return {

@@ -22,7 +22,13 @@ from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
 from toolpath_stiff.stiffness.model import build_model, setup_of
 from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, Judgement, judge
 from toolpath_stiff.updating.inference.candidates import testable_effects
-from toolpath_stiff.updating.inference.doubts import SuspectEntry, suspect_entries, suspect_rows
+from toolpath_stiff.updating.inference.doubts import (
+    SlipSize,
+    SuspectEntry,
+    slips_that_show,
+    suspect_entries,
+    suspect_rows,
+)
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, of_readings, refine
 from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
@@ -79,6 +85,8 @@ class Diagnosis:
         What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
     suspects
         Rows that look mistyped; `data` no longer holds those that are clear.
+    slips
+        The smallest slips of a pose that these readings would show; none where rows were not looked at.
     loops
         Readings of indicators beside the tip against the likeliest explanation. Everything above with an entry a
         reading is of those of the tip.
@@ -108,6 +116,7 @@ class Diagnosis:
     path: dict[str, Any] | None = None
     portrait: Portrait | None = None
     suspects: tuple[SuspectEntry, ...] = ()
+    slips: tuple[SlipSize, ...] = ()
     loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
 
     @property
@@ -265,7 +274,8 @@ def _examined(
         return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
 
     judgements, main = judged(data)
-    suspects = () if main.question or data.beside is not None else suspect_rows(main.problem, main.likeliest)
+    looked_at = not main.question and data.beside is None
+    suspects = suspect_rows(main.problem, main.likeliest) if looked_at else ()
     entries = suspect_entries(suspects, data, left_out=True)
     kept = np.ones(len(data), dtype=bool)
     kept[[row for one in suspects if one.clear for row in one.rows]] = False
@@ -293,7 +303,8 @@ def _examined(
         {name: one.of_readings(tip) for name, one in held.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
-        files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries), loops=_loops(main, fits),
+        files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
+        slips=slips_that_show(main.problem, main.likeliest) if looked_at else (), loops=_loops(main, fits),
     )  # fmt: skip
 
 

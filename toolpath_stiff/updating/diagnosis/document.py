@@ -181,6 +181,14 @@ class DetectableEntry(TypedDict):
     detectable: bool
 
 
+class SlipSizeEntry(TypedDict):
+    """By how much a column of a clamping's readings must be off to stand out; None where that is not known."""
+
+    column: str
+    unit: str
+    size: float | None
+
+
 class ConfoundingEntry(TypedDict):
     """Which effects these data cannot tell apart."""
 
@@ -225,6 +233,7 @@ class DiagnosisDocument(TypedDict):
     warnings: list[str]
     notes: list[str]
     suspect_rows: list[SuspectEntry]
+    detectable_slips: list[SlipSizeEntry]
     seed: int
     machine: str
     effects: list[str]
@@ -280,6 +289,9 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],
         "suspect_rows": list(diagnosis.suspects),
+        "detectable_slips": [
+            {"column": one.column, "unit": one.unit, "size": json_number(one.size, 2)} for one in diagnosis.slips
+        ],
         "seed": diagnosis.seed,
         "machine": diagnosis.machine.name,
         "effects": diagnosis.predictor.effects_that_act,

@@ -57,7 +57,7 @@ def _verdict_text(diagnosis: Diagnosis) -> str:
         return f"{diagnosis.main.question} Mean error: {_errors(diagnosis)}."
     form = diagnosis.main.form
     return (
-        "Something is missing, and nothing in the catalogue accounts for it. Mean error: "
+        f"Something is missing, and nothing in the catalogue accounts for it{_or_noise(diagnosis)}. Mean error: "
         f"{_errors(diagnosis)}; scatter alone leaves {diagnosis.noise.floor_percent:.2f} %."
         + (f" What is left forms a pattern {form}." if form else "")
         + _closest(diagnosis)
@@ -68,6 +68,14 @@ def unconfirmed(diagnosis: Diagnosis) -> Drawn | None:
     """How an answer that is only `described` stands, under the noise model that confirms it least."""
     found = [judgement.drawn for judgement in diagnosis.judgements.values() if judgement.verdict == "described"]
     return next((drawn for drawn in found if drawn is not None), None)
+
+
+def _or_noise(diagnosis: Diagnosis) -> str:
+    """The other reading of unexplained data: that nothing is missing, and they scatter more than stated."""
+    factor = diagnosis.main.noise_factor
+    if factor <= 1.0:
+        return ""
+    return f"; or nothing is missing, and the readings scatter {factor:.2g} times as much as stated"
 
 
 def _closest(diagnosis: Diagnosis) -> str:
@@ -143,6 +151,8 @@ def why(diagnosis: Diagnosis) -> list[str]:
         tested = [f"{name} (p = {g.probability:.2g})" for name, g in list(main.gates.items())[:4]]
         if tested:
             found.append(f"the best of the catalogue leave more than noise would: {', '.join(tested)}")
+        if main.noise_factor > 1.0:
+            found.append(main.doubt)
     return found
 
 

@@ -98,8 +98,9 @@ class Judgement:
         The form of discrepancy that stands out, in words; "" if none was looked for.
     question
         Whether these are readings of this machine, and why it is asked; "" where nothing says that they are not.
-    doubt
-        That the noise is not what was stated; "" where nothing says so.
+    doubt, noise_factor
+        That the noise is not what was stated; "" where nothing says so. And how many times as large a stated one would
+        have to be for the model alone to leave what it leaves; 1 where it may be right, or repeats tell.
     drawn
         How the answer stands if its form was read off these readings; None otherwise.
     """
@@ -118,6 +119,7 @@ class Judgement:
     form: str
     question: str = ""
     doubt: str = ""
+    noise_factor: float = 1.0
     drawn: Drawn | None = None
 
     @property
@@ -156,14 +158,14 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     weighed = weigh(problem, noise, candidates, gates)
     asked = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if asked else decide(gates, weighed)
-    doubt = "" if asked else noise_doubt(problem, noise, gates.base, verdict == "unexplained", seed)
+    doubt, factor = ("", 1.0) if asked else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
         described = drawn(fits.made[explanations[0]], {NONE: candidates.base, **fits.made}, problem.predictor.data)
         verdict = verdict if described is None or described.confirmed else "described"
     return Judgement(
         verdict, explanations, problem, noise, candidates.base, gates.base, candidates.families, dict(gates.by_name),
-        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, noise.remark or doubt, described,
+        fits.made, gates.tried, dict(weighed.by_name), weighed.form, asked, noise.remark or doubt, factor, described,
     )  # fmt: skip
 
 
@@ -303,7 +305,7 @@ class Gates:
 
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fits, seed: int) -> Gates:
-    """The model alone, then single effects, then all pairs, then triples where nothing else passes."""
+    """The model alone, then single effects, then all pairs, then triples where no single effect is enough."""
     simulator = Simulator.of(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
@@ -329,10 +331,12 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
     tried, search = search_pairs(problem, families, base)
     pairs, tried = _standing(tried, evidence, fits, passes)
-    if not singles and not pairs:
+    least = singles[0].log_evidence + _price_of_another(families, 1) if singles else -np.inf
+    if not singles or any(pair.log_evidence > least for pair in pairs):
+        # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
         evidence |= {pair.names: pair.log_evidence for pair in tried}
-        pairs, triples = _standing(search_triples(problem, search, base), evidence, fits, passes)
-        tried = [*tried, *triples]
+        triples, found = _standing(search_triples(problem, search, base, bool(pairs)), evidence, fits, passes)
+        pairs, tried = [*pairs, *triples], [*tried, *found]
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
     none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
     return Gates(alone, none_stands, tuple(f.name for f in singles), tuple(pairs), tuple(tried), by_name)
@@ -376,26 +380,54 @@ class Probabilities:
 
 
 def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) -> Probabilities:
-    """Probabilities of the explanations that pass: of single effects where one does, else of pairs and of others."""
+    """Probabilities of the explanations that pass, a further effect at odds of 3 to 1 only.
+
+    Where no single effect passes, something outside the catalogue is weighed, too.
+    """
     families = candidates.families
     if gates.enough:
         return Probabilities(_posterior(problem, noise, candidates, True, [f.name for f in families]))
-    if gates.singles:
-        found = _posterior(problem, noise, candidates, gates.none_stands, gates.singles, gates.pairs)
-        if sum(weight for name, weight in found.items() if " + " in name) < POSITIVE * found[gates.singles[0]]:
-            found = _posterior(problem, noise, candidates, gates.none_stands, gates.singles)
-        return Probabilities(found)
-    outside, form = -np.inf, ""
-    for fit in (candidates.base, *(f.best for f in candidates.offered[:2] if f.best is not None)):
-        evidence, words = discrepancy_evidence(problem, fit, candidates.forms)
-        if evidence > outside:
-            outside, form = evidence, words
-    evidences = {OUTSIDE: outside} | {pair.name: pair.log_evidence for pair in gates.pairs}
-    prior = {OUTSIDE: PRIOR_OUTSIDE} | {pair.name: _prior(families, len(pair.names)) for pair in gates.pairs}
-    found = probabilities(evidences, prior)
-    if found[OUTSIDE] < STANDS and gates.pairs:  # ruled out
+    outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
+
+    def posterior(standing: Sequence[Combination]) -> dict[str, float]:
+        if gates.singles:
+            return _posterior(problem, noise, candidates, gates.none_stands, gates.singles, standing)
+        evidences = {OUTSIDE: outside} | {one.name: one.log_evidence for one in standing}
+        prior = {OUTSIDE: PRIOR_OUTSIDE} | {one.name: _prior(families, len(one.names)) for one in standing}
+        return probabilities(evidences, prior)
+
+    found = _sparing(gates, posterior)
+    if gates.pairs and found.get(OUTSIDE, 1.0) < STANDS:  # ruled out
         del found[OUTSIDE]
     return Probabilities(found, form)
+
+
+def _sparing(gates: Gates, posterior: Callable[[Sequence[Combination]], dict[str, float]]) -> dict[str, float]:
+    """Probabilities without triples that are not likelier enough than the best pair, and pairs than the best effect."""
+    standing: Sequence[Combination] = gates.pairs
+    found = posterior(standing)
+    for count in (2, 1):
+        fewer = gates.singles if count == 1 else [one.name for one in standing if len(one.names) == count]
+        more = sum(found[one.name] for one in standing if len(one.names) > count)
+        if fewer and more < POSITIVE * max(found[name] for name in fewer):
+            standing = [one for one in standing if len(one.names) <= count]
+            found = posterior(standing)
+    return found
+
+
+def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
+    """Log evidence that something outside the catalogue is missing, and the likeliest form of it.
+
+    Alone, or beside one of the two best effects. That a further one is missing beside an effect is as rare as of two
+    effects, and it may be any of them: who picks the best of fifteen without that price makes the unknown too likely.
+    """
+    beside = PRIOR_PAIRS / PRIOR_SINGLES / max(len(candidates.families), 1)
+    found = [discrepancy_evidence(problem, candidates.base, candidates.forms)]
+    for family in candidates.offered[:2]:
+        assert family.best is not None
+        evidence, words = discrepancy_evidence(problem, family.best, candidates.forms)
+        found.append((evidence + float(np.log(beside)), words))
+    return float(np.logaddexp.reduce([evidence for evidence, _ in found])), max(found, key=lambda one: one[0])[1]
 
 
 def _posterior(
@@ -414,7 +446,7 @@ def _posterior(
 
     found = {f.name: evidence(f.log_evidence, f.best or base) for f in families}
     found |= {pair.name: evidence(pair.log_evidence, pair.score) for pair in pairs}
-    prior = {name: PRIOR_SINGLES / max(len(families), 1) for name in names}
+    prior = {name: _prior(families, 1) for name in names}
     prior |= {pair.name: _prior(families, len(pair.names)) for pair in pairs}
     return probabilities(
         {NONE: evidence(base.log_evidence, base)} | found, prior | ({NONE: PRIOR_NONE} if none else {})
@@ -422,8 +454,13 @@ def _posterior(
 
 
 def _prior(families: Sequence[Family], count: int) -> float:
-    """Prior probability of one pair or triple of effects."""
-    return {2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
+    """Prior probability of one effect, pair or triple of effects."""
+    return {1: PRIOR_SINGLES, 2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
+
+
+def _price_of_another(families: Sequence[Family], count: int) -> float:
+    """Log evidence that an effect beside `count` others must add to be considered: its prior, and odds of 3 to 1."""
+    return float(np.log(POSITIVE * _prior(families, count) / _prior(families, count + 1)))
 
 
 def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:
@@ -454,14 +491,15 @@ def decide(gates: Gates, weighed: Probabilities) -> tuple[str, tuple[str, ...]]:
         return "adequate" if posterior[NONE] > 0.5 else named, _smallest_set(posterior)
     if OUTSIDE in posterior:
         return "unexplained", ()
-    standing = [name for name, weight in posterior.items() if weight > STANDS]
-    return "identified" if len(standing) == 1 else "ambiguous", _smallest_set(posterior)
+    if max(posterior.values()) >= NAMED and sum(weight > STANDS for weight in posterior.values()) == 1:
+        return "identified", _smallest_set(posterior)
+    return "ambiguous", _smallest_set(posterior, named=HELD)
 
 
-def _smallest_set(posterior: dict[str, float]) -> tuple[str, ...]:
-    """The one hypothesis that holds `NAMED`, else the fewest that hold `HELD`."""
+def _smallest_set(posterior: dict[str, float], named: float = NAMED) -> tuple[str, ...]:
+    """The one hypothesis that holds `named`, else the fewest that hold `HELD`."""
     ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
-    if ranked and ranked[0][1] >= NAMED:
+    if ranked and ranked[0][1] >= named:
         return (ranked[0][0],)
     found: list[str] = []
     held = 0.0

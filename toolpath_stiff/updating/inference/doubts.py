@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.units import n_per_mm_from_n_per_m, rad_from_deg
+from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
 from toolpath_stiff.updating.inference.covariances import Groups, Precision
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.hypotheses import POWER_80
 from toolpath_stiff.updating.inference.noise import Noise, Scatter
 from toolpath_stiff.updating.inference.prediction import scaled_law
 from toolpath_stiff.updating.measurements import Measurements, model_stiffness
@@ -30,40 +31,43 @@ Rows = NDArray[np.int64]
 # -- a stated noise that nothing but the misfit tells of ---------------------------------------------------------------
 
 TOO_QUIET = 0.005  # share of simulated campaigns that scatter as little or less
+TOO_LOUD = 0.025  # share of those that scatter as much or more, where nothing explains it
 ROUNDS = 3  # of the search for the noise that the readings show
 LARGEST_FACTOR = 10.0
 ENOUGH = 0.05  # probability of the base model's gate, as in the verdict
 
 
-def noise_doubt(problem: Problem, noise: Noise, gate: Gate, nothing_stands: bool, seed: int) -> str:
-    """That a stated noise does not fit the readings, in a sentence; "" where it may be right.
+def noise_doubt(problem: Problem, noise: Noise, gate: Gate, verdict: str, seed: int) -> tuple[str, float]:
+    """That a stated noise does not fit the readings, in a sentence, and how many times as large it would have to be.
 
-    Too large where the model leaves less than such a noise would. Too small where no explanation stands, but the model
-    alone would under a larger noise: its residuals then have the size alone against them, and no pattern.
+    "" and 1 where it may be right. Too large where the model leaves less than such a noise would. Too small where no
+    explanation stands, or none is likelier than chance and the squares are as large in few campaigns, but the model
+    alone would stand under a larger noise: its residuals then have the size alone against them, and no pattern.
     """
     if noise.name != "stated":
-        return ""
+        return "", 1.0
     told = 100.0 * noise.typical
     if float((gate.simulated <= gate.squares).mean()) < TOO_QUIET:
         factor = float(np.sqrt(gate.squares / np.median(gate.simulated)))
         return (
             f"the stated noise of {told:.2g} % is too large: what the model leaves is about {factor:.2g} times what "
             f"such a noise would leave; {factor * told:.2g} % would fit, and small effects would show"
-        )
-    if not nothing_stands:
-        return ""
+        ), factor
+    loud = gate.probability <= ENOUGH and gate.squares_probability <= TOO_LOUD
+    if not (verdict == "unexplained" or (verdict == "adequate" and loud)):
+        return "", 1.0
     factor = 1.0
     for _ in range(ROUNDS):
         factor *= float(np.sqrt(gate.squares / np.median(gate.simulated)))
         if not 1.0 < factor < LARGEST_FACTOR:
-            return ""
+            return "", 1.0
         gate = _gate_at(problem, noise, factor, seed)
     if gate.probability <= ENOUGH:
-        return ""
+        return "", 1.0
     return (
         f"the stated noise of {told:.2g} % may be too small: were it {factor:.2g} times as large, {factor * told:.2g} "
         "%, the model alone would explain the readings; repeat a few readings, re-clamped, and leave it to them"
-    )
+    ), factor
 
 
 def _gate_at(problem: Problem, noise: Noise, factor: float, seed: int) -> Gate:
@@ -90,6 +94,7 @@ FAR_OFF = 16.0  # squared deviation of a row from which on it is looked at
 MOST_ROWS, MOST_CLAMPS, MOST_SLIPS = 12, 6, 3
 NEAR = 3.0  # standard deviations within which the mended rows must lie, root mean square
 STEP_MM, STEP_DEG = 10.0, 1.0
+MOST_STEPS = 10.0  # times these up to which a change is in proportion to the slip
 LBF_PER_IN = 25.4 / 4.4482216152605  # of 1 N/mm; the inch is 25.4 mm, the pound-force 4.448... N, both exactly
 # What a stiffness may have been written in -> written over true.
 UNITS = {"lbf/in": LBF_PER_IN, "N/um": 1e-3}
@@ -97,6 +102,11 @@ TINY = 1e-9
 SET_ASIDE = 1e2  # variance of ln k of a row that is left out
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 COORDINATES, ANGLES = ("x_mm", "y_mm", "z_mm"), ("a_deg", "b_deg", "c_deg")
+# Columns, field of the readings, usual slip, SI value of its unit, and that unit.
+POSE_STEPS = (
+    (COORDINATES, "position", STEP_MM, float(m_from_mm(1.0)), "mm"),
+    (ANGLES, "angles", STEP_DEG, float(rad_from_deg(1.0)), "deg"),
+)
 
 
 @dataclass(frozen=True)
@@ -227,6 +237,44 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
     return tuple(found)
 
 
+@dataclass(frozen=True)
+class SlipSize:
+    """By how much a column of all readings of a clamping must be off for these to show it, four times of five.
+
+    `size` in mm or degrees, for the median clamping; inf where not even ten times the usual slip would show; nan where
+    no clamping has several readings, or where the machine cannot take a pose that is off by the usual slip.
+    """
+
+    column: str
+    unit: str
+    size: float
+
+
+def slips_that_show(problem: Problem, fit: Fit) -> tuple[SlipSize, ...]:
+    """How large a slip of each coordinate and angle must be to stand out as `suspect_rows` asks.
+
+    That one looks for slips of 10 mm and 1 degree: where the size is larger, they pass unseen, and do as little harm.
+    Mending a slip of whitened length s gains s^2 / 2, in proportion to the square of its size, and has to pay for every
+    slip that is tried.
+    """
+    data = problem.predictor.data
+    tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))
+    wanted = float(np.sqrt(2.0 * np.log(tried / SLIPPED))) + POWER_80
+    projected = problem.scatter.precision.beside(fit.jacobian.T, _prior(fit))
+    blocks = [(rows, projected.block(rows)) for rows in Groups.by(data.clamp).members() if len(rows) > 1]
+    found = []
+    for names, field, step, si, unit in POSE_STEPS:
+        for k, name in enumerate(names):
+            moved = getattr(data, field) + step * si * np.eye(3)[k]
+            slip = _Slip.of(data, np.arange(len(data)), name, "", "", **{field: moved})
+            (change,) = _changes(problem, fit, [slip])
+            squares = np.array([change[rows] @ block @ change[rows] for rows, block in blocks])
+            middle = float(np.sqrt(np.median(squares))) if blocks else np.nan
+            size = np.inf if middle * MOST_STEPS < wanted else step * wanted / middle
+            found.append(SlipSize(name, unit, size))
+    return tuple(found)
+
+
 def _suspect(data: Measurements, ways: Sequence[_Slip], odds: float) -> Suspect:
     first = ways[0]
     several = len(first.rows) > 1
@@ -292,10 +340,7 @@ def _slips_of_row(data: Measurements, row: Rows) -> Iterator[_Slip]:
 
 def _slips_of_pose(data: Measurements, rows: Rows) -> Iterator[_Slip]:
     """A coordinate or an angle with the wrong sign, or off by 10 mm or 1 degree; the same in all rows."""
-    for names, field, step, si in (
-        (COORDINATES, "position", STEP_MM, 1e-3),
-        (ANGLES, "angles", STEP_DEG, float(rad_from_deg(1.0))),
-    ):
+    for names, field, step, si, _ in POSE_STEPS:
         values = getattr(data, field)[rows]
         for k, name in enumerate(names):
             if float(np.ptp(values[:, k])) > TINY:

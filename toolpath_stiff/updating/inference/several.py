@@ -82,8 +82,12 @@ def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> tup
     return _scored(problem, search, base, found), search
 
 
-def search_triples(problem: Problem, search: LinearSearch, base: Fit) -> list[Combination]:
-    """The triples worth looking at that hold one of the best pairs of the search."""
+def search_triples(problem: Problem, search: LinearSearch, base: Fit, only_better: bool = False) -> list[Combination]:
+    """The triples worth looking at that hold one of the best pairs of the search.
+
+    `only_better`: those that the linear search finds likelier than every pair; a pair explains the readings already.
+    """
+    least = search.ranked[0].score if only_better and search.ranked else -np.inf
     triples = {
         tuple(sorted((*pair.tables, k)))
         for pair in search.ranked[:SEEDS]
@@ -91,7 +95,7 @@ def search_triples(problem: Problem, search: LinearSearch, base: Fit) -> list[Co
         if search.owner[k] not in {search.owner[i] for i in pair.tables}
     }
     found = search.best(np.array(sorted(triples), dtype=np.int64).reshape(-1, 3))
-    return _scored(problem, search, base, found)
+    return _scored(problem, search, base, [one for one in found if one.score > least])
 
 
 # -- the linear search -------------------------------------------------------------------------------------------------
