@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import pickle
 import subprocess
@@ -153,6 +154,42 @@ def test_every_public_name_is_there_and_listed():
     assert {*wanted.split(), "Machine", "Program", "Measurements", "Effect"} <= set(tps.__all__)
     with pytest.raises(AttributeError, match="analyse"):
         tps.analyse  # noqa: B018
+
+
+# Members without an example: it would take seconds. Those of `Case` keep the result of the function of the same name.
+NO_EXAMPLE = {
+    "Case": {"compare", "diagnose", "draft", "draft_in", "place", "plan", "record", "set_up", "set_up_in", "update"},
+    "Machine": {"picture"},
+    "MachineCheck": {"picture"},
+}
+
+
+def members_of(public):
+    """Name -> function of every public method and property, inherited ones of this package too."""
+    found = {}
+    for kind in reversed(public.__mro__ if inspect.isclass(public) else ()):
+        for name, value in vars(kind).items() if kind.__module__.startswith("toolpath_stiff.") else ():
+            made = getattr(value, "__func__", None) or getattr(value, "fget", None) or getattr(value, "func", value)
+            if not name.startswith("_") and inspect.isfunction(made):
+                found.setdefault(name, []).append(made)
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in tps.__all__ if not name.startswith("_")])
+def test_every_public_name_and_member_is_in_an_example_that_runs(name):
+    """An example is the name's own, a member's, or that of a function that returns the class."""
+    public = getattr(tps, name)
+    functions = [one for one in (getattr(tps, other) for other in tps.__all__) if inspect.isfunction(one)]
+    makers = [one for one in functions if name in str(inspect.signature(one).return_annotation).split(" | ")]
+    members = members_of(public)
+    documented = [public, *getattr(public, "__mro__", ()), *makers, *(one for own in members.values() for one in own)]
+    lines = [line for one in documented for line in (inspect.getdoc(one) or "").splitlines()]
+    shown = "\n".join(line for line in lines if line.startswith((">>> ", "... ")))
+    assert any(">>> " in (one.__doc__ or "") for one in (public, *makers)), f"{name} has no example"
+    for member, own in members.items():
+        assert own[-1].__doc__, f"{name}.{member} has no docstring"
+        example = any(">>> " in (one.__doc__ or "") for one in own) or f".{member}" in shown
+        assert example or member in NO_EXAMPLE.get(name, ()), f"{name}.{member} is in no example"
 
 
 def test_a_name_that_is_imported_for_type_checkers_is_public_and_the_other_way_round():

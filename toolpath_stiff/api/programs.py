@@ -33,7 +33,7 @@ TABLES = ("csv", "parquet")
 
 
 class Analysis(FolderResult):
-    """Stiffness along the path of a program, under a load at every sample of a cut.
+    r"""Stiffness along the path of a program, under a load at every sample of a cut.
 
     Attributes
     ----------
@@ -41,6 +41,26 @@ class Analysis(FolderResult):
         The samples and what was found at each, as arrays in SI.
     on_other
         The same on the machine compared with; None without one.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> found = tps.analyze("nist", slot, origin_mm_deg=(0, 0, 800), require_N_per_mm=54000)
+    >>> [round(one) for one in (found.mean_N_per_mm, found.min_N_per_mm, found.range_N_per_mm)]
+    [54353, 53875, 948]
+    >>> found.weakest["line"], found.weakest["text"]
+    (4, 'G1 X40')
+    >>> [(line, round(stiffness)) for line, stiffness in found.below_required]
+    [(4, 53875)]
+    >>> found.complete, found.warnings, len(found.assumptions) > 0
+    (True, [], True)
+    >>> found.deviation_N_per_mm is None  # the figures of this machine are stated without standard deviations
+    True
+    >>> len(found.to_frame()), len(found.to_dict()["weakest_places"])
+    (53, 1)
+    >>> [type(picture()).__name__ for picture in (found.plot, found.plot_profile)]
+    ['Figure', 'Figure']
     """
 
     command: ClassVar[str] = "analyze"
@@ -270,7 +290,7 @@ def path_options(
 
 
 class SampledPath(Result):
-    """The sampled path of a program, without a machine.
+    r"""The sampled path of a program, without a machine.
 
     Attributes
     ----------
@@ -278,6 +298,22 @@ class SampledPath(Result):
         Arrays in SI.
     name, warnings, unsupported
         The program's; what deserves a look; "line:column: word: reason" of what was not acted upon.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> path = tps.sample_path(slot, step_mm=10)
+    >>> path
+    <SampledPath: slot.nc, 9 samples>
+    >>> path.to_dict()["x_mm"][-2:]
+    [30.0, 40.0]
+    >>> b"".join(path.csv()).decode().splitlines()[0][:26]
+    'line,motion,tool,s_mm,t_s,'
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path.save(pathlib.Path(folder, "path.csv")).name
+    'path.csv'
     """
 
     command: ClassVar[str] = "path"
@@ -363,7 +399,19 @@ def sample_path(
 
 
 class ProgramCheck(Result):
-    """What a program uses, what is not understood, extents, times, and what a machine says to it."""
+    r"""What a program uses, what is not understood, extents, times, and what a machine says to it.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
+    >>> found
+    <ProgramCheck: slot.nc, 1 error>
+    >>> found.errors == [one for one in found.findings if one["severity"] == "error"]
+    True
+    >>> found.to_frame()["line"].tolist(), found.to_dict()["complete"]
+    ([3], False)
+    """
 
     command: ClassVar[str] = "check"
 
