@@ -136,7 +136,7 @@ class Question:
         if not 0.0 <= strut_spread_percent <= LARGEST_SPREAD_PERCENT:
             raise InputError(f"strut spread {strut_spread_percent:g} %", expected=f"0 to {LARGEST_SPREAD_PERCENT:g} %")
         self.strut_spread = strut_spread_percent / 100.0
-        self.seed = whole("--seed", seed, 0)
+        self.seed = whole("seed", seed, 0)
         self.files = self.data.files if self.data else ()
         self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread)
         self.inputs = (*self.files, *self.on.inputs)

@@ -23,6 +23,7 @@ from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, 
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:
@@ -323,7 +324,7 @@ def _earlier(earlier: Placement | str | Path | Mapping[str, Any] | None) -> dict
     if not file.exists():
         raise InputError(
             f"--pick: there is no earlier search in {file.parent} (no {file.name})",
-            hint="search first, without --pick, or name the search's folder with --out",
+            hint=f"search first, without --pick, or name the search's folder with {both_names('--out')}",
         )
     try:
         found = json.loads(read_text(file, "the earlier search"))

@@ -13,6 +13,7 @@ from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, 
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.units import (
     Pose,
     m_from_mm,
@@ -491,7 +492,7 @@ def check(
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
     if on is None and strut_speed_mm_per_min is not None:
-        raise InputError("--strut-speed without a machine", hint="name one with --machine")
+        raise InputError(f"{both_names('--strut-speed')} without a machine", hint="name one with --machine")
     speed = None
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(

@@ -17,6 +17,7 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, front_rows, thin
@@ -445,7 +446,7 @@ def _infeasible(search: _Search, placement: FloatArray) -> UnreachableError:
         return UnreachableError(
             f"{least} {line} has a margin of {100.0 * found.margin[worst]:.2f} % of the limit's span: "
             f"{found.reach.describe(worst)}",
-            hint=f"widen the bounds, or ask for less than --margin {100.0 * rules.margin:g}",
+            hint=f"widen the bounds, or ask for less than {both_names('--margin', f'{100.0 * rules.margin:g}')}",
         )
     return UnreachableError(
         f"{least} the struts are outside their law at {100.0 * figures.extrapolated[0]:.1f} % of the samples, now at "

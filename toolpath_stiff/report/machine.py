@@ -441,7 +441,7 @@ def effect_details(effect: Effect) -> str:
         f"  source     {effect.source}",
     ]
     if effect.load_dependent:
-        lines.append("  load       depends on the size of the load (--force): the stiffness is the secant one")
+        lines.append("  load       depends on the size of the load (--force, force_N): the stiffness is the secant one")
     if effect.needs:
         lines.append(f"  needs      columns {', '.join(effect.needs)} in the measurements")
     for p in effect.parameters:

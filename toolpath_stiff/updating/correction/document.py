@@ -202,7 +202,7 @@ def _text(update: Update, verdict: str) -> str:
     against = "; ".join(f"{one.effect}: {', and '.join(one.reasons)}" for one in update.supports if not one.supported)
     if verdict == REFUSED:
         said = f"The data do not support {against}." if against else "The machine stays as it is."
-        return f"{asked}{said} (--force writes it all the same.) {errors}"
+        return f"{asked}{said} (--force, force=True, writes it all the same.) {errors}"
     if verdict == FORCED:
         said = f" ({against})" if against else ""
         return f"{asked}Added by force, although the data do not support it{said}. {_unconfirmed(update)}{errors}"
