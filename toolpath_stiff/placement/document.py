@@ -156,7 +156,7 @@ def placement_summary(
         "recommended": front[search["recommended"] - 1],
         "before": before,
         "before_reason": reason or None,
-        "costs": _costs(front, chosen),
+        "trade_offs": _costs(front, chosen),
         "front": front,
         "binding_limits": _binding_limits(best),
         "offset_blocks": _offsets(program, best.origin),
@@ -245,7 +245,7 @@ def placement_warnings(
     found += [
         f"line {rapid['line']}: no placement within the bounds keeps this rapid within reach ({rapid['reason']}); it "
         "does not follow the work, and was left out of the search"
-        for rapid in search["unmended_rapids"]
+        for rapid in search["rapids_left_out"]
     ]
     found += _present_words(rules, present) if before is not None else []
     found += _extrapolation_words(chosen, before)

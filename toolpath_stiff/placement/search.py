@@ -88,7 +88,7 @@ class PlacementResult:
         Figures of the present placement (one row); None if none was given.
     rules
         What every placement of the front keeps.
-    unmended
+    rapids_left_out
         (line, what it breaks) of rapids that no placement within the bounds keeps within reach.
     pose_evaluations
         Poses that the search evaluated.
@@ -99,7 +99,7 @@ class PlacementResult:
     best: int
     present: PlacementFigures | None
     rules: Rules
-    unmended: tuple[tuple[int, str], ...] = ()
+    rapids_left_out: tuple[tuple[int, str], ...] = ()
     pose_evaluations: int = 0
 
     @property
@@ -192,7 +192,7 @@ def search_placements(
     held = present is not None and bounds.holds(present)
     if present is not None and held:
         scouts = np.vstack([present, scouts])
-    unmended = _let_go(search, scouts)
+    rapids_left_out = _let_go(search, scouts)
     search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, now))
     report(1, 4)
     candidates = _evolved(search, scouts, rng)
@@ -202,7 +202,7 @@ def search_placements(
     candidates = np.vstack(
         [_for_the_front(search, candidates), ends] + ([present[None]] if present is not None and held else [])
     )
-    found = _result(search, candidates, now, unmended)
+    found = _result(search, candidates, now, rapids_left_out)
     report(4, 4)
     return found
 
@@ -218,7 +218,7 @@ def _for_the_front(search: _Search, candidates: FloatArray) -> FloatArray:
 
 
 def _result(
-    search: _Search, candidates: FloatArray, now: PlacementFigures | None, unmended: tuple[tuple[int, str], ...]
+    search: _Search, candidates: FloatArray, now: PlacementFigures | None, rapids_left_out: tuple[tuple[int, str], ...]
 ) -> PlacementResult:
     """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
     figures = search.evaluators["whole"].figures(candidates)
@@ -236,7 +236,7 @@ def _result(
         best=int(np.flatnonzero(rows == best)[0]),
         present=now,
         rules=search.rules,
-        unmended=unmended,
+        rapids_left_out=rapids_left_out,
         pose_evaluations=search.poses,
     )
 

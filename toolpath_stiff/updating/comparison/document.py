@@ -108,7 +108,7 @@ class FindingEntry(TestFigures):
     kind: str
     readings: int
     size_percent: float
-    not_told_from: list[str]
+    indistinguishable_from: list[str]
     after_strut_law_refit: NotRequired[TestFigures | None]
 
 
@@ -120,7 +120,7 @@ class FarOffEntry(TypedDict):
     reading: int
     point: str
     direction: str
-    off_percent: float
+    deviation_percent: float
     standard_deviations: float
 
 
@@ -157,7 +157,7 @@ class ComparisonDocument(TypedDict):
     findings: list[FindingEntry]
     by_noise: dict[str, list[FindingEntry]]
     tests: list[PatternTest]
-    far_off: list[FarOffEntry]
+    outliers: list[FarOffEntry]
     loops: LoopsDocument
     history: HistoryDocument
     model_free: ModelFree
@@ -251,7 +251,7 @@ def document_of(
         "findings": findings,
         "by_noise": by_noise,
         "tests": tests,
-        "far_off": _far_off_entries(residual, answers[-1], looked_for, data),
+        "outliers": _far_off_entries(residual, answers[-1], looked_for, data),
         "loops": loops,
         "history": history,
         "model_free": {"checks": _checks(answers), "cannot_check": cannot},
@@ -367,7 +367,7 @@ def _far_off_entries(
             "reading": i + 1,
             "point": str(data.point[i]),
             "direction": str(directions(data)[i]),
-            "off_percent": float(deviation_percent(rest[i])),
+            "deviation_percent": float(deviation_percent(rest[i])),
             "standard_deviations": float(ratio[i]),
         }
         for i in far.tolist()
@@ -437,7 +437,7 @@ def as_finding(
         "kind": pattern.kind,
         "readings": int(pattern.rows.sum()),
         "size_percent": size,
-        "not_told_from": [*pattern.same, *(looked_for[j].name for j in found.alike)][:MOST_ALIKE],
+        "indistinguishable_from": [*pattern.same, *(looked_for[j].name for j in found.alike)][:MOST_ALIKE],
     }
     if refitted is not None:
         test = next((t for t in refitted.tests if t.pattern == found.pattern), None)

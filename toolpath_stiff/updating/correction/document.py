@@ -50,7 +50,7 @@ class StepEntry(HeldErrors):
     by_direction: dict[str, DirectionErrors]
     strut_law_N_per_um: list[LawEntry]  # noqa: N815  as in the file
     parameters: dict[str, dict[str, Any]]
-    wild_readings: int
+    outliers: int
     held_out_gain_in_se: NotRequired[float | None]
     held_out_se_percent: NotRequired[float | None]
 
@@ -63,7 +63,7 @@ class SupportEntry(TypedDict):
     reasons: list[str]
     mean_abs_error_percent: float | None
     held_out_error_percent: float | None
-    held_out_fall_percent: float | None
+    held_out_reduction_percent: float | None
     held_out_gain_in_se: float | None
     likelihood_gain: float | None
     threshold: float | None
@@ -105,7 +105,7 @@ class UpdateDocument(TypedDict):
     steps: list[StepEntry]
     support: list[SupportEntry]
     described: list[str]  # effects whose form was read off these readings, and that no others have confirmed
-    turned_down: list[SupportEntry]
+    rejected: list[SupportEntry]
     noise_percent: float | None
     noise_floor_percent: float | None
     noise: NoiseEntry
@@ -141,7 +141,7 @@ def document(correction: Correction) -> UpdateDocument:
         "steps": steps,
         "support": [_support(one) for one in update.supports],
         "described": [] if update.described is None else list(update.described.names),
-        "turned_down": [_support(one) for one in update.turned_down],
+        "rejected": [_support(one) for one in update.turned_down],
         "noise_percent": json_number(100.0 * update.noise.typical),
         "noise_floor_percent": json_number(update.noise.floor_percent),
         "noise": {"name": update.noise.name, "origin": update.noise.origin},
@@ -256,7 +256,7 @@ def _step(update: Update, k: int) -> StepEntry:
         },
         "strut_law_N_per_um": _law(update.machine, step, update.widening),
         "parameters": step_parameters(step.fit, update.widening),
-        "wild_readings": len(step.fit.scatter.wild),
+        "outliers": len(step.fit.scatter.wild),
     }
     if k:
         before = update.steps[k - 1].held
@@ -318,7 +318,7 @@ def _support(one: Support) -> SupportEntry:
         "reasons": list(one.reasons),
         "mean_abs_error_percent": json_number(100.0 * one.error),
         "held_out_error_percent": json_number(100.0 * one.held_out_error),
-        "held_out_fall_percent": json_number(100.0 * one.fall),
+        "held_out_reduction_percent": json_number(100.0 * one.fall),
         "held_out_gain_in_se": json_number(one.gain_in_se, 3),
         "likelihood_gain": json_number(one.likelihood_gain),
         "threshold": json_number(one.threshold),

@@ -105,7 +105,7 @@ class CandidateEntry(Explanation):
     link: str
     parameters: dict[str, ParameterEntry]
     choice: dict[str, Any]
-    offered: bool
+    eligible: bool
     remark: str
 
 
@@ -203,7 +203,7 @@ class DiagnosisDocument(TypedDict):
     verdict: str
     text: str
     question: str
-    drawn: DrawnEntry | None
+    draft_status: DrawnEntry | None
     baseline: BaselineEntry
     candidates: list[CandidateEntry]
     pairs: list[PairEntry]
@@ -241,7 +241,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "verdict": diagnosis.verdict,
         "text": verdict_text(diagnosis),
         "question": main.question,
-        "drawn": None if (drawn := unconfirmed(diagnosis) or main.drawn) is None else drawn.document,
+        "draft_status": None if (drawn := unconfirmed(diagnosis) or main.drawn) is None else drawn.document,
         "baseline": _baseline(diagnosis),
         "candidates": _candidates(diagnosis),
         "pairs": _pairs(diagnosis),
@@ -364,7 +364,7 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> CandidateEntry | TestedE
             "held_out_rms_percent": json_number(100.0 * diagnosis.held_out_base.rms),
             "held_out_gain_in_se": 0.0,
             "adequate": base_passes,
-            "offered": False,
+            "eligible": False,
             "remark": "fits best when it is absent",
         }
     held = diagnosis.held_out[family.name]
@@ -384,7 +384,7 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> CandidateEntry | TestedE
         "held_out_gain_in_se": json_number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
         "adequate": bool(adequate),
         "adequate_probability": None if gate is None else json_number(gate.probability, 3),
-        "offered": not bounded,
+        "eligible": not bounded,
         "remark": remark,
     }
 
