@@ -431,7 +431,7 @@ def _origin(machine: Machine, limit: str) -> str:
 
 
 def _shown(data: Measurements, i: int) -> str:
-    mm = ", ".join(f"{value * 1e3:g}" for value in data.position[i])
+    mm = ", ".join(f"{mm_from_m(value):g}" for value in data.position[i])
     degrees = np.degrees(data.angles[i])
     return f"({mm}) mm" + (f" at ({', '.join(f'{d:.4g}' for d in degrees)}) deg" if degrees.any() else "")
 

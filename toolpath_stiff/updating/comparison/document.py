@@ -9,7 +9,7 @@ from typing import NotRequired, TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.units import certain, mm_from_m
+from toolpath_stiff.units import certain, mm_from_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 from toolpath_stiff.updating.comparison.principles import (
     CheckEntry,
@@ -384,7 +384,7 @@ def _refit_figures(predictor: Predictor, one: Answer) -> RefitFigures | None:
         **error_figures(one.law.residual),
         "strut_law": {
             "at_mm": [] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)],
-            "N_per_um": [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6][:count],
+            "N_per_um": [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][:count],
         },
         "excess_scatter_percent": None if one.refitted is None else 100.0 * one.refitted.excess,
     }

@@ -11,7 +11,7 @@ from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.comparison.residuals import directions
 from toolpath_stiff.updating.correction import Correction
 from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
@@ -172,7 +172,9 @@ def document(correction: Correction) -> UpdateDocument:
 
 def _search(search: StrutLawSearch) -> SearchEntry:
     """Starts and ends of the paper's search, in N/um."""
-    machine_law = np.array([search.strut_law.stiffness_1, search.strut_law.stiffness_2]) / np.exp(search.law) / 1e6
+    machine_law = n_per_um_from_n_per_m(
+        np.array([search.strut_law.stiffness_1, search.strut_law.stiffness_2]) / np.exp(search.law)
+    )
     return {
         "starts_N_per_um": np.round(machine_law * np.exp(search.starts), 3).tolist(),
         "ends_N_per_um": np.round(machine_law * np.exp(search.ends), 3).tolist(),
@@ -275,8 +277,8 @@ def _law(machine: Machine, step: Step, widening: float) -> list[LawEntry]:
     return [
         {
             "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
-            "stiffness": json_number(stiffness / 1e6),
-            "sd": json_number(stiffness / 1e6 * float(deviation), 3) if step.fit.law_free else None,
+            "stiffness": json_number(n_per_um_from_n_per_m(stiffness)),
+            "sd": json_number(n_per_um_from_n_per_m(stiffness) * float(deviation), 3) if step.fit.law_free else None,
         }
         for (length, stiffness), deviation in zip(ends, deviations, strict=True)
     ]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.units import certain, json_number, mm_from_m
+from toolpath_stiff.units import certain, json_number, mm_from_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.diagnosis.words import (
     assumptions,
@@ -325,8 +325,8 @@ def _baseline(diagnosis: Diagnosis) -> BaselineEntry:
         "law": [
             {
                 "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
-                "stiffness_N_per_um": json_number(stiffness * factor / 1e6),
-                "machine_file_N_per_um": json_number(stiffness / 1e6),
+                "stiffness_N_per_um": json_number(n_per_um_from_n_per_m(stiffness * factor)),
+                "machine_file_N_per_um": json_number(n_per_um_from_n_per_m(stiffness)),
                 "sd_percent": json_number(100.0 * deviation, 3),
             }
             for (length, stiffness), factor, deviation in zip(ends, factors, deviations, strict=True)

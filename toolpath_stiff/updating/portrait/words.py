@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from toolpath_stiff.stiffness.effects.contract import joined
+from toolpath_stiff.units import RAD_PER_DEG
 from toolpath_stiff.updating.portrait import Portrait, Sized
 from toolpath_stiff.updating.portrait.terms import Term
 
@@ -16,7 +15,7 @@ SAID: dict[str, tuple[str, float, str]] = {
     "y": ("y", 1e-3, "mm"),
     "z": ("z", 1e-3, "mm"),
     "radius": ("the distance from the machine's axis", 1e-3, "mm"),
-    "tilt": ("the tilt", float(np.pi / 180.0), "deg"),
+    "tilt": ("the tilt", RAD_PER_DEG, "deg"),
     "strut length": ("the strut's length", 1e-3, "mm"),
     "strut force": ("the force in the strut", 1.0, "N"),
     "load": ("the load", 1.0, "N"),
