@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.main import main
+from toolpath_stiff.cli.main import COMMANDS, main
 
 ROOT = Path(__file__).parents[1]
 SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG2 X60 Y20 R20\nM2\n"
@@ -60,7 +60,11 @@ PAIRS = {
         "nist", between=("spindle_compliance", "none"), n=2, minutes={"pose": 20}
     ),
     "machine recover --starts 2": lambda: tps.recover_geometry(starts=2),
+    "machine check nist.toml": lambda: tps.Machine.load("nist.toml").check(),
     "effects list": tps.effects,
+    "effects draft nist-table1 --noise 20 -o missing.py": lambda: tps.draft_effect(
+        "nist", "nist-table1", "missing.py", noise_percent=20
+    ),
 }
 NO_PICTURES = ("analyze", "map", "place", "case-study", "compare", "diagnose", "update", "plan")
 
@@ -70,6 +74,8 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("slot.nc").write_text(SLOT)
     Path("raw.csv").write_text(RAW)
+    tps.Machine.load("nist").save("nist.toml")
+    tps.effect_template("my_screw").save("my_screw.py")
     return tmp_path
 
 
@@ -97,6 +103,34 @@ def test_reduce_is_its_function_and_where_it_wrote(here, capsys):
     found = tps.reduce("raw.csv")
     assert shown == found.to_dict()
     assert found.to_frame()["stiffness_N_per_mm"].tolist() == [50000.0]  # 16 kN over 0.32 mm of deflection
+
+
+def test_an_effect_check_is_its_function_s_but_for_the_measured_time(here, capsys):
+    assert main(["effects", "check", "my_screw.py", "--json"]) == 0
+    shown, found = json.loads(capsys.readouterr().out), tps.check_effects("my_screw.py").to_dict()
+    for document in (shown, found):
+        assert [document["effects"][0]["checks"].pop()["name"]] == ["speed"]
+    assert shown == found
+
+
+def test_the_next_visit_is_its_function_s(here, capsys):
+    tps.plan("nist", between=("spindle_compliance", "none"), n=2).save("plan", plots=False)
+    found = tps.next_visit("plan")
+    assert main(["plan", "--next", "plan", "--json"]) == 0
+    assert capsys.readouterr().out == found.to_json()
+
+
+def test_many_programs_are_their_function_s(here, capsys):
+    Path("other.nc").write_text(SLOT)
+    assert main(["analyze", "slot.nc", "other.nc", "--step", "20", "--jobs", "1", "--no-plots", "--json"]) == 0
+    found = tps.analyze_many("nist", ["slot.nc", "other.nc"], "reports", jobs=1, step_mm=20, plots=False)
+    assert capsys.readouterr().out == found.to_json()
+
+
+def test_every_command_is_held_to_its_function():
+    """What has no JSON of its own: `rig` shares nothing with the library, `studio` serves a page."""
+    alone = {"reduce", "path"}  # in tests of their own
+    assert {line.split()[0] for line in PAIRS} | alone | {"rig", "studio"} == {one.name for one in COMMANDS}
 
 
 def test_path_is_its_function(here, capsys):

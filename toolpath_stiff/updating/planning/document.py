@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.units import certain, deg_from_rad, mm_from_m
+from toolpath_stiff.units import certain, deg_from_rad, min_from_s, mm_from_m
 from toolpath_stiff.updating.planning import Plan, Proposal, matters
 from toolpath_stiff.updating.planning.campaign import Campaign
 from toolpath_stiff.updating.planning.gaps import MOST_REPEATS, SETTLED, ReadingNoise, pair_shares
@@ -333,7 +333,7 @@ def plan_rows(
             entry["repeat"] = repeats[clamp - 1] if len(repeats) else int(visits.rounds[row])
             entry["point"] = names[clamp - 1]
             if timed:
-                entry["time_min"] = _round(visits.readings.time[row] / 60.0)
+                entry["time_min"] = _round(min_from_s(visits.readings.time[row]))
             entry["tool_extension_mm"] = _round(mm_from_m(visits.extension[visit]))
             found.append(entry)
     if not any(entry["loop"] for entry in found):
