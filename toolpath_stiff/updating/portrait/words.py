@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import RAD_PER_DEG
@@ -84,20 +84,32 @@ def _with(term: Term) -> str:
     def shown(value: float) -> str:
         return f"{float(f'{value / si:.3g}'):g} {unit}".rstrip()
 
-    if term.shape == "slope" and "power" in at:
-        fading = "less" if at["power"] < 0.0 else "more"
-        return f", {fading} with {name} (power {at['power']:.2g}, the size given at {shown(at['reference'])})"
-    if term.shape == "slope" and len(term.signs) > 1:
-        return f" in a straight line with {name}, nothing at {shown(at['start'])} and in full at {shown(at['end'])}"
     if term.shape == "slope":
-        side = "above" if at["end"] > at["start"] else "below"
-        return f" where {name} is {side} {shown(at['start'])}, in full at {shown(at['end'])}"
+        return _slope_words(term, name, shown)
     if term.shape == "square":
         return f", with the square of {name} from {shown(at['centre'])}, in full {shown(at['reach'])} from there"
     if term.shape == "bump":
         return f" where {name} is about {shown(at['centre'])} (to some {shown(2.0 * at['width'])} either side)"
     if term.shape == "periodic":
         return f" in a wave over {name} with a period of {shown(at['period'])}"
+    return _threshold_words(term, name, shown)
+
+
+def _slope_words(term: Term, name: str, shown: Callable[[float], str]) -> str:
+    """A straight line or a power of a variable, in words."""
+    at = term.constants
+    if "power" in at:
+        fading = "less" if at["power"] < 0.0 else "more"
+        return f", {fading} with {name} (power {at['power']:.2g}, the size given at {shown(at['reference'])})"
+    if len(term.signs) > 1:
+        return f" in a straight line with {name}, nothing at {shown(at['start'])} and in full at {shown(at['end'])}"
+    side = "above" if at["end"] > at["start"] else "below"
+    return f" where {name} is {side} {shown(at['start'])}, in full at {shown(at['end'])}"
+
+
+def _threshold_words(term: Term, name: str, shown: Callable[[float], str]) -> str:
+    """A step, a line from a value on, or what friction holds, in words."""
+    at = term.constants
     if "from" in at:
         side = "above" if at["end"] > at["from"] else "below"
         return f" where {name} is {side} {shown(at['from'])}, in full at {shown(at['end'])}"
