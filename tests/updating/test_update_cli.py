@@ -114,7 +114,7 @@ def test_the_papers_own_estimation_with_its_figure_3(tmp_path, capsys):
         (("--strut-law", "--objective", "mean-error", "--auto"), "mean-error"),
         (("--objective", "mean-error"), "--strut-law"),
         (("--add", "weak_strutt"), "weak_strut"),
-        (("--auto", "--seed", "-1"), "--seed -1"),
+        (("--auto", "--seed", "-1"), "seed -1"),
     ],
 )
 def test_wrong_arguments(arguments, words, tmp_path, capsys):
