@@ -63,16 +63,7 @@ def _of_unknowns(layout: str, records: Sequence[Record]) -> list[Figure]:
         share(layout, "unknown: `identified`, a name of the catalogue", [named_by_catalogue(r) for r in records]),
         share(layout, "unknown: has a portrait", [bool(r["portrait"]) for r in records]),
     ]  # fmt: skip
-    for name in LARGEST_SET:
-        bar = 0.85 if barred else None
-        found += [
-            share(layout, f"portrait: {name}, the set holds the truth", [right_set(r, name) for r in drawn],
-                  at_least=bar),
-            share(layout, f"portrait: {name}, the likeliest is right", [first_right(r, name) for r in drawn]),
-            mean(layout, f"portrait: {name}, mean size of the set", [float(len(r["portrait"][name])) for r in drawn]),
-            share(layout, f"unknown: {name} right, cases without a portrait counted as wrong",
-                  [right_set(r, name) for r in records]),
-        ]  # fmt: skip
+    found += [figure for name in LARGEST_SET for figure in _of_set(layout, name, records, drawn, barred)]
     ratios = [ratio(r) for r in drawn]
     found += [
         share(layout, f"portrait: held-out error at most {most:g} of the noise floor", [r <= most for r in ratios],
@@ -86,6 +77,19 @@ def _of_unknowns(layout: str, records: Sequence[Record]) -> list[Figure]:
         middle_of(layout, "CPU of `diagnose` with the portrait, median", [r["cpu"] for r in records], None, " s")
     )
     return found
+
+
+def _of_set(layout: str, name: str, records: Sequence[Record], drawn: Sequence[Record], barred: bool) -> list[Figure]:
+    """How often the set of links, or of variables, holds the truth."""
+    bar = 0.85 if barred else None
+    return [
+        share(layout, f"portrait: {name}, the set holds the truth", [right_set(r, name) for r in drawn],
+              at_least=bar),
+        share(layout, f"portrait: {name}, the likeliest is right", [first_right(r, name) for r in drawn]),
+        mean(layout, f"portrait: {name}, mean size of the set", [float(len(r["portrait"][name])) for r in drawn]),
+        share(layout, f"unknown: {name} right, cases without a portrait counted as wrong",
+              [right_set(r, name) for r in records]),
+    ]  # fmt: skip
 
 
 def _of_sound(layout: str, records: Sequence[Record]) -> list[Figure]:

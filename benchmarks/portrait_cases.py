@@ -82,5 +82,5 @@ def in_short(portrait: Mapping[str, Any] | None) -> dict[str, Any] | None:
         **{name: {entry[ENTRY[name]]: entry["probability"] for entry in portrait[name]} for name in NAMES},
         **{name: portrait[name] for name in FIGURES},
         "terms": [term["words"] for term in portrait["terms"]],
-        "alike": [term["words"] for term in portrait["alike"]],
+        "alike": [term["words"] for term in portrait["indistinguishable"]],
     }

@@ -180,19 +180,29 @@ def _slips(records: Sequence[Record]) -> list[Figure]:
     clean = [r for r in records if not r["slip"]]
     wrong = [r for r in records if r["slip"]]
     plain = [r for r in wrong if slip_visible(r)]
+    faint = [r for r in wrong if not slip_visible(r)]
     # Wild readings are no slips, but one of eight standard deviations may look like one: counted, without a bar.
     beside = [bool(named_rows(r) - {row for slip in r["slips"] for row in slip["rows"]}) for r in wrong]
     return [
         share("tilted", f"slips with a detectability of {VISIBLE:g} or more: row named", [slip_found(r) for r in plain],
               at_least=0.90),
         share("tilted", "the same: and what it would be", [slip_found(r) and meant_named(r) for r in plain]),
-        share("tilted", "slips that show less: row named", [slip_found(r) for r in wrong if not slip_visible(r)]),
+        share("tilted", "slips that show less: row named", [slip_found(r) for r in faint]),
         share("tilted", "no slip: some row suspected", [bool(named_rows(r)) for r in clean], at_most=0.05),
         share("tilted", "a slip: another row suspected as well", beside),
+        *_slips_verdicts(clean, wrong),
+    ]  # fmt: skip
+
+
+def _slips_verdicts(clean: Sequence[Record], wrong: Sequence[Record]) -> list[Figure]:
+    """The verdict with nothing or one effect hidden; the reader may refuse a table with a slip."""
+    sound, spoiled = ([r for r in some if r["hidden"] == "none"] for some in (clean, wrong))
+    with_one = [r for r in wrong if r["hidden"] == "one"]
+    return [
         share("tilted", "no slip, none hidden: `adequate`",
-              [r["verdict"] == "adequate" for r in clean if r["hidden"] == "none"]),
+              [r["verdict"] == "adequate" for r in sound]),
         share("tilted", "a slip, none hidden: `adequate` (or refused by the reader)",
-              [r["verdict"] in ("adequate", "refused") for r in wrong if r["hidden"] == "none"]),
+              [r["verdict"] in ("adequate", "refused") for r in spoiled]),
         share("tilted", "a slip, one hidden: truth in `plausible` (or refused)",
-              [r["verdict"] == "refused" or holds_truth(r) for r in wrong if r["hidden"] == "one"]),
+              [r["verdict"] == "refused" or holds_truth(r) for r in with_one]),
     ]  # fmt: skip

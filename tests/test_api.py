@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import pickle
 import subprocess
@@ -13,7 +14,7 @@ import pandas as pd
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.main import main
+from toolpath_stiff.cli.main import COMMANDS, main
 
 ROOT = Path(__file__).parents[1]
 SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG2 X60 Y20 R20\nM2\n"
@@ -59,7 +60,11 @@ PAIRS = {
         "nist", between=("spindle_compliance", "none"), n=2, minutes={"pose": 20}
     ),
     "machine recover --starts 2": lambda: tps.recover_geometry(starts=2),
+    "machine check nist.toml": lambda: tps.Machine.load("nist.toml").check(),
     "effects list": tps.effects,
+    "effects draft nist-table1 --noise 20 -o missing.py": lambda: tps.draft_effect(
+        "nist", "nist-table1", "missing.py", noise_percent=20
+    ),
 }
 NO_PICTURES = ("analyze", "map", "place", "case-study", "compare", "diagnose", "update", "plan")
 
@@ -69,6 +74,8 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("slot.nc").write_text(SLOT)
     Path("raw.csv").write_text(RAW)
+    tps.Machine.load("nist").save("nist.toml")
+    tps.effect_template("my_screw").save("my_screw.py")
     return tmp_path
 
 
@@ -96,6 +103,34 @@ def test_reduce_is_its_function_and_where_it_wrote(here, capsys):
     found = tps.reduce("raw.csv")
     assert shown == found.to_dict()
     assert found.to_frame()["stiffness_N_per_mm"].tolist() == [50000.0]  # 16 kN over 0.32 mm of deflection
+
+
+def test_an_effect_check_is_its_function_s_but_for_the_measured_time(here, capsys):
+    assert main(["effects", "check", "my_screw.py", "--json"]) == 0
+    shown, found = json.loads(capsys.readouterr().out), tps.check_effects("my_screw.py").to_dict()
+    for document in (shown, found):
+        assert [document["effects"][0]["checks"].pop()["name"]] == ["speed"]
+    assert shown == found
+
+
+def test_the_next_visit_is_its_function_s(here, capsys):
+    tps.plan("nist", between=("spindle_compliance", "none"), n=2).save("plan", plots=False)
+    found = tps.next_visit("plan")
+    assert main(["plan", "--next", "plan", "--json"]) == 0
+    assert capsys.readouterr().out == found.to_json()
+
+
+def test_many_programs_are_their_function_s(here, capsys):
+    Path("other.nc").write_text(SLOT)
+    assert main(["analyze", "slot.nc", "other.nc", "--step", "20", "--jobs", "1", "--no-plots", "--json"]) == 0
+    found = tps.analyze_many("nist", ["slot.nc", "other.nc"], "reports", jobs=1, step_mm=20, plots=False)
+    assert capsys.readouterr().out == found.to_json()
+
+
+def test_every_command_is_held_to_its_function():
+    """What has no JSON of its own: `rig` shares nothing with the library, `studio` serves a page."""
+    alone = {"reduce", "path"}  # in tests of their own
+    assert {line.split()[0] for line in PAIRS} | alone | {"rig", "studio"} == {one.name for one in COMMANDS}
 
 
 def test_path_is_its_function(here, capsys):
@@ -153,6 +188,42 @@ def test_every_public_name_is_there_and_listed():
     assert {*wanted.split(), "Machine", "Program", "Measurements", "Effect"} <= set(tps.__all__)
     with pytest.raises(AttributeError, match="analyse"):
         tps.analyse  # noqa: B018
+
+
+# Members without an example: it would take seconds. Those of `Case` keep the result of the function of the same name.
+NO_EXAMPLE = {
+    "Case": {"compare", "diagnose", "draft", "draft_in", "place", "plan", "record", "set_up", "set_up_in", "update"},
+    "Machine": {"picture"},
+    "MachineCheck": {"picture"},
+}
+
+
+def members_of(public):
+    """Name -> function of every public method and property, inherited ones of this package too."""
+    found = {}
+    for kind in reversed(public.__mro__ if inspect.isclass(public) else ()):
+        for name, value in vars(kind).items() if kind.__module__.startswith("toolpath_stiff.") else ():
+            made = getattr(value, "__func__", None) or getattr(value, "fget", None) or getattr(value, "func", value)
+            if not name.startswith("_") and inspect.isfunction(made):
+                found.setdefault(name, []).append(made)
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in tps.__all__ if not name.startswith("_")])
+def test_every_public_name_and_member_is_in_an_example_that_runs(name):
+    """An example is the name's own, a member's, or that of a function that returns the class."""
+    public = getattr(tps, name)
+    functions = [one for one in (getattr(tps, other) for other in tps.__all__) if inspect.isfunction(one)]
+    makers = [one for one in functions if name in str(inspect.signature(one).return_annotation).split(" | ")]
+    members = members_of(public)
+    documented = [public, *getattr(public, "__mro__", ()), *makers, *(one for own in members.values() for one in own)]
+    lines = [line for one in documented for line in (inspect.getdoc(one) or "").splitlines()]
+    shown = "\n".join(line for line in lines if line.startswith((">>> ", "... ")))
+    assert any(">>> " in (one.__doc__ or "") for one in (public, *makers)), f"{name} has no example"
+    for member, own in members.items():
+        assert own[-1].__doc__, f"{name}.{member} has no docstring"
+        example = any(">>> " in (one.__doc__ or "") for one in own) or f".{member}" in shown
+        assert example or member in NO_EXAMPLE.get(name, ()), f"{name}.{member} is in no example"
 
 
 def test_a_name_that_is_imported_for_type_checkers_is_public_and_the_other_way_round():

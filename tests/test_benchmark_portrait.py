@@ -20,7 +20,8 @@ def portrait(links: dict[str, float], variables: dict[str, float], held: float |
         "text": "...",
         "links": [{"link": link, "probability": p} for link, p in links.items()],
         "variables": [{"variable": variable, "probability": p} for variable, p in variables.items()],
-        "terms": [TERM], "alike": [TERM | {"probability": 0.2}], "explained_percent": 90.0, "error_percent": 2.0,
+        "terms": [TERM], "indistinguishable": [TERM | {"probability": 0.2}],
+        "explained_percent": 90.0, "error_percent": 2.0,
         "held_out_rms_percent": held, "noise_floor_percent": 2.0, "smooth_rms_percent": 3.0, "look_elsewhere": 0.001,
     }  # fmt: skip
 

@@ -193,7 +193,7 @@ def test_every_command_on_the_machine_warns(here, capsys):
 
 def test_a_machine_compared_with_says_so_too(here, capsys):
     found = analyzed(capsys, "--compare", "riser.toml")
-    assert any(text.startswith(f"--compare nist: {WAITS}") for text in found["warnings"])
+    assert any(text.startswith(f"--compare nist (compare_with): {WAITS}") for text in found["warnings"])
     found = analyzed(capsys, "--compare", "riser.toml", "--setup", "riser")
     assert found["compare"]["mean_N_per_mm"] < 0.9 * found["mean_N_per_mm"]
     assert found["compare"]["effects"] == ["setup_compliance"]

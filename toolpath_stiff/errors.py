@@ -49,7 +49,17 @@ def _cut(found: str) -> str:
 
 
 class TpsError(Exception):
-    """Base of every error that the command line turns into one message and an exit code (2)."""
+    """Base of every error that the command line turns into one message and an exit code (2).
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> try:
+    ...     tps.pose("nist", (0, 0, 5000))
+    ... except tps.TpsError as error:
+    ...     print(type(error).__name__, error.exit_code)
+    UnreachableError 2
+    """
 
     exit_code = 2
 
@@ -70,6 +80,11 @@ class InputError(TpsError):
         What to do next, an imperative sentence.
     file, line, column
         Where; line and column count from 1. For tables `line` is the line of the file; say "row" in `found`.
+
+    Examples
+    --------
+    >>> print(InputError("step 0 mm", expected="more than 0", hint="say how far", file="a.csv", line=3))
+    a.csv:3: step 0 mm; expected more than 0. Say how far
     """
 
     def __init__(
@@ -97,7 +112,14 @@ class InputError(TpsError):
 
 
 class InputErrors(TpsError):
-    """Several input errors, reported together (bad rows of a table, say)."""
+    """Several input errors, reported together (bad rows of a table, say).
+
+    Examples
+    --------
+    >>> print(InputErrors([InputError("no number", line=2), InputError("no unit", line=5)]))
+    2: no number
+    5: no unit
+    """
 
     def __init__(self, errors: Iterable[InputError]) -> None:
         self.errors = tuple(errors)
@@ -105,43 +127,129 @@ class InputErrors(TpsError):
 
 
 class FileError(InputError):
-    """A file cannot be read or written, or a folder holds what would be lost: choose another, or make room."""
+    """A file cannot be read or written, or a folder holds what would be lost: choose another, or make room.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> try:
+    ...     tps.machine_from_linuxcnc("nowhere.hal")
+    ... except tps.FileError as error:
+    ...     print(error.found)
+    cannot read the file of HAL pins 'nowhere.hal': No such file or directory
+    """
 
 
 class ProgramError(InputError):
-    """An NC program, a controller file, a tool table or offsets cannot be read, or cannot be used as asked.
+    r"""An NC program, a controller file, a tool table or offsets cannot be read, or cannot be used as asked.
 
     Raised by `analyze`, `check`, `place`, `rewrite` and the like; `line` and `column` say where to mend it.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> try:
+    ...     tps.sample_path(tps.Program.from_text("G21\nG1 X40 F", name="slot.nc"))
+    ... except tps.ProgramError as error:
+    ...     print(error.line, error.column, error.found)
+    2 8 the word 'F' has no number
     """
 
 
 class MachineFileError(InputError):
-    """A machine file is missing or wrong: `tps machine new` writes a template, `tps machine check` tries a file."""
+    """A machine file is missing or wrong: `tps machine new` writes a template, `tps machine check` tries a file.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> try:
+    ...     tps.Machine.load("nits")
+    ... except tps.MachineFileError as error:
+    ...     print(error.found)
+    machine 'nits' is neither a packaged machine nor a file
+    """
 
 
 class TableError(InputError):
-    """A table (CSV or a sheet of a workbook) is empty, damaged, or has cells that can be read in two ways."""
+    """A table (CSV or a sheet of a workbook) is empty, damaged, or has cells that can be read in two ways.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder, "poses.csv")
+    ...     file.touch()
+    ...     try:
+    ...         tps.read_poses(file)
+    ...     except tps.TableError as error:
+    ...         print(error.found)
+    the file is empty
+    """
 
 
 class MeasurementError(TableError):
-    """Readings, raw records or a plan lack what is needed, or contradict themselves; `line` says which row."""
+    r"""Readings, raw records or a plan lack what is needed, or contradict themselves; `line` says which row.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder, "measured.csv")
+    ...     _ = file.write_text("x_mm,y_mm,z_mm\n0,0,800\n")
+    ...     try:
+    ...         tps.Measurements.read(file)
+    ...     except tps.MeasurementError as error:
+    ...         print(error.line, error.found)
+    1 no direction
+    """
 
 
 class EffectError(InputError):
     """A physical effect does not exist, is declared wrongly, or has parameters that are not possible.
 
     A fit takes it for values to walk away from; otherwise mend the entry in the machine file or the effect's file.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> try:
+    ...     tps.preview("nist", "nist-table1").at({"weak_strut": {"strut": 7, "factor": 0.8}})
+    ... except tps.EffectError as error:
+    ...     print(error)
+    by hand: effect weak_strut: strut = 7; expected a whole number from 1 to 6
     """
 
 
 class PoseError(InputError):
-    """A pose cannot be computed: strut lengths that belong to no pose, or a strut law carried beyond zero."""
+    """A pose cannot be computed: strut lengths that belong to no pose, or a strut law carried beyond zero.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> from toolpath_stiff.machine import forward_kinematics
+    >>> try:
+    ...     forward_kinematics(tps.Machine.load("nist").model.machine, [[1.0] * 6], [[0.0, 0.0, 0.8, 0.0, 0.0, 0.0]])
+    ... except tps.PoseError as error:
+    ...     print(type(error).__name__)
+    PoseError
+    """
 
 
 class UnreachableError(PoseError):
     """A pose that the machine cannot take: a limit exceeded, or a singular configuration.
 
     Move the work (`origin`), widen the search, or keep the reachable part.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> try:
+    ...     tps.pose("nist", (0, 0, 5000))
+    ... except tps.UnreachableError as error:
+    ...     print(error.found)
+    the pose is out of reach on machine nist: frame joint2 angle needs 97.97 deg, limit 30.00 deg, 67.97 deg beyond
     """
 
 
@@ -149,6 +257,13 @@ class EffectFault(TpsError):
     """A user's own effect does not do what the contract asks: where, what it did, what was expected.
 
     Not an `InputError`: fits take those for values to walk away from, and a fault must end them. Keywords as there.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> error = tps.EffectFault("strut_compliance gives (6,)", expected="(n, 6)", file="my_screw.py", line=31)
+    >>> print(error)
+    my_screw.py:31: strut_compliance gives (6,); expected (n, 6)
     """
 
     def __init__(

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff import defaults
 from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
@@ -258,7 +259,7 @@ def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> 
         raise ProgramError(
             f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
             expected=f"at most {MOST_SAMPLES}",
-            hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
+            hint=f"use {both_names('--step', f'{mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g}')} or more",
         )
     return np.asarray(pieces)
 

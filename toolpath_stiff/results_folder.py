@@ -34,12 +34,14 @@ from toolpath_stiff.files import (
     sync_folder,
     write_file,
 )
+from toolpath_stiff.hints import both_names
 
 MANIFEST = ".tps-files.json"
 # In the temporary folder of a run: files that are being written; the same when all are there and nothing is left but
 # to move them to their places; what was moved out of their way.
 NEW, WHOLE, GONE = "new", "whole", "gone"
-ELSEWHERE = "choose another folder with --out, or say --replace (replace=True): the old file is kept beside the new one"
+_OTHER_FOLDER = f"choose another folder with {both_names('--out')}"
+ELSEWHERE = f"{_OTHER_FOLDER}, or say --replace (replace=True): the old file is kept beside the new one"
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,7 @@ def _refused(target: Path, names: Iterable[str], rules: Rules) -> list[Path]:
     if rules.of and old.of and old.of != _relative(target, rules.of):
         raise FileError(
             f"{str(target)!r} holds the results of {', '.join(map(repr, old.of))} (seen from there)",
-            hint="choose another folder with --out",
+            hint=_OTHER_FOLDER,
         )
     for name in names:
         if told := _told(target, name, old, rules):

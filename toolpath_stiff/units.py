@@ -82,6 +82,11 @@ def s_from_min(minutes: T) -> T:
     return minutes * 60.0
 
 
+def min_from_s(seconds: T) -> T:
+    """Minutes from seconds."""
+    return seconds / SECONDS_PER_MINUTE
+
+
 def per_s_from_per_min(rate: T) -> T:
     """A rate a second from one a minute."""
     return rate / 60.0

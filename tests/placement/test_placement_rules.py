@@ -178,7 +178,7 @@ def test_a_homing_rapid_that_no_placement_mends_is_named_and_no_constraint(tmp_p
     command = ["place", "home.nc", "--x=-100:100", "--y=-100:100", "--z", "700:1000", "--step", "5", "--out", "out"]
     assert main([*command, "--no-plots"]) == 0
     summary = json.loads(Path("out/placement.json").read_text())
-    assert [rapid["line"] for rapid in summary["search"]["unmended_rapids"]] == [9]
+    assert [rapid["line"] for rapid in summary["search"]["rapids_left_out"]] == [9]
     assert any(
         text.startswith("line 9: no placement within the bounds keeps this rapid") for text in summary["warnings"]
     )

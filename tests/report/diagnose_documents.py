@@ -37,7 +37,7 @@ def candidate(effect: str, held_out: float, probability: float, words: str, **mo
         "held_out_rms_percent": held_out * 1.27,
         "held_out_gain_in_se": 3.0,
         "adequate": False,
-        "offered": True,
+        "eligible": True,
         "remark": "",
     } | more
 
@@ -200,7 +200,7 @@ def unexplained() -> dict[str, Any]:
         "parameters": {"spindle_compliance": {"radial_nm_per_N": size(3.0, "nm/N", 2.0, 4.0)},
                        "weak_strut": {"factor": size(0.8, "", 0.7, 0.9)}},
         "choice": {"weak_strut": {"strut": 5}}, "mean_abs_error_percent": 2.9, "held_out_error_percent": 3.3,
-        "held_out_gain_in_se": 2.0, "adequate": False, "offered": True,
+        "held_out_gain_in_se": 2.0, "adequate": False, "eligible": True,
     }  # fmt: skip
     return common(
         "unexplained",

@@ -130,7 +130,7 @@ def test_the_command_writes_everything_and_the_same_bytes_again(tmp_path, capsys
         (["no_such_file.csv"], "no_such_file.csv"),
         (["nist-table1", "--machine", "no-such-machine"], "no-such-machine"),
         (["nist-table1", "--noise", "-3"], "noise"),
-        (["nist-table1", "--seed", "-1"], "--seed -1"),
+        (["nist-table1", "--seed", "-1"], "seed -1"),
     ],
 )
 def test_errors_are_one_line_and_write_nothing(arguments, said, tmp_path, capsys):

@@ -128,7 +128,7 @@ def test_a_set_up_is_named_with_the_plane_that_it_is():
     data = campaign(43, layout="paper")[0]
     rows = data.setup == "riser"
     first = quick(softened(data, rows, 0.85)).document["findings"][0]
-    names = {first["pattern"], *first["not_told_from"]}
+    names = {first["pattern"], *first["indistinguishable_from"]}
     assert {"all: setup riser", "all: plane upper plane"} <= names
 
 
@@ -178,7 +178,7 @@ def test_two_structures_are_both_named():
     data = campaign(47, layout="paper")[0]
     twice = softened(softened(data, directions(data) == "Z", 0.7), data.setup == "riser", 1.25)
     found = quick(twice)
-    named = {name for one in found.document["findings"] for name in (one["pattern"], *one["not_told_from"])}
+    named = {name for one in found.document["findings"] for name in (one["pattern"], *one["indistinguishable_from"])}
     assert len(found.document["findings"]) >= 2
     # Z lies along the tool and the riser carries the upper plane: other names of the same.
     assert named & {"Z: everywhere", "all: along_tool"}
@@ -188,8 +188,8 @@ def test_two_structures_are_both_named():
 def test_a_wild_reading_is_named_and_makes_no_pattern():
     data = campaign(48)[0]
     found = quick(softened(data, np.arange(len(data)) == 100, 0.6))
-    assert found.document["far_off"][0]["line"] == data.line[100]
-    assert found.document["far_off"][0]["standard_deviations"] < -10.0
+    assert found.document["outliers"][0]["line"] == data.line[100]
+    assert found.document["outliers"][0]["standard_deviations"] < -10.0
     assert found.document["findings"] == quick(data).document["findings"]
 
 
@@ -221,7 +221,9 @@ def test_the_order_of_files_is_kept_and_a_file_that_is_off_is_named(tmp_path):
     found = quick(read_measurements([str(file) for file in files], nist())).document
     assert found["data"] == [str(file) for file in files]
     first = found["findings"][0]
-    assert any("second.csv" in name or "first.csv" in name for name in (first["pattern"], *first["not_told_from"]))
+    assert any(
+        "second.csv" in name or "first.csv" in name for name in (first["pattern"], *first["indistinguishable_from"])
+    )
 
 
 def test_the_same_seed_gives_the_same_answer():

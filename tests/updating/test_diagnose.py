@@ -96,7 +96,7 @@ def test_candidates_come_best_first_with_values_in_their_intervals(verdict):
             value = math.inf if given["value"] is None else given["value"]
             assert low <= ends[0] <= value <= ends[1] <= high or math.isclose(value, ends[0], rel_tol=1e-4)
             assert given["unit"] == known[key].unit
-        if entry["offered"]:
+        if entry["eligible"]:
             assert entry["mean_abs_error_percent"] > 0.0 and entry["held_out_error_percent"] > 0.0
 
 

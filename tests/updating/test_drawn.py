@@ -52,7 +52,7 @@ def among_few(data, file):
 @pytest.fixture(scope="module")
 def described(tmp_path_factory):
     """Judged by the readings that it was drawn from alone."""
-    file = drawn_file(tmp_path_factory.mktemp("drawn"), slice(None))
+    file = drawn_file(tmp_path_factory.mktemp("draft_status"), slice(None))
     return diagnose(nist(), DATA, effect_files=[file]), file
 
 
@@ -62,7 +62,7 @@ def test_the_readings_that_it_was_drawn_from_only_describe(described):
     assert found.main.drawn.seen == len(DATA) and found.main.drawn.new == 0
     assert found.next_measurements and "between" in found.next_measurements[0]["why"]
     back = document(found)
-    assert back["drawn"] == {
+    assert back["draft_status"] == {
         "effects": ["saddle"], "readings_seen": len(DATA), "readings_new": 0, "gain": None, "rival": "",
         "confirmed": False,
     }  # fmt: skip

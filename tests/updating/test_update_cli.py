@@ -91,7 +91,7 @@ def test_table_1_bears_no_effect(tmp_path, capsys):
     assert main(["update", "nist-table1", "--auto", "--strut-law", "--no-plots", "--out", str(tmp_path)]) == 0
     told = json.loads((tmp_path / "update.json").read_text())
     assert told["steps"][-1]["effects"] == []
-    assert {one["effect"] for one in told["turned_down"]} >= {"joint_moment_stiffness"}
+    assert {one["effect"] for one in told["rejected"]} >= {"joint_moment_stiffness"}
 
 
 def test_the_papers_own_estimation_with_its_figure_3(tmp_path, capsys):
@@ -114,7 +114,7 @@ def test_the_papers_own_estimation_with_its_figure_3(tmp_path, capsys):
         (("--strut-law", "--objective", "mean-error", "--auto"), "mean-error"),
         (("--objective", "mean-error"), "--strut-law"),
         (("--add", "weak_strutt"), "weak_strut"),
-        (("--auto", "--seed", "-1"), "--seed -1"),
+        (("--auto", "--seed", "-1"), "seed -1"),
     ],
 )
 def test_wrong_arguments(arguments, words, tmp_path, capsys):

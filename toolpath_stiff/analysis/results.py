@@ -27,6 +27,7 @@ from toolpath_stiff.analysis.statistics import (
 )
 from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.errors import ProgramError, UnreachableError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Moves, Program
 from toolpath_stiff.path import Samples, place, sample_moves
@@ -217,9 +218,9 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     if not bad.any() or (partial and not bad[samples.cutting].all()):
         return
     first = int(np.argmax(bad))
-    hint = "place the work elsewhere with --origin, or keep the reachable part with --partial"
+    hint = f"place the work elsewhere with {both_names('--origin')}, or keep the reachable part with --partial"
     if partial:
-        hint = "place the work elsewhere with --origin"
+        hint = f"place the work elsewhere with {both_names('--origin')}"
     if _words_turn_the_platform(analysis.program):
         hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"
     raise UnreachableError(
@@ -250,7 +251,10 @@ def assumptions(analysis: Analysis) -> list[str]:
         " A{:g} B{:g} C{:g}".format(*(deg_from_rad(v) for v in angles)) if any(angles) else ""
     )
     if analysis.origin_source == "default":
-        found.append(f"program zero (G54) sits at {where} in machine coordinates: the machine's default (--origin)")
+        found.append(
+            f"program zero (G54) sits at {where} in machine coordinates, the machine's default; "
+            f"{both_names('--origin')} puts it elsewhere"
+        )
     for quantity, origin in machine.origins.items():
         if origin != "published":
             remark = machine.remarks.get(quantity)

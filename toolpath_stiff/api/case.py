@@ -49,7 +49,7 @@ Found = TypeVar("Found", bound=FolderResult)
 
 
 class Case(History):
-    """A folder that holds a machine, measurements, a program, and every step that was done with them.
+    r"""A folder that holds a machine, measurements, a program, and every step that was done with them.
 
     Attributes
     ----------
@@ -60,15 +60,21 @@ class Case(History):
 
     Examples
     --------
-    >>> import tempfile
+    >>> import pathlib, tempfile
     >>> import toolpath_stiff as tps
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     case = tps.Case.open(folder)
     ...     case.start_exercise(seed=9006)
     ...     case.set_aside("data/measurements.csv", 5)
     ...     _ = case.undo()
-    ...     [step.kind for step in tps.Case.open(folder).history]
-    ['machine', 'exercise']
+    ...     [step.kind for step in tps.Case.open(folder).history], [step.kind for step in case.undone]
+    ...     _ = case.redo()
+    ...     _ = pathlib.Path(case.path("plan.csv")).write_text("x_mm,y_mm,z_mm,dx,dy,dz\n0,0,900,1,0,0\n")
+    ...     case.measure(case.path("plan.csv"))
+    ...     case.check_files()  # raises InputError for a file that is gone or was changed
+    ...     case.state.data, case.claim("weak_strut")["verdict"], case.next_result("compare")
+    (['machine', 'exercise'], ['aside'])
+    (('data/measurements.csv', 'data/measured.csv'), 'right', 'results/006-compare')
     """
 
     def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
@@ -90,6 +96,16 @@ class Case(History):
         ------
         InputError
             case.toml is no case, a file of the case is missing or was changed by another program.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     _ = tps.Case.open(folder, "genhexkins")  # begins it
+        ...     case = tps.Case.open(folder)
+        ...     case.machine, len(case.history)
+        (<Machine genhexkins: 6 struts, no effects>, 1)
         """
         place = Path(folder)
         if (place / CASE_FILE).is_file():
@@ -139,7 +155,18 @@ class Case(History):
     # -- what one does ------------------------------------------------------------------------------------------------
 
     def set_machine(self, machine: str | Path) -> None:
-        """Use another machine: a name or a file, of which the case keeps a copy."""
+        """Use another machine: a name or a file, of which the case keeps a copy.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.set_machine("genhexkins")
+        ...     case.machine.name, case.state.machine
+        ('genhexkins', 'machines/genhexkins.toml')
+        """
         text = machine_bytes(machine)
         name = free_name(self.folder, f"machines/{Path(machine).stem}.toml")
         write_files(self.folder, {name: text})
@@ -151,7 +178,19 @@ class Case(History):
         self.record("machine", f"machine {Path(machine).name}", change={"machine": name, "on": {}}, files=[name])
 
     def add_effects(self, file: str | Path) -> None:
-        """Use a Python file with effects of one's own. Its code is run."""
+        """Use a Python file with effects of one's own. Its code is run.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.add_effects(tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py")))
+        ...     case.change_effects("effects/my_screw.py", pathlib.Path(folder, "my_screw.py"))
+        ...     case.state.effects
+        ('effects/my_screw-2.py',)
+        """
         name = copied(self.folder, file, "effects")
         self._take_effects(name, "", f"own effects of {Path(file).name}", f"case.add_effects({str(file)!r})")
 
@@ -180,7 +219,18 @@ class Case(History):
         self.record("effects", text, change=change, files=[new], command=command, python=python)
 
     def add_data(self, *files: str | Path) -> None:
-        """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used."""
+        """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.add_data("nist-table1")
+        ...     case.data_files, len(case.data.to_frame()), case.question("compare").split()[:2]
+        (('data/nist-table1.csv',), 42, ['tps', 'compare'])
+        """
         names = [copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files]
         after = (*self.state.data, *names)
         try:
@@ -226,6 +276,16 @@ class Case(History):
         """Switch an effect on with these values (keys as in a machine file), or off with None.
 
         Raises `InputError` for an effect that is unknown or in the machine, and for values that it cannot have.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.switch("weak_strut", {"strut": 4, "factor": 0.8})
+        ...     case.state.on
+        {'weak_strut': {'strut': 4, 'factor': 0.8}}
         """
         self._check_effect(effect, values or {}, values is not None)
         on = {name: dict(keys) for name, keys in self.state.on.items() if name != effect}
@@ -240,9 +300,20 @@ class Case(History):
         )
 
     def accept(self, file: str | Path) -> None:
-        """Go on with the machine file that an update of this case wrote."""
+        """Go on with the machine file that an update of this case wrote.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.accept(tps.Machine.load("nist").save(pathlib.Path(folder, "fitted.toml")))
+        ...     case.state.machine
+        'machines/nist-updated.toml'
+        """
         name = free_name(self.folder, f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
-        write_files(self.folder, {name: Path(file).read_bytes()})
+        write_files(self.folder, {name: read_bytes(file, "the machine file")})
         command = next((step.command for step in reversed(self.history) if step.kind == "update"), "")
         self.record(
             "accept",
@@ -254,7 +325,23 @@ class Case(History):
         )
 
     def add_program(self, file: str | Path) -> None:
-        """Use an NC program or cutter-location file."""
+        r"""Use an NC program or cutter-location file.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     file = pathlib.Path(folder, "slot.nc")
+        ...     _ = file.write_text("G21 G90\nG1 X40 F300\nM2\n")
+        ...     case.add_program(file)
+        ...     case.place_at((0, 0, 850))
+        ...     case.require(50000)
+        ...     found = case.analyze()
+        ...     case.program, found.complete, case.latest("analyze"), case.history[-1].command[:30]
+        (<Program slot.nc>, True, 'results/005-analyze', 'tps analyze programs/slot.nc -')
+        """
         name = copied(self.folder, file, "programs")
         try:
             Program.read(self.path(name)).moves()

@@ -28,7 +28,26 @@ COSTS = ("reading", "pose", "tool", "setup", "indicator")
 
 
 class Reduction(Result):
-    """Raw records of force and displacement as measured stiffnesses, and what each loop says of play and friction."""
+    """Raw records of force and displacement as measured stiffnesses, and what each loop says of play and friction.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> rows = ["x_mm,y_mm,z_mm,direction,jog_um,force_N,displacement_um"]
+    >>> rows += [f"0,0,800,X,{jog},{40 * jog},{0.2 * jog}" for jog in (0, 200, -200, 0)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder, "raw.csv")
+    ...     _ = file.write_text(chr(10).join(rows))
+    ...     found = tps.reduce(file)
+    ...     names = [one.name for one in found.save(pathlib.Path(folder, "measurements.csv"), plots=False)]
+    >>> names == [one.name for one in found.files("measurements.csv", plots=False)]
+    True
+    >>> found.to_dict()["loops"][0]["stiffness_N_per_mm"], found.notes
+    (50000.0, [])
+    >>> type(found.plot()).__name__
+    'Figure'
+    """
 
     command: ClassVar[str] = "reduce"
 
@@ -118,6 +137,29 @@ class Update(FolderResult):
     ----------
     correction
         Steps and fits, with arrays in SI.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> found = tps.update("nist", "nist-table1", strut_law=True, noise_percent=5)
+    >>> found
+    <Update: updated, mean error 9.62 to 9.67 %>
+    >>> found.accepted, found.to_dict()["objective"]
+    (True, 'likelihood')
+    >>> found.to_frame()["mean_abs_error_percent"].round(2).tolist()
+    [9.62, 9.67]
+    >>> print(found.machine_text().splitlines()[0][:24])
+    # Machine nist, updated.
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = found.save_machine(pathlib.Path(folder, "mine.toml"))
+    ...     tps.Machine.load(file).name == found.machine.name
+    True
+    >>> print(found.next[0])
+    what is left:
+    tps compare nist-table1 --machine machine.toml --noise 5
+    >>> list(found.files(plots=False)), type(found.plot()).__name__
+    (['update.json', 'residuals.csv', 'machine.toml'], 'Figure')
     """
 
     command: ClassVar[str] = "update"
@@ -376,8 +418,12 @@ def plan(
     --------
     >>> import toolpath_stiff as tps
     >>> found = tps.plan("nist", between=("spindle_compliance", "none"), n=2)
-    >>> len(found.to_dict()["visits"])
-    2
+    >>> found
+    <Plan: rivals, 2 clampings>
+    >>> len(found.to_dict()["visits"]), found.to_frame().columns.tolist()[:6]
+    (2, ['x_mm', 'y_mm', 'z_mm', 'a_deg', 'b_deg', 'c_deg'])
+    >>> list(found.files(plots=False))
+    ['plan.csv', 'plan.json', 'plan_tables.npz']
     """
     from toolpath_stiff.updating.planning import plan as plan_visits
     from toolpath_stiff.updating.planning.visits import Costs

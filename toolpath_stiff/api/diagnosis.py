@@ -59,6 +59,12 @@ class Measurements:
         ------
         InputError, InputErrors
             A file cannot be read, or has not the right columns; every bad row.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.Measurements.read("nist-table1")
+        <Measurements nist-table1>
         """
         found = cls([str(file) for file in files])
         found.on(Machine.load())
@@ -68,6 +74,13 @@ class Measurements:
         """The readings as arrays in SI, checked against a machine.
 
         Raises `InputError` or `InputErrors`, for poses that the machine cannot have too.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> readings = tps.Measurements.read("nist-table1").on(tps.Machine.load("nist"))
+        >>> len(readings), readings.position.shape
+        (42, (42, 3))
         """
         from toolpath_stiff.updating.measurements import read_measurements
 
@@ -77,7 +90,14 @@ class Measurements:
         return self._last[1]
 
     def to_frame(self, machine: Machine | str | Path = MACHINE) -> pd.DataFrame:
-        """One row a reading: file, line, point, pose, direction, measured stiffness, force."""
+        """One row a reading: file, line, point, pose, direction, measured stiffness, force.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.Measurements.read("nist-table1").to_frame()[["point", "dx", "stiffness_N_per_mm"]].values.tolist()[0]
+        ['P1', 1.0, 56813.0]
+        """
         import pandas as pd
 
         from toolpath_stiff.updating.measurements import reading_columns
@@ -116,7 +136,7 @@ class Question:
         if not 0.0 <= strut_spread_percent <= LARGEST_SPREAD_PERCENT:
             raise InputError(f"strut spread {strut_spread_percent:g} %", expected=f"0 to {LARGEST_SPREAD_PERCENT:g} %")
         self.strut_spread = strut_spread_percent / 100.0
-        self.seed = whole("--seed", seed, 0)
+        self.seed = whole("seed", seed, 0)
         self.files = self.data.files if self.data else ()
         self.asked = Asked(self.files, self.on.asked, self.on.effect_files, self.noise, self.strut_spread)
         self.inputs = (*self.files, *self.on.inputs)
@@ -156,6 +176,17 @@ class Comparison(FolderResult):
     ----------
     compared
         Residuals and scatter as arrays in SI.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.compare("nist", "nist-table1", noise_percent=5)
+    >>> round(found.to_dict()["baseline"]["mean_abs_error_percent"], 2)
+    9.62
+    >>> found.to_frame()[["direction", "measured_N_per_mm", "modelled_N_per_mm"]].shape
+    (42, 3)
+    >>> list(found.files(plots=False)), type(found.plot()).__name__
+    (['compare.json', 'residuals.csv'], 'Figure')
     """
 
     command: ClassVar[str] = "compare"
@@ -239,7 +270,17 @@ def compare(
 
 
 class Preview:
-    """The error at every reading with effects of any size, at once: what a slider moves; `preview` makes one."""
+    """The error at every reading with effects of any size, at once: what a slider moves; `preview` makes one.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> hand = tps.preview("nist", "nist-table1", noise_percent=5)
+    >>> sorted(hand.at({}))
+    ['bias_percent', 'deviation_percent', 'mean_abs_error_percent', 'modelled_N_per_mm', 'rms_percent']
+    >>> hand.machine({"weak_strut": {"strut": 4, "factor": 0.8}})
+    <Machine nist: 6 struts, weak_strut>
+    """
 
     def __init__(self, asked: Question) -> None:
         from toolpath_stiff.updating.comparison import ByHand
@@ -430,9 +471,13 @@ def diagnose(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> found = tps.diagnose("nist", "nist-table1", noise_percent=10)
-    >>> found.verdict
-    'ambiguous'
+    >>> found = tps.diagnose("nist", "nist-table1", noise_percent=20)
+    >>> found.verdict, found.plausible[:2], found.best
+    ('adequate', ['none', 'joint_moment_stiffness'], 'joint_moment_stiffness')
+    >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
+    (12, 3)
+    >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
+    (['diagnose.json', 'residuals.csv'], 6)
     """
     from toolpath_stiff.placement.case_study import case_study_program
     from toolpath_stiff.updating.diagnosis import diagnose as diagnose_readings

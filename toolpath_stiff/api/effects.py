@@ -29,6 +29,17 @@ class EffectCatalogue(Result):
         The effects themselves.
     broken
         Plug-ins that do not load -> why.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> catalogue = tps.effects()
+    >>> catalogue["weak_strut"].link, catalogue.broken
+    ('struts', {})
+    >>> catalogue.to_frame().columns.tolist()
+    ['link', 'name', 'title', 'equation', 'source', 'load_dependent']
+    >>> len(catalogue.to_dict()["effects"]) == len(catalogue.effects)
+    True
     """
 
     command: ClassVar[str] = "effects"
@@ -82,7 +93,20 @@ def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
 
 
 class EffectCheck(Result):
-    """Effects of a file tried against the contract: shapes, symmetry, units, neutral value, speed."""
+    """Effects of a file tried against the contract: shapes, symmetry, units, neutral value, speed.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py"))
+    ...     found = tps.check_effects(file)
+    >>> found.passed, found.to_dict()["effects"][0]["effect"]
+    (True, 'my_screw')
+    >>> found.to_frame()[["effect", "passed"]].values.tolist()[0]
+    ['my_screw', True]
+    """
 
     command: ClassVar[str] = "effects"
 
@@ -152,6 +176,18 @@ class EffectFile(Result):
     ----------
     name, text
         The effect's name; the file.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> template = tps.effect_template("my_screw")
+    >>> template.to_dict()["effect"], template.text == str(template)
+    ('my_screw', True)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = template.save(pathlib.Path(folder, "my_screw.py"))
+    ...     tps.effects([file])["my_screw"].link
+    'struts'
     """
 
     command: ClassVar[str] = "effects"
@@ -275,8 +311,11 @@ def draft_effect(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> tps.draft_effect("nist", "nist-table1", noise_percent=20).reason
+    >>> found = tps.draft_effect("nist", "nist-table1", noise_percent=20)
+    >>> found.reason
     'Nothing is missing that these data could show: there is nothing to describe.'
+    >>> found.to_dict()["effect"] is None, found.text  # `found.save(FILE)` raises InputError then
+    (True, '')
     """
     from toolpath_stiff.stiffness.effects import known_effects
     from toolpath_stiff.updating.diagnosis import diagnose

@@ -92,6 +92,8 @@ class Program:
     <Program slot.nc: 5 lines>
     >>> len(program.to_frame())
     3
+    >>> program.lines[1], program.inputs, program.read_as["block_delete"]
+    ('G0 X0 Y0 Z5', (), False)
     """
 
     name: str
@@ -118,7 +120,7 @@ class Program:
         subprograms: str | Path | None = None,
         unconfined: bool = False,
     ) -> Program:
-        """A program in a file.
+        r"""A program in a file.
 
         Parameters
         ----------
@@ -148,6 +150,19 @@ class Program:
         ------
         InputError
             A file cannot be read, or says what cannot be.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = pathlib.Path(folder, "slot.nc")
+        ...     _ = file.write_text("G21 G90\nG0 Z5\n/ G0 X90\nG1 X40 F300\nM2\n")
+        ...     program = tps.Program.read(file, dialect="fanuc", block_delete=True)
+        ...     len(program.to_frame())
+        2
+        >>> program.words
+        ['--dialect', 'fanuc', '--block-delete']
         """
         from toolpath_stiff.nc.words import read_lines
 
@@ -169,7 +184,14 @@ class Program:
 
     @classmethod
     def from_text(cls, text: str, name: str = "program", **reading: Unpack[Reading]) -> Program:
-        """A program given as text; further arguments as of `read`."""
+        r"""A program given as text; further arguments as of `read`.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.Program.from_text("G1 X40 F300\nM2", name="slot.nc", dialect="linuxcnc")
+        <Program slot.nc: 2 lines>
+        """
         said = _said(**reading)
         return cls(name, None, *_control(said, reading.get("block_delete", False)), text, said)
 
@@ -202,9 +224,16 @@ class Program:
         return tuple(one for one in (self.file, *beside) if one)
 
     def moves(self, origin: Pose | None = None, default_origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) -> ReadProgram:
-        """The program read for a zero, SI: as asked for, and unless anyone says; the last one is kept.
+        r"""The program read for a zero, SI: as asked for, and unless anyone says; the last one is kept.
 
         Raises `InputError` with file, line and column for what cannot be read.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> read = tps.Program.from_text("G21 G90\nG1 X40 F300\nM2", name="slot.nc").moves()
+        >>> len(read.moves), read.unsupported
+        (1, ())
         """
         from toolpath_stiff.nc import parse_program, read_program
 
@@ -226,7 +255,15 @@ class Program:
         return found
 
     def to_frame(self) -> pd.DataFrame:
-        """The moves, one a row: line, motion, tool, start and end in program coordinates of G54, feed."""
+        r"""The moves, one a row: line, motion, tool, start and end in program coordinates of G54, feed.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+        >>> slot.to_frame()[["line", "motion"]].values.tolist()
+        [[2, 'rapid'], [3, 'feed'], [4, 'feed']]
+        """
         import pandas as pd
 
         from toolpath_stiff.nc.moves import move_columns

@@ -52,6 +52,14 @@ class Machine:
     <Machine nist: 6 struts, no effects>
     >>> machine.strut_lengths_mm((0, 0, 800)).round(1).tolist()
     [2884.7, 2869.9, 2884.7, 2869.9, 2884.7, 2869.9]
+    >>> machine.name, machine.title, machine.source[:24]
+    ('nist', 'NIST Ingersoll Octahedral Hexapod', 'Clinton, Zhang, Wavering')
+    >>> machine.effects, machine.setups, machine.inputs
+    ([], [], ('nist',))
+    >>> machine.origin_mm_deg
+    (0.0, 0.0, 800.0, 0.0, 0.0, 0.0)
+    >>> [round(value) for value in machine.joints_mm["frame"][0]], machine.joints_mm["tool"]
+    ([1207, 2091, 3013], 150.0)
     """
 
     model: StiffnessModel
@@ -86,6 +94,12 @@ class Machine:
         ------
         InputError
             There is no such machine, the file is wrong, an effect is unknown, or no effect knows the set-up.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.Machine.load("nist", temperature_C=22)
+        <Machine nist: 6 struts, no effects>
         """
         from toolpath_stiff.machine import load_machine
         from toolpath_stiff.stiffness.model import build_model
@@ -100,6 +114,13 @@ class Machine:
         """The same machine under a set-up and a temperature, as of `load`; None: as the files say.
 
         Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> machine.under(temperature_C=22).running().conditions.temperature
+        22
         """
         low, high = TEMPERATURES_C
         if temperature_C is not None and not low <= temperature_C <= high:
@@ -166,6 +187,13 @@ class Machine:
         """The model under what it runs under: what `load` was told, then a program's controller file, then its own.
 
         `beside` are machines that the same is said of. Raises `InputError` for a set-up that none of them knows.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> machine.running().machine.name, machine.running().conditions.setup
+        ('nist', None)
         """
         from toolpath_stiff.stiffness.effects.contract import Conditions
         from toolpath_stiff.stiffness.model import NO_SETUP, check_setup
@@ -183,7 +211,15 @@ class Machine:
         return replace(model, conditions=conditions)
 
     def like(self, machine: str | Path) -> Machine:
-        """Another machine with the same effect files, set-up and temperature."""
+        """Another machine with the same effect files, set-up and temperature.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> machine.like("genhexkins").name
+        'genhexkins'
+        """
         from toolpath_stiff.machine import load_machine
         from toolpath_stiff.stiffness.model import build_model
 
@@ -199,11 +235,26 @@ class Machine:
         """(6,) lengths of the struts between their joint centres at a pose (inverse kinematics).
 
         `pose_mm_deg` is X, Y, Z or X, Y, Z, A, B, C of the tool tip; the reference tool is in the spindle.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> machine.strut_lengths_mm((100, 0, 800, 0, 10, 0)).round(1).tolist()
+        [2874.1, 2822.0, 2976.3, 2940.1, 2827.7, 2873.1]
         """
         return mm_from_m(self.standing(pose_mm_deg)[1].lengths[0])
 
     def to_frame(self) -> pd.DataFrame:
-        """Its figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark."""
+        """Its figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> machine.to_frame()[["quantity", "unit", "origin"]].values.tolist()[-1]
+        ['rapid feed', 'mm/min', 'assumed']
+        """
         import pandas as pd
 
         from toolpath_stiff.report.machine import figure_entries
@@ -211,13 +262,30 @@ class Machine:
         return pd.DataFrame(figure_entries(self.model.machine))
 
     def plot(self, pose_mm_deg: Sequence[float] | None = None) -> Figure:
-        """The machine at a pose, from three sides."""
+        """The machine at a pose, from three sides.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> type(machine.plot((0, 0, 800))).__name__
+        'Figure'
+        """
         from toolpath_stiff.report.machine import machine_picture
 
         return machine_picture.figure(self.model.machine, *self.standing(pose_mm_deg)[:2])
 
     def standing(self, pose_mm_deg: Sequence[float] | None = None) -> tuple[FloatArray, Struts, Reach]:
-        """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), struts and reach there."""
+        """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), struts and reach there.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> pose, struts, reach = machine.standing((0, 0, 800))
+        >>> pose.tolist(), struts.lengths.shape, bool(reach.reachable[0])
+        ([0.0, 0.0, 0.8, 0.0, 0.0, 0.0], (1, 6), True)
+        """
         import numpy as np
 
         from toolpath_stiff.machine import reach, solve_struts
@@ -274,7 +342,15 @@ class Machine:
         return machine_picture(self.model.machine, *self.standing(pose_mm_deg)[:2])
 
     def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
-        """Its figures with their origin, and how far the limits are at a pose."""
+        """Its figures with their origin, and how far the limits are at a pose.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> print(machine.text().splitlines()[0])
+        NIST Ingersoll Octahedral Hexapod
+        """
         from toolpath_stiff.report.machine import text
 
         return text(self.model.machine, self.standing(pose_mm_deg)[2])
@@ -283,11 +359,29 @@ class Machine:
         return self.text()
 
     def check(self) -> MachineCheck:
-        """Look for slips in the figures: units, signs, mirrored joints; what its effects lack."""
+        """Look for slips in the figures: units, signs, mirrored joints; what its effects lack.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist")
+        >>> machine.check()
+        <MachineCheck: nist, 0 wrong, 0 doubtful>
+        """
         return check_machine(self)
 
     def save(self, file: str | Path) -> Path:
-        """Write the machine file, effects included, whole or not at all."""
+        """Write the machine file, effects included, whole or not at all.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = tps.Machine.load("nist").save(pathlib.Path(folder, "copy.toml"))
+        ...     tps.Machine.load(file).name
+        'nist'
+        """
         from toolpath_stiff.files import write_atomically
         from toolpath_stiff.machine import machine_toml
 
@@ -320,6 +414,15 @@ class MachineCheck(Result):
     ----------
     found
         What cannot be right, what is doubtful, the machine at its neutral pose and default origin.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.Machine.load("nist").check()
+    >>> found.good, found.to_dict()["wrong"], found.warnings, len(found.to_frame())
+    (True, [], [], 0)
+    >>> type(found.plot()).__name__
+    'Figure'
     """
 
     command: ClassVar[str] = "machine"
@@ -421,6 +524,18 @@ class MachineFile(Result):
     ----------
     name, text, notes
         The machine's name; the file; what was assumed in making it.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> template = tps.machine_template("mill.toml")
+    >>> template.name, template.to_dict()["notes"]
+    ('mill', [])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = template.save(pathlib.Path(folder, "mill.toml"))
+    ...     tps.Machine.load(file)
+    <Machine mill: 6 struts, no effects>
     """
 
     command: ClassVar[str] = "machine"

@@ -177,10 +177,17 @@ def analyze_many(
     >>> slot = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2"
     >>> parts = [tps.Program.from_text(slot, name="slot.nc"), tps.Program.from_text("G1 X10 F", name="bad.nc")]
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     found = tps.analyze_many("nist", parts, folder, jobs=1, plots=False)
-    >>> found
-    <ManyAnalyses: 2 programs, 1 failed>
-    >>> [one.status for one in found.outcomes]
+    ...     found = tps.analyze_many("nist", parts, folder, jobs=1, plots=False, require_N_per_mm=60000)
+    ...     programs = [entry["program"] for entry in found.to_dict()]
+    ...     "".join(found.json_pieces()) == found.to_json()
+    True
+    >>> found, programs
+    (<ManyAnalyses: 2 programs, 1 failed>, ['slot.nc', 'bad.nc'])
+    >>> [one.status for one in found.outcomes], found.complete
+    (['done', 'failed'], False)
+    >>> [one.name for one in found.failed], [one.name for one in found.below_required]
+    (['bad.nc'], ['slot.nc'])
+    >>> found.to_frame()["status"].tolist()
     ['done', 'failed']
     """
     on = machine_from(machine)

@@ -87,8 +87,14 @@ def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ())
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     _ = tps.plan("nist", between=("spindle_compliance", "none"), n=2).save(folder, plots=False)
     ...     found = tps.next_visit(folder)
+    ...     [file.name for file in found.save()]
+    ['next_1.csv']
     >>> found
     <NextVisit: 0 readings, open>
+    >>> found.probability, found.settled
+    ({'spindle_compliance': 0.5, 'none': 0.5}, False)
+    >>> len(found.to_frame()) == len(found.to_dict()["rows"])
+    True
     """
     from toolpath_stiff.updating.planning.next_visit import next_visit as choose_next
 

@@ -23,6 +23,7 @@ from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, 
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
 
 if TYPE_CHECKING:
@@ -47,7 +48,14 @@ Range = tuple[float, float] | float
 
 @dataclass(frozen=True)
 class KeepOut:
-    """A box that the tool tip stays out of, rapids included: its name, two corners in machine coordinates, mm."""
+    """A box that the tool tip stays out of, rapids included: its name, two corners in machine coordinates, mm.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> tps.KeepOut("vice", (-100, -50, 600), (100, 50, 700)).high_mm
+    (100, 50, 700)
+    """
 
     name: str
     low_mm: tuple[float, float, float]
@@ -55,12 +63,28 @@ class KeepOut:
 
 
 class Placement(FolderResult):
-    """A program at the placement that was chosen for it, and the others of the front.
+    r"""A program at the placement that was chosen for it, and the others of the front.
 
     Attributes
     ----------
     placed
         The search, the analyses before and at the chosen placement, in SI.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> found = tps.place("nist", slot, x_mm=0, y_mm=0, z_mm=800, rotate_deg=0, step_mm=10, points=2, write="new.nc")
+    >>> found
+    <Placement: slot.nc, X0 Y0 Z800 A0 B0 C0 of 1 placements>
+    >>> found.origin_mm_deg, found.worse, found.warnings
+    ((0.0, 0.0, 800.0, 0.0, 0.0, 0.0), [], [])
+    >>> print(found.program_bytes.decode().splitlines()[1])
+    G0 X0 Y0 Z5
+    >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
+    (1, ['placements.csv', 'placement.json'], 'balanced')
+    >>> type(found.plot()).__name__
+    'Figure'
     """
 
     command: ClassVar[str] = "place"
@@ -298,7 +322,7 @@ def _earlier(earlier: Placement | str | Path | Mapping[str, Any] | None) -> dict
     if not file.exists():
         raise InputError(
             f"--pick: there is no earlier search in {file.parent} (no {file.name})",
-            hint="search first, without --pick, or name the search's folder with --out",
+            hint=f"search first, without --pick, or name the search's folder with {both_names('--out')}",
         )
     try:
         found = json.loads(read_text(file, "the earlier search"))
@@ -344,7 +368,18 @@ def _pair(given: Range) -> tuple[float, float]:
 
 
 class PlacementTrial:
-    """A program that can be put anywhere, with the figures of every place at once; `try_placement` makes one."""
+    r"""A program that can be put anywhere, with the figures of every place at once; `try_placement` makes one.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> trial = tps.try_placement("nist", slot, step_mm=10)
+    >>> trial.samples, list(trial.at((0, 0, 800)))
+    (7, ['mean_N_per_mm', 'range_N_per_mm', 'min_N_per_mm', 'margin', 'rapid_margin'])
+    >>> trial.at((0, 0, 5000))["mean_N_per_mm"] is None  # out of reach
+    True
+    """
 
     def __init__(self, model: StiffnessModel, program: ReadProgram, path: WorkPath, load: Load, force: float) -> None:
         from toolpath_stiff.placement.evaluator import Evaluator
@@ -398,12 +433,24 @@ def try_placement(
 
 
 class RewrittenProgram(Result):
-    """A program written for another placement.
+    r"""A program written for another placement.
 
     Attributes
     ----------
     name, content, notes
         The program's name, the new file's bytes, what the user should hear of.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> moved = tps.rewrite(slot, to_mm_deg=(10, 0, 0))
+    >>> moved.content.splitlines()[3], moved.to_dict()["notes"]
+    (b'G1 X50', [])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     moved.save(pathlib.Path(folder, "moved.nc")).name
+    'moved.nc'
     """
 
     command: ClassVar[str] = "place"

@@ -31,7 +31,23 @@ MOST_POINTS = 2001  # along a side of a map
 
 
 class PoseStiffness(Result):
-    """Stiffness at poses: along X, Y, Z, in the softest and the stiffest direction, with strut lengths and margins."""
+    """Stiffness at poses: along X, Y, Z, in the softest and the stiffest direction, with strut lengths and margins.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.pose("nist", [(0, 0, 800), (0, 0, 5000)])
+    >>> found
+    <PoseStiffness: 2 poses of nist, 1 within reach>
+    >>> found.reachable.tolist(), found.warnings
+    ([True, False], [])
+    >>> found.out_of_reach(3)
+    ['row 2: out of reach: frame joint2 angle needs 97.97 deg, limit 30.00 deg, 67.97 deg beyond']
+    >>> found.to_frame()["kz_N_per_mm"].round().tolist()
+    [123723.0, nan]
+    >>> found.csv().splitlines()[0][:30]
+    'x_mm,y_mm,z_mm,a_deg,b_deg,c_d'
+    """
 
     command: ClassVar[str] = "pose"
 
@@ -95,7 +111,7 @@ class PoseStiffness(Result):
 
 
 def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
-    """Poses (n, 6) in mm and degrees from a table (CSV, or FILE.xlsx[#SHEET]), and what is to be said of the reading.
+    r"""Poses (n, 6) in mm and degrees from a table (CSV, or FILE.xlsx[#SHEET]), and what is to be said of the reading.
 
     Columns x_mm, y_mm, z_mm and, if there, a_deg, b_deg, c_deg.
 
@@ -103,6 +119,17 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
     ------
     InputError, InputErrors
         A column is missing, there is no row; every cell that is no number within reason.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder, "poses.csv")
+    ...     _ = file.write_text("x_mm,y_mm,z_mm,a_deg\n0,0,800,0\n100,0,800,10\n")
+    ...     poses, notes = tps.read_poses(file)
+    >>> poses.shape, poses[1].tolist(), notes
+    ((2, 6), [100.0, 0.0, 800.0, 10.0, 0.0, 0.0], ())
     """
     import numpy as np
 
@@ -217,6 +244,17 @@ class StiffnessMap(FolderResult):
     ----------
     grid
         The grid and the stiffness on it, arrays in SI.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.map_stiffness("nist", z_mm=(800, 1200), points=5)
+    >>> [plane["z_mm"] for plane in found.to_dict()["slices"]]
+    [800.0, 1200.0]
+    >>> found.to_frame().columns.tolist(), len(found.to_frame())
+    (['x_mm', 'y_mm', 'z_mm', 'stiffness_N_per_mm', 'reachable'], 50)
+    >>> type(found.plot()).__name__
+    'Figure'
     """
 
     command: ClassVar[str] = "map"

@@ -13,6 +13,7 @@ from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, 
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.units import (
     Pose,
     m_from_mm,
@@ -33,7 +34,7 @@ TABLES = ("csv", "parquet")
 
 
 class Analysis(FolderResult):
-    """Stiffness along the path of a program, under a load at every sample of a cut.
+    r"""Stiffness along the path of a program, under a load at every sample of a cut.
 
     Attributes
     ----------
@@ -41,6 +42,26 @@ class Analysis(FolderResult):
         The samples and what was found at each, as arrays in SI.
     on_other
         The same on the machine compared with; None without one.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> found = tps.analyze("nist", slot, origin_mm_deg=(0, 0, 800), require_N_per_mm=54000)
+    >>> [round(one) for one in (found.mean_N_per_mm, found.min_N_per_mm, found.range_N_per_mm)]
+    [54353, 53875, 948]
+    >>> found.weakest["line"], found.weakest["text"]
+    (4, 'G1 X40')
+    >>> [(line, round(stiffness)) for line, stiffness in found.below_required]
+    [(4, 53875)]
+    >>> found.complete, found.warnings, len(found.assumptions) > 0
+    (True, [], True)
+    >>> found.deviation_N_per_mm is None  # the figures of this machine are stated without standard deviations
+    True
+    >>> len(found.to_frame()), len(found.to_dict()["weakest_places"])
+    (53, 1)
+    >>> [type(picture()).__name__ for picture in (found.plot, found.plot_profile)]
+    ['Figure', 'Figure']
     """
 
     command: ClassVar[str] = "analyze"
@@ -270,7 +291,7 @@ def path_options(
 
 
 class SampledPath(Result):
-    """The sampled path of a program, without a machine.
+    r"""The sampled path of a program, without a machine.
 
     Attributes
     ----------
@@ -278,6 +299,22 @@ class SampledPath(Result):
         Arrays in SI.
     name, warnings, unsupported
         The program's; what deserves a look; "line:column: word: reason" of what was not acted upon.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2", name="slot.nc")
+    >>> path = tps.sample_path(slot, step_mm=10)
+    >>> path
+    <SampledPath: slot.nc, 9 samples>
+    >>> path.to_dict()["x_mm"][-2:]
+    [30.0, 40.0]
+    >>> b"".join(path.csv()).decode().splitlines()[0][:26]
+    'line,motion,tool,s_mm,t_s,'
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path.save(pathlib.Path(folder, "path.csv")).name
+    'path.csv'
     """
 
     command: ClassVar[str] = "path"
@@ -363,7 +400,19 @@ def sample_path(
 
 
 class ProgramCheck(Result):
-    """What a program uses, what is not understood, extents, times, and what a machine says to it."""
+    r"""What a program uses, what is not understood, extents, times, and what a machine says to it.
+
+    Examples
+    --------
+    >>> import toolpath_stiff as tps
+    >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
+    >>> found
+    <ProgramCheck: slot.nc, 1 error>
+    >>> found.errors == [one for one in found.findings if one["severity"] == "error"]
+    True
+    >>> found.to_frame()["line"].tolist(), found.to_dict()["complete"]
+    ([3], False)
+    """
 
     command: ClassVar[str] = "check"
 
@@ -443,7 +492,7 @@ def check(
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
     if on is None and strut_speed_mm_per_min is not None:
-        raise InputError("--strut-speed without a machine", hint="name one with --machine")
+        raise InputError(f"{both_names('--strut-speed')} without a machine", hint="name one with --machine")
     speed = None
     if strut_speed_mm_per_min is not None:
         speed = m_per_s_from_mm_per_min(

@@ -31,7 +31,14 @@ class Result(ABC):
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """The result as plain data: the JSON document that the command writes, and prints with --json."""
+        """The result as plain data: the JSON document that the command writes, and prints with --json.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> sorted(tps.machine_template("mill.toml").to_dict())
+        ['machine', 'notes', 'text']
+        """
 
     @abstractmethod
     def __str__(self) -> str:
@@ -49,15 +56,39 @@ class Result(ABC):
         return f"<pre>{html.escape(str(self))}</pre>"
 
     def to_json(self) -> str:
-        """`to_dict()` as text, as the command writes it."""
+        """`to_dict()` as text, as the command writes it.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> print(tps.Machine.load("nist").check().to_json()[:37])
+        {
+          "file": "nist",
+          "machine": "nis
+        """
         return json_text(self.to_dict())
 
     def to_frame(self) -> pd.DataFrame:
-        """The result as a pandas DataFrame, the unit in each column's name."""
+        """The result as a pandas DataFrame, the unit in each column's name.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.effects().to_frame()["link"].tolist()[:3]
+        ['tool', 'platform', 'joints']
+        """
         raise self._cannot("has no table", "use to_dict()")
 
     def plot(self) -> Figure:
-        """The result as a matplotlib figure."""
+        """The result as a matplotlib figure.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> figure = tps.map_stiffness("nist", points=5).plot()
+        >>> type(figure).__name__
+        'Figure'
+        """
         raise self._cannot("has no picture", "print it, or use to_dict()")
 
     def _cannot(self, what: str, hint: str) -> InputError:
@@ -71,7 +102,14 @@ class FolderResult(Result):
 
     @abstractmethod
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content, or what makes it, of every file that `save` writes; pictures and pages with `plots`."""
+        """Name -> content, or what makes it, of every file that `save` writes; pictures and pages with `plots`.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> list(tps.map_stiffness("nist", points=5).files())
+        ['map.csv', 'map.json', 'map.png', 'map.html']
+        """
 
     def save(
         self,
@@ -107,6 +145,15 @@ class FolderResult(Result):
         ------
         InputError
             A file of such a name is not the tool's, or was read for this result, or the folder cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     written = tps.map_stiffness("nist", points=5).save(folder, plots=False)
+        >>> [file.name for file in written]
+        ['map.csv', 'map.json']
         """
         return write_folder(
             folder,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM
-from toolpath_stiff.defaults import LOAD, MACHINE
+from toolpath_stiff.defaults import FORCE, LOAD, MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import ShopPose
 
@@ -128,7 +128,7 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
     group.add_argument(
         "--dialect",
         choices=("generic", "linuxcnc", "fanuc", "haas"),
-        help="how the control reads what others read otherwise: X10 without a decimal point, the time of G4 P, "
+        help="the control, for what controls read differently: X10 without a decimal point, the time of G4 P, "
         "G70 and G71, `;` (default: the controller file's, else generic)",
     )
     group.add_argument(
@@ -148,8 +148,8 @@ def _add_interpreter_options(group: argparse._ArgumentGroup) -> None:
         "--interpreter",
         choices=("builtin", "linuxcnc", "auto"),
         default="builtin",
-        help="who reads the program: ours; LinuxCNC's rs274, which knows cutter compensation; "
-        "auto: the second where the first refuses (default: builtin)",
+        help="what reads the program: the built-in reader; LinuxCNC's rs274; "
+        "auto: rs274 where the built-in reader refuses the program (default: builtin)",
     )
     group.add_argument(
         "--feed",
@@ -182,9 +182,9 @@ def add_machine_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--force",
         type=positive_number("N", 1e6),
-        default=1000.0,
+        default=FORCE,
         metavar="N",
-        help="load at the tool tip, for deflections and load-dependent effects (default: 1000)",
+        help=f"load at the tool tip, for deflections and load-dependent effects (default: {FORCE:g})",
     )
     add_condition_options(group)
 
@@ -195,7 +195,7 @@ def add_condition_options(group: argparse._ActionsContainer) -> None:
         "--setup",
         type=_setup_name,
         metavar="NAME",
-        help="set-up that is on the machine, for effects that belong to one; none: none that has a name "
+        help="set-up that is on the machine, for effects that belong to one; none: a set-up without a name "
         "(default: the controller file's, else the machine file's)",
     )
     group.add_argument(

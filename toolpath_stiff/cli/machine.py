@@ -185,7 +185,7 @@ def machine_arguments(parser: argparse.ArgumentParser) -> None:
     add_replace_option(show)
     show.add_argument("--json", action="store_true", help="print JSON, draw nothing unless --out is given")
     check = actions.add_parser(
-        "check", help="check a machine file for slips, draw it; exit code 1 if it cannot be right"
+        "check", help="check a machine file for mistakes, draw it; exit code 1 if it cannot be right"
     )
     check.add_argument("file", metavar="FILE")
     check.add_argument(
@@ -193,6 +193,7 @@ def machine_arguments(parser: argparse.ArgumentParser) -> None:
     )
     check.add_argument("--out", metavar="FILE.png", help="the picture (default: reports/<file>_machine.png)")
     add_replace_option(check)
+    check.add_argument("--json", action="store_true", help="print JSON, draw nothing unless --out is given")
     new = actions.add_parser("new", help="write a commented template")
     new.add_argument("file", metavar="FILE")
     add_replace_option(new)
@@ -262,10 +263,15 @@ def _machine_check(args: argparse.Namespace) -> int:
         new = command_line("machine", "new", args.file)
         raise InputError(f"cannot read machine file {args.file!r}", hint=f"`{new}` writes a template")
     target = args.out or f"reports/{Path(args.file).stem}_machine.png"
-    replaced = check_written(args, [target])
+    drawn = bool(args.out) or not args.json
+    replaced = check_written(args, [target]) if drawn else []
     found = Machine.load(Path(args.file), effects=args.effects).check()
-    keep(replaced)
-    print(f"{found}\n{written_text([write_atomically(target, found.picture())])}")
+    keep(replaced, quiet=args.json)
+    written = [write_atomically(target, found.picture())] if drawn else []
+    if args.json:
+        sys.stdout.write(found.to_json())
+    else:
+        print(f"{found}\n{written_text(written)}")
     return 0 if found.good else NOT_GOOD
 
 
@@ -344,7 +350,7 @@ def effects_arguments(parser: argparse.ArgumentParser) -> None:
     drafting = actions.add_parser("draft", help="write what a diagnosis leaves unexplained as an effect to edit")
     add_data_arguments(drafting)
     add_noise_arguments(drafting)
-    drafting.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
+    drafting.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random draw (default: 0)")
     drafting.add_argument("-o", "--output", default="missing.py", metavar="FILE.py", help="default: missing.py")
     add_replace_option(drafting)
     add_json_option(drafting, "print the draft as JSON")

@@ -67,7 +67,9 @@ COMMANDS = (
     Command(
         "diagnose", "which physical effect the model lacks, if any: verdict, candidates, confounding", "Measurements"
     ),
-    Command("update", "fit effects to measurements, watch the error fall, write the machine", "Measurements"),
+    Command(
+        "update", "fit effects to measurements, see how far the error falls, write the machine file", "Measurements"
+    ),
     Command("plan", "what to measure next to tell explanations apart, or a first campaign", "Measurements"),
     Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements", "rig"),
     Command("studio", "measure, see where the model fails, add what is missing: a case in the browser", "Studio"),
@@ -81,7 +83,7 @@ examples:
   tps pose 100 -200 800 10 -15 20          stiffness at one pose
   tps machine show nist                    the machine's figures and where they come from
 
-`tps COMMAND --help` tells more. Lengths are in mm, angles in degrees, stiffnesses in N/mm.
+`tps COMMAND --help` describes a command. Lengths are in mm, angles in degrees, stiffnesses in N/mm.
 """
 
 # argparse takes "-10,0,800" or "-300:300" for an option; this matches every value that begins like a negative number.

@@ -44,7 +44,11 @@ def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherw
         "--machine", default=MACHINE, metavar="NAME|FILE", help=f"machine name or file (default: {MACHINE})"
     )
     parser.add_argument(
-        "--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects; they take part"
+        "--effects",
+        action="append",
+        default=[],
+        metavar="FILE.py",
+        help="file with your own physical effects, used as well",
     )
 
 
@@ -69,7 +73,7 @@ def add_output_arguments(
 
     `of` is what the folder is named after.
     """
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random draw (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random draw (default: 0)")
     parser.add_argument("--out", metavar="DIR", help=f"folder (default: reports/<{of}>-{command})")
     add_replace_option(parser, force=force)
     parser.add_argument("--no-plots", action="store_true", help=f"only {kept}")
@@ -266,7 +270,7 @@ def update_arguments(parser: argparse.ArgumentParser) -> None:
     add_data_arguments(parser)
     parser.add_argument(
         "--add", action="append", default=[], metavar="EFFECT[:KEY=VALUE,..]",
-        help="effect to fit; what it acts on is searched unless it is said (weak_strut:strut=3)",
+        help="effect to fit; what it acts on is searched for unless given (weak_strut:strut=3)",
     )  # fmt: skip
     law = parser.add_mutually_exclusive_group()
     law.add_argument("--strut-law", action="store_true", help="write the refitted strut law even without an effect")

@@ -34,7 +34,7 @@ def add_replace_option(parser: argparse.ArgumentParser, *, force: bool = True) -
         *(["--force"] if force else []),
         action="store_true",
         dest="replace",
-        help="write over a file that is there and matters; the old one is kept beside it as NAME.old",
+        help="replace existing files that the tool did not write; the old ones are kept as NAME.old",
     )
 
 

@@ -47,7 +47,7 @@ def _add_bounds(parser: argparse.ArgumentParser) -> None:
         group.add_argument(f"--{axis}", type=range_argument, metavar="LO:HI", help=f"{axis} of program zero, mm")
     heights = group.add_mutually_exclusive_group()
     heights.add_argument("--z", type=range_argument, metavar="LO:HI", help="z of program zero, mm")
-    heights.add_argument("--z-values", type=_heights, metavar="Z,Z,...", help="the only heights there are, mm")
+    heights.add_argument("--z-values", type=_heights, metavar="Z,Z,...", help="the only heights that are available, mm")
     group.add_argument(
         "--rotate", type=range_argument, default=(0.0, 360.0), metavar="LO:HI", help="degrees (default: 0:360)"
     )
@@ -68,7 +68,7 @@ def _add_bounds(parser: argparse.ArgumentParser) -> None:
         type=_percent,
         default=1.0,
         metavar="PERCENT",
-        help="of a limit's span that cuts and rapids keep from it (default: 1)",
+        help="distance that cuts and rapids keep from each limit, in per cent of its span (default: 1)",
     )
     group.add_argument(
         "--allow-extrapolation",
@@ -96,7 +96,7 @@ def place_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         metavar="N",
         help="take point N of the front in --out (number in placements.csv) instead of the recommended one, without "
-        "searching again; the other options as they were",
+        "searching again; leave the other options unchanged",
     )
     parser.add_argument("--points", type=int, default=60, metavar="N", help="most points of the front (default: 60)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the search (default: 1)")
@@ -112,7 +112,9 @@ def place_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_write_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("the program itself, transformed to the recommended placement")
-    group.add_argument("--write", metavar="FILE", help="write it: place at the present origin it cuts as placed")
+    group.add_argument(
+        "--write", metavar="FILE", help="write the program so that, run at the present origin, it cuts at the placement"
+    )
     group.add_argument(
         "--decimals", type=int, metavar="N", help="of its numbers (default: 4 in mm and degrees, 5 in inch)"
     )

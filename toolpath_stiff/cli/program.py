@@ -48,8 +48,8 @@ example:
 
 plunges:
   With the tangential load, cuts along the tool axis (within 5 degrees of it) are left out of mean, range, weakest
-  place, axes and colours: a few short plunges into a stiff direction would rule them all. Their own figures stand
-  beside, and --require holds for them as well.
+  place, axes and colours: a few short plunges into a stiff direction would dominate them all. Their figures
+  are reported separately, and --require applies to them as well.
 
 files written to --out:
   samples.csv   every sample: line, position, stiffness, strut lengths, margin to the nearest limit
@@ -61,7 +61,7 @@ files written to --out:
 several programs, or a folder:
   a folder stands for the programs in it and below it: .nc .ngc .tap .cnc .gcode .gc .eia .mpf .min, and the
   cutter-location files .apt .aptsource .cl .cls .clsf .ncl, in small letters or capitals; hidden files and linked
-  folders are left alone. Each program has the files above in a folder of its own below --out (default: reports), and
+  folders are ignored. Each program has the files above in a folder of its own below --out (default: reports), and
   beside these folders there are
   index.html    all programs in one sortable table, drawn on one scale of stiffness; failures with their reason
   summary.csv   the same for a spreadsheet, one row a program
@@ -93,8 +93,8 @@ def analyze_arguments(parser: argparse.ArgumentParser) -> None:
         "--jobs",
         type=int,
         metavar="N",
-        help="several programs: so many at a time, each in its own process; 1: all in this one "
-        "(default: one a CPU that may be used)",
+        help="several programs: how many run at a time, each in its own process; 1: all in this process "
+        "(default: one for each available CPU)",
     )
     parser.add_argument(
         "--cluster",

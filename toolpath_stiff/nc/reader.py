@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
@@ -351,7 +352,8 @@ def _run_built_in(
     g54 = asked.offsets.table[0].given or frames.offsets.table[0].given
     if frames.source == "option" and g54:
         warnings.append(
-            "the program or the offsets file sets G54; --origin overrides it, other offsets keep their distance to it"
+            f"the program or the offsets file sets G54; {both_names('--origin')} overrides it, other offsets keep "
+            "their distance to it"
         )
     moves = state.recorder.moves()
     program = Program(

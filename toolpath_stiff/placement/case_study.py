@@ -22,6 +22,7 @@ from toolpath_stiff.analysis import Analysis, analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import ProgramError, TableError, UnreachableError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import Program, parse_program
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated, machine_words
 from toolpath_stiff.tables import Columns, read_table
@@ -154,7 +155,7 @@ def _in_region(at: Callable[[Region], Analysis], name: str, place: Region, own: 
             raise
         raise UnreachableError(
             f"region {name}: {error.found}",
-            hint="give regions that the machine reaches: --region NAME:X,Y,Z[,TURN]",
+            hint=f"give regions that the machine reaches: {both_names('--region', 'NAME:X,Y,Z[,TURN]')}",
             file=error.file,
             line=error.line,
         ) from None

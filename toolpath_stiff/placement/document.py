@@ -14,6 +14,7 @@ from toolpath_stiff.analysis.loads import Load, plunging_rows
 from toolpath_stiff.analysis.results import assumptions
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.moves import Program
 from toolpath_stiff.placement.climb import Bounds
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
@@ -155,7 +156,7 @@ def placement_summary(
         "recommended": front[search["recommended"] - 1],
         "before": before,
         "before_reason": reason or None,
-        "costs": _costs(front, chosen),
+        "trade_offs": _costs(front, chosen),
         "front": front,
         "binding_limits": _binding_limits(best),
         "offset_blocks": _offsets(program, best.origin),
@@ -244,7 +245,7 @@ def placement_warnings(
     found += [
         f"line {rapid['line']}: no placement within the bounds keeps this rapid within reach ({rapid['reason']}); it "
         "does not follow the work, and was left out of the search"
-        for rapid in search["unmended_rapids"]
+        for rapid in search["rapids_left_out"]
     ]
     found += _present_words(rules, present) if before is not None else []
     found += _extrapolation_words(chosen, before)
@@ -273,7 +274,7 @@ def _present_words(rules: SearchRules, present: PlacementFigures) -> list[str]:
     if 0.0 <= least < asked:
         found.append(
             f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
-            f"{100.0 * asked:g} % asked for (--margin)"
+            f"{100.0 * asked:g} % asked for with {both_names('--margin')}"
         )
     if present.clearance[0] < 0.0:
         found.append(
@@ -317,7 +318,10 @@ def bound_warnings(bounds: Bounds, placement: np.ndarray, workspace: np.ndarray)
     if len(bounds.heights) > 1:
         for end, which in ((min(bounds.heights), "lowest"), (max(bounds.heights), "highest")):
             if abs(placement[2] - end) < 1e-9:
-                found.append(f"the search took the {which} of --z-values, {mm_from_m(end):g} mm: try one beyond it")
+                found.append(
+                    f"the search took the {which} height, {mm_from_m(end):g} mm, of {both_names('--z-values')}: "
+                    "try one beyond it"
+                )
     return found
 
 

@@ -154,7 +154,7 @@ def place_program(task: Task, progress: Callable[[int, int], None] | None = None
     search = {
         **fingerprint(task),
         "recommended": found.best + 1,
-        "unmended_rapids": [{"line": line, "reason": reason} for line, reason in found.unmended],
+        "rapids_left_out": [{"line": line, "reason": reason} for line, reason in found.rapids_left_out],
         "pose_evaluations": found.pose_evaluations,
     }
     assert found.present is not None

@@ -17,6 +17,7 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, front_rows, thin
@@ -87,7 +88,7 @@ class PlacementResult:
         Figures of the present placement (one row); None if none was given.
     rules
         What every placement of the front keeps.
-    unmended
+    rapids_left_out
         (line, what it breaks) of rapids that no placement within the bounds keeps within reach.
     pose_evaluations
         Poses that the search evaluated.
@@ -98,7 +99,7 @@ class PlacementResult:
     best: int
     present: PlacementFigures | None
     rules: Rules
-    unmended: tuple[tuple[int, str], ...] = ()
+    rapids_left_out: tuple[tuple[int, str], ...] = ()
     pose_evaluations: int = 0
 
     @property
@@ -191,7 +192,7 @@ def search_placements(
     held = present is not None and bounds.holds(present)
     if present is not None and held:
         scouts = np.vstack([present, scouts])
-    known, unmended = _let_go(search, scouts)
+    known, rapids_left_out = _let_go(search, scouts)
     search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, known, now))
     report(1, 4)
     archive, figures = _evolved(search, scouts, known, rng)
@@ -201,7 +202,7 @@ def search_placements(
     candidates = np.vstack(
         [_for_the_front(search, archive), ends] + ([present[None]] if present is not None and held else [])
     )
-    found = _result(search, candidates, now, unmended)
+    found = _result(search, candidates, now, rapids_left_out)
     report(4, 4)
     return found
 
@@ -217,7 +218,7 @@ def _for_the_front(search: _Search, candidates: FloatArray) -> FloatArray:
 
 
 def _result(
-    search: _Search, candidates: FloatArray, now: PlacementFigures | None, unmended: tuple[tuple[int, str], ...]
+    search: _Search, candidates: FloatArray, now: PlacementFigures | None, rapids_left_out: tuple[tuple[int, str], ...]
 ) -> PlacementResult:
     """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
     figures = search.evaluators["whole"].figures(candidates)
@@ -235,7 +236,7 @@ def _result(
         best=int(np.flatnonzero(rows == best)[0]),
         present=now,
         rules=search.rules,
-        unmended=unmended,
+        rapids_left_out=rapids_left_out,
         pose_evaluations=search.poses,
     )
 
@@ -475,7 +476,7 @@ def _infeasible(search: _Search, placement: FloatArray) -> UnreachableError:
         return UnreachableError(
             f"{least} {line} has a margin of {100.0 * found.margin[worst]:.2f} % of the limit's span: "
             f"{found.reach.describe(worst)}",
-            hint=f"widen the bounds, or ask for less than --margin {100.0 * rules.margin:g}",
+            hint=f"widen the bounds, or ask for less than {both_names('--margin', f'{100.0 * rules.margin:g}')}",
         )
     return UnreachableError(
         f"{least} the struts are outside their law at {100.0 * figures.extrapolated[0]:.1f} % of the samples, now at "

@@ -140,7 +140,7 @@ def is_plausible(entry: Mapping[str, Any], document: DiagnosisDocument | Mapping
 
 def is_offered(entry: Mapping[str, Any], document: DiagnosisDocument | Mapping[str, Any]) -> bool:
     """False only where the diagnosis says so and does not rely on it all the same."""
-    return entry.get("offered") is not False or is_plausible(entry, document)
+    return entry.get("eligible") is not False or is_plausible(entry, document)
 
 
 def model_rows(document: DiagnosisDocument) -> list[dict[str, Any]]:
@@ -170,7 +170,7 @@ def remark_text(entry: Mapping[str, Any]) -> str:
     """How it stands, and what is against it."""
     own = str(entry.get("remark") or "")
     said = str(entry.get("words") or "")
-    if entry.get("offered") is False and (figure_of(entry, "probability") or 0.0) < LEAST:
+    if entry.get("eligible") is False and (figure_of(entry, "probability") or 0.0) < LEAST:
         return plain(own or "not offered")
     settled = entry.get("adequate") is False and said not in SETTLED
     return plain("; ".join(part for part in (said, own or ("leaves structure" if settled else "")) if part))

@@ -18,7 +18,13 @@ from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import acting_names, condition_warnings, effects_stated
 from toolpath_stiff.stiffness.truss import HUB, TIP, platform_bars, platform_nodes
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
+from toolpath_stiff.units import (
+    deg_from_rad,
+    mm_from_m,
+    mm_per_min_from_m_per_s,
+    n_per_mm_from_n_per_m,
+    n_per_um_from_n_per_m,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -224,8 +230,10 @@ def _draw_view(axes: Any, frame: FloatArray, joints: FloatArray, tip: FloatArray
 def _law_figures(law: StrutLaw) -> tuple[str, str]:
     """Value and unit of a strut law."""
     if law.constant:
-        return f"{law.stiffness_1 / 1e6:g}", "N/um at every length"
-    first, *rest = [f"{stiffness / 1e6:g} N/um at {mm_from_m(length):g}" for length, stiffness in law.points]
+        return f"{n_per_um_from_n_per_m(law.stiffness_1):g}", "N/um at every length"
+    first, *rest = [
+        f"{n_per_um_from_n_per_m(stiffness):g} N/um at {mm_from_m(length):g}" for length, stiffness in law.points
+    ]
     return ", ".join([f"{first} mm", *rest]), "mm, linear between" if law.shape else "mm, linear"
 
 
@@ -311,7 +319,7 @@ def check_text(file: str, model: StiffnessModel, found: MachineCheck) -> str:
     if found.neutral.reach.reachable[0]:
         lines.append(f"  {neutral_words(machine, found.neutral)}")
     if found.origin.reach.reachable[0]:
-        kx, ky, kz = found.origin.along_axes[0] / 1e3
+        kx, ky, kz = n_per_mm_from_n_per_m(found.origin.along_axes[0])
         lines.append(
             f"  at the default origin: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; "
             f"{found.origin.reach.describe(0)}"
@@ -441,7 +449,7 @@ def effect_details(effect: Effect) -> str:
         f"  source     {effect.source}",
     ]
     if effect.load_dependent:
-        lines.append("  load       depends on the size of the load (--force): the stiffness is the secant one")
+        lines.append("  load       depends on the size of the load (--force, force_N): the stiffness is the secant one")
     if effect.needs:
         lines.append(f"  needs      columns {', '.join(effect.needs)} in the measurements")
     for p in effect.parameters:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes import M_STATE, M_STOP, MOTION, ONCE
 from toolpath_stiff.nc.codes.drilling import CYCLES
@@ -21,7 +22,10 @@ from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, points_betw
 HALF_CIRCLE = 0.999  # chord over diameter, from which R magnifies a rounded end more than twenty times
 NEAR = 2.0  # units by which the centre of an arc given by R may miss its place; beyond, I, J, K are written
 SLASH = re.compile(r"\s*/\d*")
-LINEARISE = "give --linearise MM to have straight moves within MM of it, or place the work without that turn"
+LINEARISE = (
+    f"give {both_names('--linearise', 'MM')} to have straight moves within MM of it, "
+    "or place the work without that turn"
+)
 
 
 def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str], bool]:
@@ -267,7 +271,8 @@ def _piece_count(controls: Controls, motion: int, start: list[float], end: list[
     tolerance = controls.linearise - controls.unit
     if tolerance < controls.unit:
         raise controls.refusal(
-            f"--linearise {controls.linearise:g} mm is no more than the rounding to {controls.digits} decimals",
+            f"{both_names('--linearise', f'{controls.linearise:g}')} is no more than the rounding to "
+            f"{controls.digits} decimals",
             "give more of it, or more --decimals",
         )
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))

@@ -391,6 +391,12 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
     if hidden == "outside":
         return (str(rng.choice(list(ODDITIES) if layout == "paper" else list(OUTSIDE))),)
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
+    _check_named(names, table)
+    return names
+
+
+def _check_named(names: Sequence[str], table: Table) -> None:
+    """Raise `InputError` for names that are unknown, cannot be together, or need a column that is missing."""
     all_names = (*CATALOGUE, *OUTSIDE, *UNKNOWNS)
     for name in names:
         if name not in all_names:
@@ -411,7 +417,6 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
             raise InputError(
                 f"{name} needs the column {', '.join(lacking)}", expected="layout tilted, or a plan with that column"
             )
-    return names
 
 
 def _looks(name: str) -> dict[str, Any]:

@@ -125,18 +125,19 @@ def at_strength(name: str, shape: Mapping[str, Any], strength: float) -> Paramet
         case "tool_length_error" | "platform_radius_error":
             return {"error": 60.0 * strength * sign}
         case "gauge_scale":
-            axis = shape["target"] in ("X", "Y", "Z")
-            return {
-                "direction": "XYZ".index(shape["target"]) + 1 if axis else 0,
-                "setup": "" if axis else shape["target"],
-                "scale": 20.0 * strength * sign,
-            }
+            return {**_gauge_target(shape["target"]), "scale": 20.0 * strength * sign}
         case "thermal_drift":
             return {"rate": 20.0 * strength * sign}
         case _:
             own = {key: value for key, value in shape.items() if key != "sign"}
             limit = UNKNOWNS[name].limit if name in UNKNOWNS else ODDITY_LIMITS[name]
             return {**own, "size": limit * strength * sign}
+
+
+def _gauge_target(target: str) -> Parameters:
+    """The direction or the set-up whose readings are scaled."""
+    axis = target in ("X", "Y", "Z")
+    return {"direction": "XYZ".index(target) + 1 if axis else 0, "setup": "" if axis else target}
 
 
 Change = Callable[[HiddenMachine, Mapping[str, Any]], dict[str, Any]]

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Machine, with_parameter
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
@@ -38,7 +39,7 @@ NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs
 TOOL = "tool_extension_mm"
 # Condition -> what it is, how a program gets it.
 WORDS = {
-    "temperature_C": ("the temperature, which nobody gives", "--temperature"),
+    "temperature_C": ("the temperature, which nobody gives", both_names("--temperature")),
     "time_min": ("the time since an indicator was zeroed, which no program has", ""),
     "direction": ("the direction of a reading, which no program has", ""),
 }

@@ -209,7 +209,15 @@ def _effect(effect: Any, candidate: dict[str, Any] | None, on: Any, session: Ses
         "sliders": sliders,
         "on": on,
     }
-    names = ("probability", "mean_abs_error_percent", "held_out_error_percent", "finding", "words", "remark", "offered")
+    names = (
+        "probability",
+        "mean_abs_error_percent",
+        "held_out_error_percent",
+        "finding",
+        "words",
+        "remark",
+        "eligible",
+    )
     return row | {name: candidate[name] if candidate else None for name in names}
 
 
@@ -291,7 +299,7 @@ def compare(session: Session) -> dict[str, Any] | None:
     if not found:
         return None
     said = found["document"]
-    names = ("text", "by_plane_and_direction", "by_direction", "findings", "far_off", "warnings")
+    names = ("text", "by_plane_and_direction", "by_direction", "findings", "outliers", "warnings")
     return {**{name: said[name] for name in names}, "result": found["result"]}
 
 

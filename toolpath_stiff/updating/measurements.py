@@ -23,7 +23,7 @@ from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table, read_table
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.dates import day_of, days_since_first
 from toolpath_stiff.updating.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
 from toolpath_stiff.updating.rows import (
@@ -431,7 +431,7 @@ def _origin(machine: Machine, limit: str) -> str:
 
 
 def _shown(data: Measurements, i: int) -> str:
-    mm = ", ".join(f"{value * 1e3:g}" for value in data.position[i])
+    mm = ", ".join(f"{mm_from_m(value):g}" for value in data.position[i])
     degrees = np.degrees(data.angles[i])
     return f"({mm}) mm" + (f" at ({', '.join(f'{d:.4g}' for d in degrees)}) deg" if degrees.any() else "")
 
@@ -448,7 +448,7 @@ def reading_columns(data: Measurements) -> dict[str, NDArray[Any]]:
     others = {
         "sd_N_per_mm": n_per_mm_from_n_per_m(data.sd),
         "tool_extension_mm": mm_from_m(data.tool_extension),
-        "time_min": data.time / 60.0,
+        "time_min": min_from_s(data.time),
         "temperature_C": data.temperature,
         **{name: getattr(data, name) for name in ("setup", "clamp", "repeat", "loop")},
     }

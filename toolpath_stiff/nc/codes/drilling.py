@@ -18,7 +18,7 @@ from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 CYCLES = ("G73", "G74", "G76", "G81", "G82", "G83", "G84", "G85", "G86", "G89")
-TAPS, BORES = ("G74", "G84"), ("G76", "G86")
+TAPS = ("G74", "G84")
 PECKS, DWELLS = ("G73", "G83"), ("G82", "G89")
 MOST_REPEATS = 10_000
 RENEWED = ("level", "unit")  # what one cycle leaves to another one of its run

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes import (
     ARC_DISTANCE,
     DISTANCE,
@@ -176,7 +177,9 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
         raise block.fail(
             words[0] if words else block.block.words[0],
             "is a feed move before any feed" if state.feed_mode != "G93" else "is a feed move without F under G93",
-            "F above 0" if state.feed_mode != "G94" else "F above 0, or --feed MM_PER_MIN for such moves",
+            "F above 0"
+            if state.feed_mode != "G94"
+            else f"F above 0, or {both_names('--feed', 'MM_PER_MIN')} for such moves",
         )
     if state.feed_mode == "G93":
         feed, state.feed = state.feed, None  # every move needs its own

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.cutter_location import geometry
 from toolpath_stiff.nc.cutter_location.geometry import VERTICAL, Circle
 from toolpath_stiff.nc.cutter_location.statements import Argument, Statement, number_of
@@ -329,5 +330,8 @@ def _feed(state: State, motion: int) -> float:
     if motion == RAPID:
         return math.nan
     if state.feed is None:
-        raise state.fail("a cut before any feed", "FEDRAT/ with a feed above 0, or --feed MM_PER_MIN for such cuts")
+        raise state.fail(
+            "a cut before any feed",
+            f"FEDRAT/ with a feed above 0, or {both_names('--feed', 'MM_PER_MIN')} for such cuts",
+        )
     return state.feed_per_minute(state.feed, state.per_revolution)

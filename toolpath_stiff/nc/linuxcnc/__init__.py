@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
 from toolpath_stiff.nc.linuxcnc.canon import Follower
@@ -173,7 +174,7 @@ class _Session:
             "machine coordinates (G53, G28, G30) in a program whose zero lies elsewhere than its G10 says, or is "
             "turned: LinuxCNC's interpreter knows the machine by its offsets alone",
             expected="G54 as the program or the offsets file sets it",
-            hint="leave --origin out, or read the program with --interpreter builtin",
+            hint=f"leave {both_names('--origin')} out, or read the program with --interpreter builtin",
             file=self.name,
             line=number,
         )
@@ -332,8 +333,8 @@ class _Session:
         warnings = list(follower.warnings)
         if says == "option" and given:
             warnings.append(
-                "the program or the offsets file sets G54; --origin overrides it, other offsets keep their distance "
-                "to it"
+                f"the program or the offsets file sets G54; {both_names('--origin')} overrides it, other offsets keep "
+                "their distance to it"
             )
         warnings += [
             f"line {number}: what {word} does on its control is not known"

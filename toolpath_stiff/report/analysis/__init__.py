@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from toolpath_stiff.files import Content
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.report.words import (
     FIGURES,
     LABEL,
@@ -128,7 +129,7 @@ def summary_with_options(analysis: Analysis, required: float | None, other: Anal
 def _of_other(summary: Mapping[str, Any]) -> list[str]:
     """What the other machine's effects wait for: without them the two machines may look the same."""
     return [
-        f"--compare {summary['machine']}: {one['effect']} does not act: {one['reason']}"
+        f"{both_names('--compare', summary['machine'])}: {one['effect']} does not act: {one['reason']}"
         for one in summary["effects_idle"]
     ]
 
@@ -217,7 +218,7 @@ def _entry(label: str, text: str) -> list[str]:
 
 
 def _origin(summary: Mapping[str, Any]) -> str:
-    says = {"option": "--origin", "program": "from the program", "default": "the machine's default"}
+    says = {"option": "as asked for", "program": "from the program", "default": "the machine's default"}
     words = [f"{axis}{value:.10g}" for axis, value in zip("XYZABC", summary["origin_mm_deg"], strict=True)]
     shown = words if any(summary["origin_mm_deg"][3:]) else words[:3]
     return f"{' '.join(shown)} ({says.get(summary['origin_source'], summary['origin_source'])})"

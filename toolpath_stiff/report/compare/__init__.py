@@ -141,7 +141,7 @@ def _said(one: Mapping[str, Any]) -> tuple[str, str, str]:
 
 
 def _alike(one: Mapping[str, Any]) -> str:
-    return ", ".join(one["not_told_from"]) or "-"
+    return ", ".join(one["indistinguishable_from"]) or "-"
 
 
 def _groups(document: ComparisonDocument) -> list[tuple[str, Mapping[str, Figures]]]:
@@ -183,11 +183,11 @@ def _far_off(document: ComparisonDocument) -> Markup:
                 f"{one['file']}:{one['line']}",
                 one["direction"],
                 one["point"],
-                f"{one['off_percent']:+.0f} %",
+                f"{one['deviation_percent']:+.0f} %",
                 f"{one['standard_deviations']:+.1f}",
             ),
         )
-        for one in document["far_off"][:MOST_FAR_OFF]
+        for one in document["outliers"][:MOST_FAR_OFF]
     ]
     head = ("line", "direction", "point", "with the findings taken out", "standard deviations")
     return table(head, rows, (3, 4))
@@ -276,24 +276,24 @@ def text(document: ComparisonDocument) -> str:
         lines.append("  none: no pattern stands out from scatter. The strongest hints:")
         lines += [f"  - {plain(one['text'])} (p = {one['p_adjusted']:.2g})" for one in document["hints"]]
     for one in document["findings"]:
-        if one["not_told_from"]:
-            others = ", ".join(one["not_told_from"])
+        if one["indistinguishable_from"]:
+            others = ", ".join(one["indistinguishable_from"])
             lines.append(f"  ({plain(one['pattern'])} looks the same here as: {plain(others)})")
     lines += loops_text(document["loops"])
     lines += history_text(document["history"])
     lines += ["", "checks without a model"]
     lines += [f"  {plain(one['text'])}" for one in document["model_free"]["checks"]]
     lines += [f"  {one['check']}: {one['reason']}" for one in document["model_free"]["cannot_check"]]
-    if document["far_off"]:
+    if document["outliers"]:
         lines += ["", "readings far off"]
         lines += [
             f"  {plain(one['file'])}:{one['line']}: {one['direction']} at point {plain(one['point'])}, "
-            f"{one['off_percent']:+.0f} % with the findings taken out "
+            f"{one['deviation_percent']:+.0f} % with the findings taken out "
             f"({one['standard_deviations']:+.1f} standard deviations)"
-            for one in document["far_off"][:MOST_NAMED]
+            for one in document["outliers"][:MOST_NAMED]
         ]
-        if len(document["far_off"]) > MOST_NAMED:
-            lines.append(f"  and {len(document['far_off']) - MOST_NAMED} more, in compare.json")
+        if len(document["outliers"]) > MOST_NAMED:
+            lines.append(f"  and {len(document['outliers']) - MOST_NAMED} more, in compare.json")
     lines += [""] + [f"warning: {plain(text)}" for text in document["warnings"]]
     lines += [f"note: {plain(text)}" for text in document["notes"]]
     return "\n".join(line for i, line in enumerate(lines) if line or lines[i - 1 : i] != [""]).rstrip() + "\n"

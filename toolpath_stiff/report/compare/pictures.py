@@ -50,7 +50,7 @@ def heading(figure: Figure, question: str, remark: str) -> None:
 def near_rows(found: Comparison) -> NDArray[np.bool_]:
     """(n,) readings that are not far off."""
     near = np.ones(len(found.residual), dtype=bool)
-    near[[one["reading"] - 1 for one in found.document["far_off"]]] = False
+    near[[one["reading"] - 1 for one in found.document["outliers"]]] = False
     return near
 
 
@@ -250,7 +250,7 @@ def _changes(axes: Axes, setup: NDArray[np.str_], file: NDArray[np.str_], named:
 
 def _name_far_off(axes: Axes, found: Comparison, axis: str, residual: FloatArray) -> None:
     """File lines of the readings that are far off."""
-    for one in found.document["far_off"][:12]:
+    for one in found.document["outliers"][:12]:
         if one["direction"] != axis:
             continue
         i = one["reading"] - 1

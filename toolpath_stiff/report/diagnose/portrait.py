@@ -49,7 +49,7 @@ def portrait_section(document: DiagnosisDocument) -> Markup:
     rows[:1] = [("plausible", [*cells[:-1], "leading"]) for _, cells in rows[:1]]
     rows += [
         ("", [*_row(one), f"instead, {probability_text(figure_of(one, 'probability'))}"])
-        for one in entries(portrait, "alike")
+        for one in entries(portrait, "indistinguishable")
     ]
     if not rows:
         return body

@@ -164,7 +164,7 @@ def text(summary: dict[str, Any]) -> str:
     for name, row in (("  stiffness", best), ("  before", before)):
         lines.append(f"{name:<16}{_figures_words(row) if row else 'out of reach: ' + summary['before_reason']}")
     lines += _plunges_words(best, before)
-    for goal, cost in summary["costs"].items():
+    for goal, cost in summary["trade_offs"].items():
         lines.append(
             f"  best {goal:<9} {cost['best_on_front_N_per_mm']:.0f} on the front, "
             f"{cost['chosen_N_per_mm']:.0f} here, N/mm"

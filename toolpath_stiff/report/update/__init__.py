@@ -150,7 +150,7 @@ def _fitted(document: UpdateDocument) -> Markup:
 
 def _support(document: UpdateDocument) -> Markup:
     rows = []
-    for one in (*document["support"], *document["turned_down"]):
+    for one in (*document["support"], *document["rejected"]):
         gain = one["held_out_gain_in_se"]
         rows.append(
             (
@@ -191,9 +191,9 @@ def text(document: UpdateDocument) -> str:
     parameters = _parameters(document)
     if parameters:
         lines += ["", *parameters]
-    if document["turned_down"]:
+    if document["rejected"]:
         lines += ["", "tried and not added"]
-        for one in document["turned_down"]:
+        for one in document["rejected"]:
             lines.append(fill(f"  {one['effect']}: {'; '.join(one['reasons'])}", WIDTH, subsequent_indent=" " * 4))
     lines += [""] + [f"warning: {plain(text)}" for text in document["warnings"]]
     lines += [f"note: {plain(text)}" for text in document["notes"]]
@@ -324,7 +324,7 @@ def _pictures(found: UpdateDocument, update: Update, bars: BarCurve | None) -> d
 
 def ladder(found: UpdateDocument) -> tuple[Any, ...]:
     """What `error_ladder_png` takes."""
-    turned_down = [{**one, "name": one["effect"]} for one in found["turned_down"]]
+    turned_down = [{**one, "name": one["effect"]} for one in found["rejected"]]
     floor, question = found["noise_floor_percent"], "What does each step do to the error?"
     return [_rung(step) for step in found["steps"]], floor, question, turned_down
 

@@ -56,6 +56,12 @@ class Parameter:
     kind
         "real" numbers are fitted. What the effect acts on is chosen, never fitted: an "integer" within `bounds`
         (which strut), a "text" (which set-up).
+
+    Examples
+    --------
+    >>> compliance = Parameter("compliance", "nm/N", 1e-9, (0.0, 50.0), (1.0, 5.0), "an example")
+    >>> compliance.key, compliance.expected, compliance.discrete
+    ('compliance_nm_per_N', 'a number from 0 to 50 nm/N', False)
     """
 
     name: str
@@ -234,7 +240,17 @@ class Effect:
     described_from: ClassVar[tuple[str, ...]] = ()
 
     def strut_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """(n, 6) m/N in series with each strut. `p`: parameter name -> SI value."""
+        """(n, 6) m/N in series with each strut. `p`: parameter name -> SI value.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> found = tps.effects()["weak_strut"].strut_compliance(path, {"strut": 4, "factor": 0.8})
+        >>> (1e9 * found).round(2).tolist()
+        [[0.0, 0.0, 0.0, 6.27, 0.0, 0.0]]
+        """
         return None
 
     def load_compliance(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
@@ -242,25 +258,67 @@ class Effect:
 
         f (6) are the strut forces with J^T f = w, w (6) the force and the moment about the tip, base axes. The
         force of strut i on the platform is -f_i u_i, on the frame +f_i u_i.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> tps.effects()["spindle_compliance"].load_compliance(path, {"radial": 5e-9, "axial": 1e-9}).shape
+        (1, 12, 12)
         """
         return None
 
     def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
-        """(n, 6, 6) between platform and base about the tip, parallel to the struts, base axes."""
+        """(n, 6, 6) between platform and base about the tip, parallel to the struts, base axes.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> tps.effects()["joint_moment_stiffness"].parallel_stiffness(path, {"stiffness": 1000.0}).shape
+        (1, 6, 6)
+        """
         return None
 
     def geometry(self, machine: Machine, p: Mapping[str, float]) -> Machine:
-        """The machine with this effect's geometry."""
+        """The machine with this effect's geometry.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> machine = tps.Machine.load("nist").model.machine
+        >>> longer = tps.effects()["tool_length_error"].geometry(machine, {"error": 0.001})
+        >>> longer is machine
+        False
+        """
         return machine
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Mapping[str, float]) -> FloatArray:
-        """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m."""
+        """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> gauge = tps.effects()["gauge_scale"]
+        >>> gauge.reading(np.array([50e6]), path, {"direction": 0, "setup": "", "scale": 0.02}).round().tolist()
+        [51000000.0]
+        """
         return stiffness
 
     def seen_by(self, loop: MeasuringLoop) -> float:
         """Share of what it gives way that an indicator across part of the load path sees: all where its link is inside.
 
         Of a joint's two ends each is taken to give half.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> [tps.effects()["weak_strut"].seen_by(MeasuringLoop(kind)) for kind in ("tip", "strut", "spindle")]
+        [1.0, 1.0, 0.0]
         """
         if self.link not in loop.links:
             return 0.0
@@ -273,6 +331,16 @@ class Effect:
 
         Of effects with `link = "frame"`: energy alone does not say which way a vertex moves. Without it an indicator
         between a vertex and the floor is taken to see nothing of the effect.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> frame = tps.effects()["frame_compliance"]
+        >>> values = {"vertex": 1, "radial": 1e-9, "tangential": 1e-9, "vertical": 1e-9}
+        >>> frame.vertex_displacement(path, values, np.ones((1, 6)), 1).shape
+        (1, 3)
         """
         return None
 
@@ -280,6 +348,16 @@ class Effect:
         """Which of `CONDITIONS` it waits for with these values: those of `needs`, and those that a value names.
 
         None for a geometry: a machine has one, whatever the conditions.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> from toolpath_stiff.stiffness.model import load_path
+        >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
+        >>> setup = tps.effects()["setup_compliance"]
+        >>> values = {"setup": "riser", "x": 1e-9, "y": 1e-9, "z": 0.0}
+        >>> setup.conditions(values), setup.acts_on(path, values), setup.is_instrument  # the path names no set-up
+        (('setup',), False, False)
         """
         if type(self).geometry is not Effect.geometry:
             return ()

@@ -354,6 +354,12 @@ def check_declarations(effect: object, where: str) -> None:
     marks = effect.described_from
     if not isinstance(marks, tuple | list) or not all(isinstance(one, str) for one in marks):
         raise refuse("described_from", f"described_from = {marks!r:.60}", "marks of readings, a tuple of texts")
+    _check_parameters(effect, refuse)
+    _check_hooks(effect, refuse)
+
+
+def _check_parameters(effect: Effect, refuse: Callable[..., InputError]) -> None:
+    """Refuse parameters that are of the wrong kind, wrong in themselves, or declared twice."""
     if not isinstance(effect.parameters, tuple | list):
         raise refuse("parameters", f"parameters = {effect.parameters!r:.60}", "(Parameter(...), ...), with a comma")
     for i, parameter in enumerate(effect.parameters):
@@ -364,7 +370,6 @@ def check_declarations(effect: object, where: str) -> None:
             raise refuse("parameters", f"parameter {parameter.name}: {wrong[0]}", wrong[1], i)
         if parameter.name in [earlier.name for earlier in effect.parameters[:i]]:
             raise refuse("parameters", f"parameter {parameter.name} is declared twice", index=i)
-    _check_hooks(effect, refuse)
 
 
 def _wrong_in(parameter: Parameter) -> tuple[str, str] | None:

@@ -9,7 +9,7 @@ from typing import NotRequired, TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.units import certain, mm_from_m
+from toolpath_stiff.units import certain, mm_from_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 from toolpath_stiff.updating.comparison.principles import (
     CheckEntry,
@@ -108,7 +108,7 @@ class FindingEntry(TestFigures):
     kind: str
     readings: int
     size_percent: float
-    not_told_from: list[str]
+    indistinguishable_from: list[str]
     after_strut_law_refit: NotRequired[TestFigures | None]
 
 
@@ -120,7 +120,7 @@ class FarOffEntry(TypedDict):
     reading: int
     point: str
     direction: str
-    off_percent: float
+    deviation_percent: float
     standard_deviations: float
 
 
@@ -157,7 +157,7 @@ class ComparisonDocument(TypedDict):
     findings: list[FindingEntry]
     by_noise: dict[str, list[FindingEntry]]
     tests: list[PatternTest]
-    far_off: list[FarOffEntry]
+    outliers: list[FarOffEntry]
     loops: LoopsDocument
     history: HistoryDocument
     model_free: ModelFree
@@ -251,7 +251,7 @@ def document_of(
         "findings": findings,
         "by_noise": by_noise,
         "tests": tests,
-        "far_off": _far_off_entries(residual, answers[-1], looked_for, data),
+        "outliers": _far_off_entries(residual, answers[-1], looked_for, data),
         "loops": loops,
         "history": history,
         "model_free": {"checks": _checks(answers), "cannot_check": cannot},
@@ -367,7 +367,7 @@ def _far_off_entries(
             "reading": i + 1,
             "point": str(data.point[i]),
             "direction": str(directions(data)[i]),
-            "off_percent": float(deviation_percent(rest[i])),
+            "deviation_percent": float(deviation_percent(rest[i])),
             "standard_deviations": float(ratio[i]),
         }
         for i in far.tolist()
@@ -384,7 +384,7 @@ def _refit_figures(predictor: Predictor, one: Answer) -> RefitFigures | None:
         **error_figures(one.law.residual),
         "strut_law": {
             "at_mm": [] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)],
-            "N_per_um": [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6][:count],
+            "N_per_um": [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][:count],
         },
         "excess_scatter_percent": None if one.refitted is None else 100.0 * one.refitted.excess,
     }
@@ -437,7 +437,7 @@ def as_finding(
         "kind": pattern.kind,
         "readings": int(pattern.rows.sum()),
         "size_percent": size,
-        "not_told_from": [*pattern.same, *(looked_for[j].name for j in found.alike)][:MOST_ALIKE],
+        "indistinguishable_from": [*pattern.same, *(looked_for[j].name for j in found.alike)][:MOST_ALIKE],
     }
     if refitted is not None:
         test = next((t for t in refitted.tests if t.pattern == found.pattern), None)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import about
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.comparison.structure import SIGNIFICANT, FoundPattern, Pattern
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
@@ -145,7 +145,7 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
     extension = mm_from_m(data.tool_extension)
     columns = [
         ("force_N", Variable("force_N", "the force", "N", data.force)),
-        ("time_min", Variable("time_min", "the time since zeroing", "min", data.time / 60.0)),
+        ("time_min", Variable("time_min", "the time since zeroing", "min", min_from_s(data.time))),
         ("temperature_C", Variable("temperature_C", "the temperature", "C", data.temperature)),
         ("tool_extension_mm", Variable("tool_extension_mm", "the tool's extra length", "mm", extension)),
     ]

@@ -11,7 +11,7 @@ from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.comparison.residuals import directions
 from toolpath_stiff.updating.correction import Correction
 from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
@@ -50,7 +50,7 @@ class StepEntry(HeldErrors):
     by_direction: dict[str, DirectionErrors]
     strut_law_N_per_um: list[LawEntry]  # noqa: N815  as in the file
     parameters: dict[str, dict[str, Any]]
-    wild_readings: int
+    outliers: int
     held_out_gain_in_se: NotRequired[float | None]
     held_out_se_percent: NotRequired[float | None]
 
@@ -63,7 +63,7 @@ class SupportEntry(TypedDict):
     reasons: list[str]
     mean_abs_error_percent: float | None
     held_out_error_percent: float | None
-    held_out_fall_percent: float | None
+    held_out_reduction_percent: float | None
     held_out_gain_in_se: float | None
     likelihood_gain: float | None
     threshold: float | None
@@ -105,7 +105,7 @@ class UpdateDocument(TypedDict):
     steps: list[StepEntry]
     support: list[SupportEntry]
     described: list[str]  # effects whose form was read off these readings, and that no others have confirmed
-    turned_down: list[SupportEntry]
+    rejected: list[SupportEntry]
     noise_percent: float | None
     noise_floor_percent: float | None
     noise: NoiseEntry
@@ -141,7 +141,7 @@ def document(correction: Correction) -> UpdateDocument:
         "steps": steps,
         "support": [_support(one) for one in update.supports],
         "described": [] if update.described is None else list(update.described.names),
-        "turned_down": [_support(one) for one in update.turned_down],
+        "rejected": [_support(one) for one in update.turned_down],
         "noise_percent": json_number(100.0 * update.noise.typical),
         "noise_floor_percent": json_number(update.noise.floor_percent),
         "noise": {"name": update.noise.name, "origin": update.noise.origin},
@@ -172,7 +172,9 @@ def document(correction: Correction) -> UpdateDocument:
 
 def _search(search: StrutLawSearch) -> SearchEntry:
     """Starts and ends of the paper's search, in N/um."""
-    machine_law = np.array([search.strut_law.stiffness_1, search.strut_law.stiffness_2]) / np.exp(search.law) / 1e6
+    machine_law = n_per_um_from_n_per_m(
+        np.array([search.strut_law.stiffness_1, search.strut_law.stiffness_2]) / np.exp(search.law)
+    )
     return {
         "starts_N_per_um": np.round(machine_law * np.exp(search.starts), 3).tolist(),
         "ends_N_per_um": np.round(machine_law * np.exp(search.ends), 3).tolist(),
@@ -202,7 +204,7 @@ def _text(update: Update, verdict: str) -> str:
     against = "; ".join(f"{one.effect}: {', and '.join(one.reasons)}" for one in update.supports if not one.supported)
     if verdict == REFUSED:
         said = f"The data do not support {against}." if against else "The machine stays as it is."
-        return f"{asked}{said} (--force writes it all the same.) {errors}"
+        return f"{asked}{said} (--force, force=True, writes it all the same.) {errors}"
     if verdict == FORCED:
         said = f" ({against})" if against else ""
         return f"{asked}Added by force, although the data do not support it{said}. {_unconfirmed(update)}{errors}"
@@ -256,7 +258,7 @@ def _step(update: Update, k: int) -> StepEntry:
         },
         "strut_law_N_per_um": _law(update.machine, step, update.widening),
         "parameters": step_parameters(step.fit, update.widening),
-        "wild_readings": len(step.fit.scatter.wild),
+        "outliers": len(step.fit.scatter.wild),
     }
     if k:
         before = update.steps[k - 1].held
@@ -275,8 +277,8 @@ def _law(machine: Machine, step: Step, widening: float) -> list[LawEntry]:
     return [
         {
             "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
-            "stiffness": json_number(stiffness / 1e6),
-            "sd": json_number(stiffness / 1e6 * float(deviation), 3) if step.fit.law_free else None,
+            "stiffness": json_number(n_per_um_from_n_per_m(stiffness)),
+            "sd": json_number(n_per_um_from_n_per_m(stiffness) * float(deviation), 3) if step.fit.law_free else None,
         }
         for (length, stiffness), deviation in zip(ends, deviations, strict=True)
     ]
@@ -318,7 +320,7 @@ def _support(one: Support) -> SupportEntry:
         "reasons": list(one.reasons),
         "mean_abs_error_percent": json_number(100.0 * one.error),
         "held_out_error_percent": json_number(100.0 * one.held_out_error),
-        "held_out_fall_percent": json_number(100.0 * one.fall),
+        "held_out_reduction_percent": json_number(100.0 * one.fall),
         "held_out_gain_in_se": json_number(one.gain_in_se, 3),
         "likelihood_gain": json_number(one.likelihood_gain),
         "threshold": json_number(one.threshold),

@@ -18,7 +18,7 @@ from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.effects.contract import SETUP
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.tables import split_name
-from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.prediction import scaled_law
 from toolpath_stiff.updating.measurements import NIST_TABLE_1
@@ -87,7 +87,7 @@ def _uncertainty(machine: Machine, fit: Fit, widened: float) -> Uncertainty | No
     names, slopes, rows = [], [], []
     if fit.law_free:
         names += list(law.parameters)
-        slopes += [law.stiffness_1 / 1e6, law.stiffness_2 / 1e6][: len(names)]
+        slopes += [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][: len(names)]
         rows += [0, 1][: len(names)]
     index = 0
     for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
@@ -261,8 +261,8 @@ def _freed(lengths: FloatArray, position: FloatArray, table: FloatArray) -> dict
     _, twist, stiff = unpack(_fit(residuals, np.zeros(9)).x)
     return {
         "freed_hexagon_angles_deg": [30.0 + float(np.rad2deg(twist)), 90.0 - float(np.rad2deg(twist))],  # type: ignore[dict-item]
-        "freed_stiffness_1_N_per_um": stiff.stiffness_1 / 1e6,
-        "freed_stiffness_2_N_per_um": stiff.stiffness_2 / 1e6,
+        "freed_stiffness_1_N_per_um": n_per_um_from_n_per_m(stiff.stiffness_1),
+        "freed_stiffness_2_N_per_um": n_per_um_from_n_per_m(stiff.stiffness_2),
     }
 
 

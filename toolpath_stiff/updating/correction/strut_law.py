@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.units import n_per_um_from_n_per_m
 from toolpath_stiff.updating.correction.ladder import Step, Update
 from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
@@ -244,7 +245,7 @@ def bar_curve_csv(curve: BarCurve) -> str:
     """The curve as CSV: N/m, per cent, N/um."""
     rows = ["bar_stiffness_N_per_m,error_percent,error_refitted_percent,stiffness_1_N_per_um,stiffness_2_N_per_um"]
     for k, error, refitted, law in zip(curve.bars, curve.error, curve.error_refitted, curve.stiffness, strict=True):
-        figures = (100 * error, 100 * refitted, law[0] / 1e6, law[1] / 1e6)
+        figures = (100 * error, 100 * refitted, n_per_um_from_n_per_m(law[0]), n_per_um_from_n_per_m(law[1]))
         rows.append(f"{k:.6g}," + ",".join(f"{value:.4f}" for value in figures))
     return "\n".join(rows) + "\n"
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
-from toolpath_stiff.units import certain, json_number, mm_from_m
+from toolpath_stiff.units import certain, json_number, mm_from_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.diagnosis.words import (
     assumptions,
@@ -105,7 +105,7 @@ class CandidateEntry(Explanation):
     link: str
     parameters: dict[str, ParameterEntry]
     choice: dict[str, Any]
-    offered: bool
+    eligible: bool
     remark: str
 
 
@@ -211,7 +211,7 @@ class DiagnosisDocument(TypedDict):
     verdict: str
     text: str
     question: str
-    drawn: DrawnEntry | None
+    draft_status: DrawnEntry | None
     baseline: BaselineEntry
     candidates: list[CandidateEntry]
     pairs: list[PairEntry]
@@ -250,7 +250,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "verdict": diagnosis.verdict,
         "text": verdict_text(diagnosis),
         "question": main.question,
-        "drawn": None if (drawn := unconfirmed(diagnosis) or main.drawn) is None else drawn.document,
+        "draft_status": None if (drawn := unconfirmed(diagnosis) or main.drawn) is None else drawn.document,
         "baseline": _baseline(diagnosis),
         "candidates": _candidates(diagnosis),
         "pairs": _pairs(diagnosis),
@@ -337,8 +337,8 @@ def _baseline(diagnosis: Diagnosis) -> BaselineEntry:
         "law": [
             {
                 "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
-                "stiffness_N_per_um": json_number(stiffness * factor / 1e6),
-                "machine_file_N_per_um": json_number(stiffness / 1e6),
+                "stiffness_N_per_um": json_number(n_per_um_from_n_per_m(stiffness * factor)),
+                "machine_file_N_per_um": json_number(n_per_um_from_n_per_m(stiffness)),
                 "sd_percent": json_number(100.0 * deviation, 3),
             }
             for (length, stiffness), factor, deviation in zip(ends, factors, deviations, strict=True)
@@ -376,7 +376,7 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> CandidateEntry | TestedE
             "held_out_rms_percent": json_number(100.0 * diagnosis.held_out_base.rms),
             "held_out_gain_in_se": 0.0,
             "adequate": base_passes,
-            "offered": False,
+            "eligible": False,
             "remark": "fits best when it is absent",
         }
     held = diagnosis.held_out[family.name]
@@ -396,7 +396,7 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> CandidateEntry | TestedE
         "held_out_gain_in_se": json_number(gain_in_standard_errors(diagnosis.held_out_base, held), 3),
         "adequate": bool(adequate),
         "adequate_probability": None if gate is None else json_number(gate.probability, 3),
-        "offered": not bounded,
+        "eligible": not bounded,
         "remark": remark,
     }
 

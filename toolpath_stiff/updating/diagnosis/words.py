@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.hints import Asked, both_names, command_line, hint, options
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
@@ -238,7 +238,8 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     if diagnosis.verdict == "ambiguous":
         found = [hint("measure what tells them apart", asked.command("plan"))]
         if len(diagnosis.judgements) > 1:
-            found.insert(0, "repeat a few readings, re-clamped, or state --noise: the verdict depends on the scatter")
+            noise = both_names("--noise")
+            found.insert(0, f"repeat a few readings, re-clamped, or state {noise}: the verdict depends on the scatter")
         return found
     if diagnosis.main.question:
         return [

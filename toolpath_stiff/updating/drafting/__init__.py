@@ -207,32 +207,31 @@ def effect_names(name: str, terms: Sequence[Term]) -> list[str]:
 def _effects(name: str, pieces: Sequence[Piece]) -> list[dict[str, Any]]:
     """The classes of the file: one for the machine's parts, one for its geometry, one for readings, where needed."""
     kinds = [kind for kind in KINDS if any(piece.kind == kind for piece in pieces)]
-    found = []
-    for kind in kinds:
-        own = [piece for piece in pieces if piece.kind == kind]
-        called = name if len(kinds) == 1 else f"{name}{KINDS[kind]}"
-        hooks: dict[str, list[str]] = {}
-        for piece in own:
-            mine = hooks.setdefault(piece.hook, [])
-            mine += [line for line in piece.statements if line not in mine or not line.startswith(REPEATED)]
-        effects = [piece.effect for piece in own]
-        title = "; ".join(piece.words for piece in own)
-        found.append(
-            {
-                "plain_name": called,
-                "class_name": "".join(part.capitalize() for part in called.split("_")) or "Missing",
-                "name": _text(called),
-                "title": _long_text(title),
-                "summary": _first(title),
-                "link": _text(effects[0].link),
-                "equation": _long_text("; ".join(piece.formula for piece in own)),
-                "needs": _tuple([need for effect in effects for need in effect.needs]),
-                "load_dependent": any(effect.load_dependent for effect in effects),
-                "hooks": {**dict.fromkeys(("strut_compliance", "load_compliance", "geometry", "reading")), **hooks},
-                "pieces": [_parameter(piece) for piece in own],
-            }
-        )
-    return found
+    called = {kind: name if len(kinds) == 1 else f"{name}{KINDS[kind]}" for kind in kinds}
+    return [_effect(called[kind], [piece for piece in pieces if piece.kind == kind]) for kind in kinds]
+
+
+def _effect(called: str, own: Sequence[Piece]) -> dict[str, Any]:
+    """One class of the file: what the template fills in."""
+    hooks: dict[str, list[str]] = {}
+    for piece in own:
+        mine = hooks.setdefault(piece.hook, [])
+        mine += [line for line in piece.statements if line not in mine or not line.startswith(REPEATED)]
+    effects = [piece.effect for piece in own]
+    title = "; ".join(piece.words for piece in own)
+    return {
+        "plain_name": called,
+        "class_name": "".join(part.capitalize() for part in called.split("_")) or "Missing",
+        "name": _text(called),
+        "title": _long_text(title),
+        "summary": _first(title),
+        "link": _text(effects[0].link),
+        "equation": _long_text("; ".join(piece.formula for piece in own)),
+        "needs": _tuple([need for effect in effects for need in effect.needs]),
+        "load_dependent": any(effect.load_dependent for effect in effects),
+        "hooks": {**dict.fromkeys(("strut_compliance", "load_compliance", "geometry", "reading")), **hooks},
+        "pieces": [_parameter(piece) for piece in own],
+    }
 
 
 def _parameter(piece: Piece) -> dict[str, str]:

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import both_names
 from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.inference.repeats import (
@@ -184,7 +185,11 @@ def _noise_of_tip(
         both = stated if isinstance(stated, tuple) else _shared(stated)
         if not (0.0 < both[0] <= LARGEST and 0.0 <= both[1] <= LARGEST):
             raise InputError(f"a noise of {stated!r}", expected=f"more than 0 and at most {100 * LARGEST:g} %")
-        remark = "" if repeats is None else _disagreement(repeats, both[0], both[1], "noise stated with --noise")
+        remark = (
+            ""
+            if repeats is None
+            else _disagreement(repeats, both[0], both[1], f"noise stated with {both_names('--noise')}")
+        )
         if not remark:
             wild = OUTLIERS if repeats is None else repeats.wild
             return (model("stated", np.full(n, both[0]), both[1], STATED_FREEDOM, f"stated: {_percent(*both)}", wild),)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.units import certain, deg_from_rad, mm_from_m
+from toolpath_stiff.units import certain, deg_from_rad, min_from_s, mm_from_m
 from toolpath_stiff.updating.planning import Plan, Proposal, matters
 from toolpath_stiff.updating.planning.campaign import Campaign
 from toolpath_stiff.updating.planning.gaps import MOST_REPEATS, SETTLED, ReadingNoise, pair_shares
@@ -53,7 +53,7 @@ class PairEntry(TypedDict):
     """How far two rivals are apart, in standard deviations."""
 
     effects: list[str]
-    gap_sigma: float
+    separation_sigma: float
     best_single_pose_sigma: float
     separable: bool
     indicator_across: dict[str, str]
@@ -83,7 +83,7 @@ class Seen(TypedDict):
     """An effect and how far a campaign would set it apart from nothing."""
 
     effect: str
-    gap_sigma: float
+    separation_sigma: float
 
 
 class _Promise(TypedDict):
@@ -170,7 +170,7 @@ def _campaign(campaign: Campaign, rows: list[dict[str, Any]], noise: float | tup
         "poses": len({row["point"] for row in rows}),
         "readings": len(rows),
         "minutes": campaign.minutes,
-        "sees": [{"effect": name, "gap_sigma": gap} for name, gap in campaign.sees.items()],
+        "detectability": [{"effect": name, "separation_sigma": gap} for name, gap in campaign.sees.items()],
         "text": _campaign_text(campaign, rows, noise),
         "notes": [f"seen or not: at a noise of {_noise_text(noise)}, each effect alone at its usual size"],
     }
@@ -248,7 +248,7 @@ def plan_document(plan: Plan) -> RivalsPlan:
         "pairs": [
             {
                 "effects": [pair.first, pair.second],
-                "gap_sigma": pair.gap,
+                "separation_sigma": pair.gap,
                 "best_single_pose_sigma": pair.best_visit_gap,
                 "separable": pair.separable,
                 "indicator_across": pair.indicators,
@@ -333,7 +333,7 @@ def plan_rows(
             entry["repeat"] = repeats[clamp - 1] if len(repeats) else int(visits.rounds[row])
             entry["point"] = names[clamp - 1]
             if timed:
-                entry["time_min"] = _round(visits.readings.time[row] / 60.0)
+                entry["time_min"] = _round(min_from_s(visits.readings.time[row]))
             entry["tool_extension_mm"] = _round(mm_from_m(visits.extension[visit]))
             found.append(entry)
     if not any(entry["loop"] for entry in found):

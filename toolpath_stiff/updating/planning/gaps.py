@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.units import min_from_s
 from toolpath_stiff.updating.planning.rivals import Forecast
 from toolpath_stiff.updating.planning.visits import Costs, Menu, Visits
 
@@ -257,7 +258,7 @@ def further_minutes(visits: Visits, chosen: Sequence[int], costs: Costs, menu: M
     setups = {menu.setups[0], *visits.setup[list(chosen)].tolist()}
     equipped = {(menu.setups[0], menu.tool_extensions[0])}
     equipped |= {(str(visits.setup[v]), float(visits.extension[v])) for v in chosen}
-    minutes = costs.pose + costs.reading * visits.counts + visits.wait / 60.0
+    minutes = costs.pose + costs.reading * visits.counts + min_from_s(visits.wait)
     if visits.loop is not None:
         minutes = minutes + costs.indicator * (visits.loop != "")
     minutes = minutes + costs.setup * ~np.isin(visits.setup, list(setups))
@@ -315,7 +316,7 @@ def why_of(visits: Visits, visit: int, shares: dict[tuple[str, str], GapShares],
     loads = np.unique(visits.readings.force[visits.rows(visit)])
     what.append("at " + " and ".join(f"{load:g} N" for load in loads))
     if visits.wait[visit] > menu.waits[0]:
-        what.append(f"{visits.wait[visit] / 60.0:.3g} minutes after zeroing")
+        what.append(f"{min_from_s(visits.wait[visit]):.3g} minutes after zeroing")
     if visits.rounds[visits.rows(visit)].max() > 1:
         what.append("each reading twice" if visits.rounds[visits.rows(visit)].max() == 2 else "readings repeated")
     if visits.across(visit):

@@ -45,35 +45,55 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, lean: bool = Fals
         return [("offset", ())]
     different = np.unique(np.round(values, 9))
     if variable == "force sign":
-        sides = (1.0,) if signed else (1.0, -1.0)
-        return [("sign", (("side", side),)) for side in sides] if len(different) > 1 else []
+        return _signs(signed) if len(different) > 1 else []
     if len(different) < 2 or different[-1] - different[0] <= 1e-9 * max(abs(different[-1]), 1e-9):
         return []
+    sides = (1.0,) if signed else (1.0, -1.0)
     low, high = float(different[0]), float(different[-1])
     many, place = len(different), variable in (*PLACE, "strut length")
     found: list[tuple[str, Constants]] = []
     if variable in ("load", "strut force") and not (signed and many == 2):
-        reference = float(np.median(values))
-        found += [("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)]
-        held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if many > 2 else [0.5 * low, 0.9 * low]
-        found += [("threshold", (("beyond", force),)) for force in held]
+        found += _of_a_force(low, high, float(np.median(values)), many > 2)
     found += _slopes(low, high, signed, many > 4)
     if many == 2:
         return found
-    centres = [0.5 * (low + high)] + ([0.0] if low < 0.0 < high and place else [])
-    found += [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
+    found += _squares(low, high, place)
     edges = [0.0] if lean else _edges(different, MOST_EDGES if place else 3)
-    sides = (1.0,) if signed else (1.0, -1.0)
     found += [("threshold", (("edge", edge), ("side", side))) for edge in edges for side in sides]
     if place and many > 4:
-        found += [
-            ("bump", (("centre", float(c)), ("width", (high - low) / parts)))
-            for c in np.linspace(low, high, BUMPS)
-            for parts in (4.0, 8.0)
-        ]
+        found += _bumps(low, high)
     if (place or variable not in VARIABLES) and many > 8:
         found += _periodic(variable, low, high - low, many, signed)
     return found
+
+
+def _signs(signed: bool) -> list[tuple[str, Constants]]:
+    """Tension or compression alone."""
+    return [("sign", (("side", side),)) for side in ((1.0,) if signed else (1.0, -1.0))]
+
+
+def _of_a_force(low: float, high: float, reference: float, several: bool) -> list[tuple[str, Constants]]:
+    """Powers of a force, and what friction holds below some of it."""
+    powers: list[tuple[str, Constants]] = [
+        ("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)
+    ]
+    held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if several else [0.5 * low, 0.9 * low]
+    return [*powers, *(("threshold", (("beyond", force),)) for force in held)]
+
+
+def _squares(low: float, high: float, place: bool) -> list[tuple[str, Constants]]:
+    """Squares about the middle of the range, and of a place about the machine's axis."""
+    centres = [0.5 * (low + high)] + ([0.0] if low < 0.0 < high and place else [])
+    return [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
+
+
+def _bumps(low: float, high: float) -> list[tuple[str, Constants]]:
+    """Bumps over the range of a place, of two widths."""
+    return [
+        ("bump", (("centre", float(c)), ("width", (high - low) / parts)))
+        for c in np.linspace(low, high, BUMPS)
+        for parts in (4.0, 8.0)
+    ]
 
 
 def _slopes(low: float, high: float, signed: bool, within: bool) -> list[tuple[str, Constants]]:

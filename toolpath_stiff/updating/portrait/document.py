@@ -53,7 +53,7 @@ class PortraitEntry(TypedDict):
     links: list[LinkEntry]
     variables: list[VariableEntry]
     terms: list[TermEntry]
-    alike: list[AlikeEntry]
+    indistinguishable: list[AlikeEntry]
     explained_percent: float | None
     error_percent: float | None
     held_out_rms_percent: float | None
@@ -69,7 +69,9 @@ def portrait_entry(portrait: Portrait) -> PortraitEntry:
         "links": [{"link": name, "probability": json_number(weight, 3)} for name, weight in portrait.links],
         "variables": [{"variable": name, "probability": json_number(weight, 3)} for name, weight in portrait.variables],
         "terms": [_term(one) for one in portrait.terms],
-        "alike": [{**_term(one), "probability": json_number(one.probability or 0.0, 3)} for one in portrait.alike],
+        "indistinguishable": [
+            {**_term(one), "probability": json_number(one.probability or 0.0, 3)} for one in portrait.alike
+        ],
         "explained_percent": json_number(100.0 * portrait.explained, 4),
         "error_percent": json_number(100.0 * portrait.error, 4),
         "held_out_rms_percent": json_number(100.0 * portrait.held_out_rms, 4),

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
+from collections.abc import Callable, Sequence
 
 from toolpath_stiff.stiffness.effects.contract import joined
+from toolpath_stiff.units import RAD_PER_DEG
 from toolpath_stiff.updating.portrait import Portrait, Sized
 from toolpath_stiff.updating.portrait.terms import Term
 
@@ -16,7 +15,7 @@ SAID: dict[str, tuple[str, float, str]] = {
     "y": ("y", 1e-3, "mm"),
     "z": ("z", 1e-3, "mm"),
     "radius": ("the distance from the machine's axis", 1e-3, "mm"),
-    "tilt": ("the tilt", float(np.pi / 180.0), "deg"),
+    "tilt": ("the tilt", RAD_PER_DEG, "deg"),
     "strut length": ("the strut's length", 1e-3, "mm"),
     "strut force": ("the force in the strut", 1.0, "N"),
     "load": ("the load", 1.0, "N"),
@@ -85,20 +84,32 @@ def _with(term: Term) -> str:
     def shown(value: float) -> str:
         return f"{float(f'{value / si:.3g}'):g} {unit}".rstrip()
 
-    if term.shape == "slope" and "power" in at:
-        fading = "less" if at["power"] < 0.0 else "more"
-        return f", {fading} with {name} (power {at['power']:.2g}, the size given at {shown(at['reference'])})"
-    if term.shape == "slope" and len(term.signs) > 1:
-        return f" in a straight line with {name}, nothing at {shown(at['start'])} and in full at {shown(at['end'])}"
     if term.shape == "slope":
-        side = "above" if at["end"] > at["start"] else "below"
-        return f" where {name} is {side} {shown(at['start'])}, in full at {shown(at['end'])}"
+        return _slope_words(term, name, shown)
     if term.shape == "square":
         return f", with the square of {name} from {shown(at['centre'])}, in full {shown(at['reach'])} from there"
     if term.shape == "bump":
         return f" where {name} is about {shown(at['centre'])} (to some {shown(2.0 * at['width'])} either side)"
     if term.shape == "periodic":
         return f" in a wave over {name} with a period of {shown(at['period'])}"
+    return _threshold_words(term, name, shown)
+
+
+def _slope_words(term: Term, name: str, shown: Callable[[float], str]) -> str:
+    """A straight line or a power of a variable, in words."""
+    at = term.constants
+    if "power" in at:
+        fading = "less" if at["power"] < 0.0 else "more"
+        return f", {fading} with {name} (power {at['power']:.2g}, the size given at {shown(at['reference'])})"
+    if len(term.signs) > 1:
+        return f" in a straight line with {name}, nothing at {shown(at['start'])} and in full at {shown(at['end'])}"
+    side = "above" if at["end"] > at["start"] else "below"
+    return f" where {name} is {side} {shown(at['start'])}, in full at {shown(at['end'])}"
+
+
+def _threshold_words(term: Term, name: str, shown: Callable[[float], str]) -> str:
+    """A step, a line from a value on, or what friction holds, in words."""
+    at = term.constants
     if "from" in at:
         side = "above" if at["end"] > at["from"] else "below"
         return f" where {name} is {side} {shown(at['from'])}, in full at {shown(at['end'])}"
