@@ -150,7 +150,8 @@ def _without_a_path(file: Path, theirs: Program | None, said: str, ours: Program
 def read(file: Path, table: Path, interpreter: str, rs274: str | None) -> tuple[Program | None, str]:
     """The program, or why not; no cutting move is told apart, since it is an answer of its own."""
     try:
-        return read_program(file, tool_table=table, interpreter=interpreter, rs274=rs274, controller=LINUXCNC), "read"
+        program = read_program(file, tool_table=table, interpreter=interpreter, rs274=rs274, controller=LINUXCNC)
+        return (program, "read") if len(feed_path(program)) else (None, NONE)
     except InputError as error:
         return None, NONE if error.found == "no cutting move" else str(error)
     except TpsError as error:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+import subprocess
 import sys
 import tempfile
 from collections import Counter
@@ -32,9 +33,9 @@ PRINTED = 0.011  # a move shorter than rs274's digits, and twice their sum
 CENTER_TOLERANCE = 0.05  # mm: a centre from R magnifies the digits where the chord is nearly a diameter
 MOST_REPAIRS = 15
 LENGTHS = {1: 50.0, 2: 75.5, 3: 101.6}  # mm
-SAME, RAPIDS, REFUSED, WE_REFUSE, ONLY_WE, OTHER = (
+SAME, RAPIDS, REFUSED, WE_REFUSE, ONLY_WE, UNANSWERED, OTHER = (
     "same feed path", "same feed path, other rapids", "refused by both", "refused by the built-in reader",
-    "refused by LinuxCNC alone", "OTHER PATH",
+    "refused by LinuxCNC alone", "LinuxCNC gave no answer within a minute", "OTHER PATH",
 )  # fmt: skip
 Move = tuple[str, np.ndarray, np.ndarray, "tuple[np.ndarray, np.ndarray, float] | None"]
 
@@ -114,7 +115,10 @@ def hunt_one(text: str, folder: Path, controller: Controller = UNKNOWN_CONTROL) 
         file.write_text(text, newline="")
         for left in ("rs274.var", "canon.txt"):  # it keeps its parameters from run to run
             (folder / left).unlink(missing_ok=True)
-        theirs = rs274.run(file, folder, their_table)
+        try:
+            theirs = rs274.run(file, folder, their_table)
+        except subprocess.TimeoutExpired:
+            return Outcome(UNANSWERED, "", text)
         program, answer = None, ""
         try:
             program = read_program(file, tool_table=folder / "ours.tbl", controller=controller)

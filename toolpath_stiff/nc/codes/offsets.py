@@ -359,10 +359,17 @@ def _hold_tip(state: State, block: CurrentBlock, word: Word, hold: bool) -> None
 def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
     """Length of the tool that G43 names by H, or of the one in the spindle."""
     number = block.take("H")
+    if number == 0 and state.dialect.name == "linuxcnc":  # find_tool_pocket(0): the tool in the spindle
+        number = None
     if number == 0:
         if state.dialect.increments:
             return math.nan
-        raise block.fail(block.values["H"], "is no offset on some controls, on LinuxCNC that of the tool", "H or G49")
+        raise block.fail(
+            block.values["H"],
+            "is no offset on some controls, on LinuxCNC that of the tool",
+            "H or G49",
+            "name the control with --dialect",
+        )
     tool = state.tool if number is None else int(number)
     if number is None and state.named_length not in (None, state.tool):
         raise block.fail(

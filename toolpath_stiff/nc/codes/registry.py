@@ -46,6 +46,9 @@ from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
 # -- codes that leave the path alone, and refused ones -----------------------------------------------------------------
 
 
+WAIT_FOR_INPUT = 66  # LinuxCNC, M-Codes, M66: P or E, and L with the kind of wait
+
+
 def path_control(state: State, block: CurrentBlock, code: str) -> None:
     """G61, G61.1, G64: P and Q are tolerances of the blending, which does not enter."""
     block.take("P")
@@ -53,10 +56,11 @@ def path_control(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def m_parameters(state: State, block: CurrentBlock) -> None:
-    """M codes may carry P, Q, E, R, S words; unless the block moves, these are theirs."""
+    """M codes may carry P, Q, E, R, S words, M66 an L too; unless the block moves, these are theirs."""
     moves = MOTION in block.groups or ONCE in block.groups or any(block.has(letter) for letter in POINT_WORDS)
     if not moves:
-        for letter in "PQERS":
+        waits = any(word.letter == "M" and word.value == WAIT_FOR_INPUT for word in block.block.words)
+        for letter in "PQERSL" if waits else "PQERS":
             block.take(letter)
 
 
