@@ -190,10 +190,10 @@ def table(counts: Counter[str], programs: int, seed: int) -> str:
         [
             "# Random programs through both readers",
             "",
-            f"{programs} random programs, of the seeds {seed} to {seed + programs - 1}: of lines at odds with each other, as "
-            "CAM writes them, with variables and flow, contours under cutter compensation, arcs at the tolerance. A line "
-            f"that one of the readers refuses is left out; the feed paths must agree within {TOLERANCE} mm and degrees, "
-            "move by move.",
+            f"{programs} random programs, of the seeds {seed} to {seed + programs - 1}: of lines at odds with each other, "
+            "as CAM writes them, with variables and flow, contours under cutter compensation, arcs at the tolerance. A "
+            "line that one of the readers refuses is left out; the feed paths must agree within "
+            f"{TOLERANCE} mm and degrees, move by move.",
             "",
             "| what became of it | programs |",
             "| --- | --- |",
