@@ -203,9 +203,9 @@ def table(counts: Counter[str], compared: set[str], programs: int, seed: int) ->
         [
             "# Random programs through both readers",
             "",
-            f"{programs} random programs, of the seeds {seed} to {seed + programs - 1}: of lines at odds with each other, "
-            "as CAM writes them, with variables and flow, contours under cutter compensation, arcs at the tolerance. A "
-            "line that one of the readers refuses is left out; the feed paths must agree within "
+            f"{programs} random programs, of the seeds {seed} to {seed + programs - 1}: of lines at odds with each "
+            "other, as CAM writes them, with variables and flow, contours under cutter compensation, arcs at the "
+            "tolerance. A line that one of the readers refuses is left out; the feed paths must agree within "
             f"{TOLERANCE} mm and degrees, move by move.",
             "",
             "| what became of it | programs |",

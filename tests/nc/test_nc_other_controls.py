@@ -10,7 +10,7 @@ from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.codes.registry import would_change
 from toolpath_stiff.nc.controller import Controller, dialect_named
-from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.words import read_block
 
 HEAD = "G21 G90 F600.\nG0 Z5.\n"
@@ -222,10 +222,11 @@ def test_fine_boring_is_that_of_the_control_that_is_named():
     assert cuts(program) == [[1, 0, -2]]
     assert [note.word for note in program.unsupported] == ["Q.1"]
     assert [note.word for note in read("G76 X1. Z-2. R1. I.1 J0. P100", "haas").unsupported] == ["I.1", "J0."]
-    for dialect in ("generic", "linuxcnc"):
-        with pytest.raises(InputError, match="threading cycle on LinuxCNC, fine boring on Fanuc's") as refusal:
-            read("G76 X1. Z-2. R1. Q.1", dialect)
-        assert refusal.value.hint.startswith("name the control with --dialect")
+    with pytest.raises(InputError, match="threading cycle on LinuxCNC, fine boring on Fanuc's") as refusal:
+        read("G76 X1. Z-2. R1. Q.1", "generic")
+    assert refusal.value.hint.startswith("name the control with --dialect")
+    with pytest.raises(InputError, match="lathe's threading cycle on LinuxCNC"):
+        read("G76 X1. Z-2. R1. Q.1", "linuxcnc")
 
 
 def test_pecks_that_get_shallower():
@@ -384,3 +385,24 @@ def test_text_before_the_tape_mark_is_no_part_of_the_program():
 def test_text_that_is_no_leader_is_refused(text):
     with pytest.raises(InputError):
         parse_program(text, "p.nc")
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+@pytest.mark.parametrize(("before", "kind"), [("G0", RAPID), ("G1", FEED)])
+def test_a_cycle_off_leaves_the_motion_of_its_own_group(dialect, before, kind):
+    """Fanuc, operator's manuals, Canned cycle cancel: normal operation goes on; cycles are of group 09, G0 of 01."""
+    moves = read(f"F100.\n{before} X1.\nG99 G81 X2. Z-2. R1.\nG80 Z25.\nX9.", dialect).moves
+    assert moves.motion[-2:].tolist() == [kind, kind] and moves.end[-1, 0] == pytest.approx(9e-3)
+
+
+def test_a_cycle_off_leaves_no_arc():
+    with pytest.raises(InputError, match="no motion mode"):
+        read("G2 X4. I2.\nG81 X2. Z-2. R1.\nG80 Z25.", "fanuc")
+
+
+@pytest.mark.parametrize(("mode", "depth"), [("G90", "Z-2."), ("G91", "Z-7.")])
+def test_a_cycle_without_r_begins_where_the_tool_stands(mode, depth):
+    program = read(f"{mode} G98 G81 X2. {depth}\nX3.", "haas")
+    assert [x[2] for x in cuts(program)] == [-2.0, -2.0] and any("without R" in text for text in program.assumptions)
+    with pytest.raises(InputError, match="without R"):
+        read("G98 G81 X2. Z-2.", "fanuc")

@@ -30,12 +30,16 @@ def ends(program: Program) -> list[tuple[float, float]]:
     return [(round(x * 1e3, 6) + 0.0, round(y * 1e3, 6) + 0.0) for x, y in moves.end[moves.motion != RAPID][:, :2]]
 
 
-def test_a_square_from_outside():
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_a_square_from_outside(dialect):
     """Clockwise, the tool on its left: each corner of 90 degrees is where the offset sides meet."""
-    program = read("G0 X-10. Y-10.\nG41 D1 G1 X0 Y0\nY20.\nX20.\nY0\nX0\nG40 X-10. Y-10.")
+    program = read("G0 X-10. Y-10.\nG41 D1 G1 X0 Y0\nY20.\nX20.\nY0\nX0\nG40 X-10. Y-10.", dialect)
     assert ends(program) == [(-3, 0), (-3, 23), (23, 23), (23, -3), (0, -3), (-10, -10)]
     assert not program.moves.arc_sweep.any()
-    assert any("type A" in text for text in program.assumptions)
+    assert [t.split(" (")[0] for t in program.assumptions if "setting" in t] == [
+        "cutter compensation begins and ends by type A",
+        "outside corners of cutter compensation are joined by straight moves",
+    ]
 
 
 def test_an_inside_corner():
@@ -135,7 +139,6 @@ def test_no_offset_is_the_programmed_path():
 @pytest.mark.parametrize(
     ("dialect", "text", "line", "found"),
     [
-        ("haas", "G0 X0 Y-10.\nG41 D1 G1 Y0.\nX20.\nY-20.\nG40 X0", 5, "outside corner"),
         ("haas", "G41 G1 X10.", 2, "without D"),
         ("fanuc", "G41 D7 G1 X10.", 2, "diameter of tool 7"),
         ("fanuc", "G41 D1 G2 X10. I5.", 2, "an arc as the first move"),

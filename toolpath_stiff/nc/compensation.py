@@ -68,8 +68,6 @@ class Cutter:
         Moves since the last corner, the one in the plane first.
     straight
         As Fanuc's and Haas' manuals have it (`straight_corners`), not LinuxCNC's.
-    corners
-        Whether its way round outside corners is known.
     entering
         The first move waits for the next one, which says where it ends.
     """
@@ -82,7 +80,6 @@ class Cutter:
     anchor: Point2 = (0.0, 0.0)
     pending: list[Pending] = field(default_factory=list)
     straight: bool = False
-    corners: bool = True
     entering: bool = False
 
     @property
@@ -100,7 +97,8 @@ class Step:
     trim: Point2 | None = None
     corner: Point2 | None = None  # where the tool centre leaves the arc about the programmed start
     center: Point2 | None = None  # of its own arc, where that is not the programmed one
-    way: tuple[Point2, ...] = ()  # straight moves round the programmed start
+    outside: bool = False  # a corner that straight moves go round: `way`, after the move before is made longer
+    way: tuple[Point2, ...] = ()
 
 
 def _beside(point: Point2, length: float, angle: float) -> Point2:

@@ -1,4 +1,4 @@
-"""Cutter compensation as Fanuc's manuals have it, and as far as Haas' manual agrees. mm, rad.
+"""Cutter compensation as Fanuc's manuals have it, and Haas' controls whose setting 58 is FANUC. mm, rad.
 
 Source: Fanuc's operator's manuals, "Details of cutter or tool nose radius compensation": start-up and cancellation of
 type A (parameter 5003, bit 0, SUP = 0; Haas: setting 43), corners joined by straight moves (parameter 19607, bit 2,
@@ -21,7 +21,10 @@ TYPE_A = (
     "cutter compensation begins and ends by type A (Fanuc: parameter 5003, bit 0, is 0; Haas: setting 43), and D is "
     "the tool in the tool table whose diameter it takes"
 )
-STRAIGHT = "outside corners of cutter compensation are joined by straight moves (parameter 19607, bit 2, is 0)"
+STRAIGHT = (
+    "outside corners of cutter compensation are joined by straight moves (Fanuc: parameter 19607, bit 2, is 0; Haas: "
+    "setting 58 is FANUC)"
+)
 
 
 def enter(cutter: Cutter, target: Point2, arc: OffsetArc | None) -> Step:
@@ -51,11 +54,6 @@ def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) 
         raise ArcError("a contour under cutter compensation that turns back on itself", "another contour")
     if turn * cutter.side > 0.0:
         return _inside(cutter, start, target, arc)
-    if not cutter.corners:
-        raise ArcError(
-            "an outside corner under cutter compensation, whose way round Haas' manual does not give",
-            "a contour with its outside corners rounded, or the path of the tool centre",
-        )
     return _outside(cutter, _end(cutter, start, target, arc), (before, turn), beside, arc)
 
 
@@ -100,4 +98,4 @@ def _outside(cutter: Cutter, end: Point2, headings: tuple[float, float], beside:
     if arc is not None:
         way.append(beside)
     longer = way.pop(0) if cutter.pending[0].arc is None else None
-    return Step(end, trim=longer, way=tuple(way))
+    return Step(end, trim=longer, outside=True, way=tuple(way))

@@ -71,9 +71,8 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
     diameter = _diameter(state, block, code)
     side = SIDES[code] if diameter >= 0.0 else -SIDES[code]
     state.cutter = Cutter(
-        side, abs(diameter) / 2.0, geometry.PLANES[state.plane], state.length_scale,
-        straight=straight, corners=state.dialect.name != "haas",
-    )  # fmt: skip
+        side, abs(diameter) / 2.0, geometry.PLANES[state.plane], state.length_scale, straight=straight
+    )
     if straight:
         state.assume(straight_corners.TYPE_A)
 
@@ -216,7 +215,7 @@ def _round_corner(
         _settle(state, block, cutter, step.trim)
     cutter.pending.clear()
     cutter.anchor = cutter.center
-    if step.way:
+    if step.outside:
         _go_straight_round(state, block, cutter, step, motion, there, feed, bound)
     if step.corner is None:
         return

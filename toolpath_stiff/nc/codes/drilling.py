@@ -153,6 +153,10 @@ def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, give
         raise block.fail(None, f"{code} with rotary axes", "the rotary axes in a block before it")
     if normal in words:
         state.sticky["Z"] = words.pop(normal)
+    if state.dialect.name == "haas" and "R" not in state.sticky:  # Haas, mill operator's manual, G81: R is optional
+        frames = state.frames
+        state.sticky["R"] = frames.to_program(frames.position)[normal] if state.absolute else 0.0
+        state.assume("a drilling cycle without R begins where the tool stands (Haas: R is optional)")
     _check_cycle(state, block, code, normal)
     return words
 

@@ -302,26 +302,42 @@ def codes_table() -> str:
     Examples
     --------
     >>> print("\n".join(codes_table().splitlines()[:3]))
-    | code | group | meaning | function in `nc/codes` | dialects | source |
-    | --- | --- | --- | --- | --- | --- |
-    | G0 | motion | rapid | `motion.straight` | all | LinuxCNC, G-Codes, G0 |
+    | code | group | meaning | function in `nc/codes` | dialects | source | against LinuxCNC |
+    | --- | --- | --- | --- | --- | --- | --- |
+    | G0 | motion | rapid | `motion.straight` | all | LinuxCNC, G-Codes, G0 | same path |
     """
     understood = [
-        (code.name, code.group, _meaning(code), _function(code), _controls(code.controls), code.source)
+        (code.name, code.group, _meaning(code), _function(code), _controls(code.controls), code.source, _witness(code))
         for code in CODES.values()
     ]
-    others = [(a.name, f"as {a.code}", a.meaning, "", _controls(a.controls), a.source) for a in ALIASES.values()]
+    others = [
+        (a.name, f"as {a.code}", a.meaning, "", _controls(a.controls), a.source, NOT_THERE) for a in ALIASES.values()
+    ]
     refused = [(code.name, code.what, code.hint, code.source) for code in REFUSED.values()]
     return "\n".join(
         [
-            *_rows(("code", "group", "meaning", "function in `nc/codes`", "dialects", "source"), understood + others),
+            *_rows(HEADING, understood + others),
             "",
-            "Refused, with the line and what to do instead:",
+            "Refused in every dialect, with the line and what to do instead; nothing is held against LinuxCNC:",
             "",
             *_rows(("code", "what it is", "instead", "source"), refused),
             "",
         ]
     )
+
+
+HEADING = ("code", "group", "meaning", "function in `nc/codes`", "dialects", "source", "against LinuxCNC")
+SAME_PATH, NOT_THERE, NOT_HELD = "same path", "has none", "not held"
+# LinuxCNC's, and in no program whose path is compared with LinuxCNC's. The others are in such programs: the random ones
+# of `benchmarks/hunt.md`, or those of the tests against rs274 (`tests/nc/test_code_registry.py` looks them up).
+WITHOUT_WITNESS = ("M19", "M71")
+
+
+def _witness(code: Code) -> str:
+    """Whether what the code does is held against LinuxCNC's interpreter."""
+    if "linuxcnc" not in code.controls or "LinuxCNC" not in code.source:
+        return NOT_THERE
+    return NOT_HELD if code.name in WITHOUT_WITNESS else SAME_PATH
 
 
 def _meaning(code: Code) -> str:
