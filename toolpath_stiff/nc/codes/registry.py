@@ -330,7 +330,7 @@ HEADING = ("code", "group", "meaning", "function in `nc/codes`", "dialects", "so
 SAME_PATH, NOT_THERE, NOT_HELD = "same path", "has none", "not held"
 # LinuxCNC's, and in no program whose path is compared with LinuxCNC's. The others are in such programs: the random ones
 # of `benchmarks/hunt.md`, or those of the tests against rs274 (`tests/nc/test_code_registry.py` looks them up).
-WITHOUT_WITNESS = ("M19", "M71")
+WITHOUT_WITNESS = ("M7", "M19", "M53", "M71")
 
 
 def _witness(code: Code) -> str:
