@@ -26,7 +26,6 @@ from toolpath_stiff.errors import TpsError
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
 from toolpath_stiff.nc.codes import code_name
-from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.linuxcnc import refusal
 from toolpath_stiff.nc.words import split_lines
@@ -172,16 +171,13 @@ def main() -> int:
     parser.add_argument("--out", help="write the table to this file as well")
     args = parser.parse_args()
     counts: Counter[str] = Counter()
-    compared: set[str] = set()
     with tempfile.TemporaryDirectory() as name:
         for seed in range(args.seed, args.seed + args.programs):
             outcome = hunt_one(program_of(seed), Path(name), control_of(seed))
             counts[outcome.verdict if outcome else WITHHELD] += 1
-            if outcome and outcome.verdict in (SAME, RAPIDS):
-                compared |= codes_of(outcome.text)
             if outcome and outcome.verdict == OTHER:
                 print(f"seed {seed}: {outcome.detail}\n{outcome.text}\n")
-    text = table(counts, compared, args.programs, args.seed)
+    text = table(counts, args.programs, args.seed)
     print(text)
     if args.out:
         write_atomically(args.out, text)
@@ -195,7 +191,7 @@ def codes_of(text: str) -> set[str]:
     return codes | {letter for letter in "FST" if letter in bare}
 
 
-def table(counts: Counter[str], compared: set[str], programs: int, seed: int) -> str:
+def table(counts: Counter[str], programs: int, seed: int) -> str:
     """The document."""
     rows = [f"| {verdict} | {counts[verdict]} |" for verdict in VERDICTS if counts[verdict] or verdict == OTHER]
     command = f"python -m benchmarks.hunt --programs {programs} --seed {seed} --out benchmarks/hunt.md"
@@ -211,8 +207,6 @@ def table(counts: Counter[str], compared: set[str], programs: int, seed: int) ->
             "| what became of it | programs |",
             "| --- | --- |",
             *rows,
-            "",
-            f"Codes in the programs whose paths agree: {' '.join(sorted(compared & CODES.keys()))}.",
             "",
             f"Made by `{command}`.",
             "",

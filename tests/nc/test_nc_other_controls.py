@@ -406,3 +406,33 @@ def test_a_cycle_without_r_begins_where_the_tool_stands(mode, depth):
     assert [x[2] for x in cuts(program)] == [-2.0, -2.0] and any("without R" in text for text in program.assumptions)
     with pytest.raises(InputError, match="without R"):
         read("G98 G81 X2. Z-2.", "fanuc")
+
+
+@pytest.mark.parametrize(
+    ("dialect", "line"),
+    [
+        ("fanuc", "G0 G15 G17 G23 G25 G40 G49 G50 G50.1 G64 G69 G80 G90 G94 G98 G13.1"),
+        ("fanuc", "G22 X10. Y10. Z10. I0. J0. K0."),
+        ("fanuc", "G62\nG63\nG64\nG26 P100 Q5 R10\nG5.4 Q1"),
+        ("haas", "G100"),
+    ],
+)
+def test_safe_start_changes_no_path(dialect, line):
+    assert cuts(read(f"{line}\nG1 X5.", dialect)) == [[5, 0, 5]]
+    with pytest.raises(InputError):
+        read(f"{line}\nG1 X5.", "linuxcnc")
+
+
+@pytest.mark.parametrize(("dialect", "lines"), [("haas", "G10 L20 P2 X7.\nG111"), ("fanuc", "G10 L20 P2 X7.\nG54 P2")])
+def test_other_names_of_additional_offsets(dialect, lines):
+    """G110 to G129 are Haas' G154 P1 to P20; Fanuc's G54 P is G54.1 P."""
+    moves = read(f"G10 L2 P1 X0\nG1 X0\n{lines}\nG1 X1.", dialect).moves
+    assert moves.end[-1, 0] == pytest.approx(8e-3)
+    with pytest.raises(InputError, match=r"G154 P3|G54\.1 P3"):
+        read({"haas": "G112", "fanuc": "G54 P3"}[dialect], dialect)
+
+
+def test_the_second_reference_point_by_its_number():
+    assert len(read("G91 G30 P2 Z0.\nG90 G1 X1. Y1. Z1.", "fanuc").moves)
+    with pytest.raises(InputError, match="P3 is a reference point"):
+        read("G91 G30 P3 Z0.", "fanuc")

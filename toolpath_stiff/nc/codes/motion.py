@@ -170,6 +170,8 @@ def go_home(state: State, block: CurrentBlock, code: str) -> None:
     """G28, G30: rapid to the intermediate point, then the axes named there, or all, to the reference point."""
     standing = {axis for axis, letter in enumerate(INCREMENTAL_AXES) if block.take(letter) is not None}
     words = axis_words(state, block)
+    if code == "G30" and state.dialect.increments and block.take("P") not in (None, 2):  # P2: as G30 alone (Fanuc)
+        raise block.fail(block.values["P"], "is a reference point that nothing gives", "P2")
     frames = state.frames
     _leave_program_coordinates(state, block, block.codes[code], {**dict.fromkeys(standing, 0.0), **words})
     if words:
