@@ -2,7 +2,7 @@
 
 Without arguments: every sample program that Debian's `linuxcnc-uspace` installs. The committed table is of every
 program in LinuxCNC's own repository (`nc_files`, `configs`, `tests`), as Debian's source package has it: the folder
-that `apt-get source linuxcnc` makes is the argument. The programs are LinuxCNC's (GPL) and are not part of this project.
+that `apt-get source linuxcnc` makes is the argument. The programs are LinuxCNC's (GPL) and no part of this project.
 
 The built-in reader must give the feed path that `rs274` gives, within 0.01 mm and 0.01 degrees in both directions, or
 refuse with file and line; never another path. Both take the program for LinuxCNC's (`--dialect linuxcnc`). Exit code 1

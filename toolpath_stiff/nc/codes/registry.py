@@ -168,7 +168,7 @@ PASSIVE_CODES = (
 _OTHER_PLANE = ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C", g_codes("G17 - G19.1"))
 _PROBING = ("probing", "leave probing out", g_codes("G38.2 - G38.5"))
 _POCKET = (
-    "a circular pocket, whose way to its circles and between them no manual gives in words or numbers",
+    "a circular pocket, whose way to its circles and between them is drawn in the manual without numbers",
     "post the program with arcs",
     f"{_HAAS}, G12 and G13",
 )
