@@ -63,7 +63,8 @@ def installed_programs() -> list[Path]:
 def programs_of(arguments: Iterable[str]) -> Iterator[Path]:
     """Files as named, and those in folders."""
     for argument in map(Path, arguments):
-        yield from sorted(p for p in argument.rglob("*") if p.suffix in SUFFIXES) if argument.is_dir() else [argument]
+        inside = (p for p in argument.rglob("*") if p.suffix in SUFFIXES and p.is_file())  # a link may lead nowhere
+        yield from sorted(inside) if argument.is_dir() else [argument]
 
 
 def feed_path(program: Program) -> Moves:
