@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+import subprocess
 import sys
 import tempfile
 from collections import Counter
@@ -22,7 +23,9 @@ from benchmarks.hunt_compensation import Beside, Tolerances
 from benchmarks.hunt_programs import Cam, Harsh, Parametric, Zeros
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
+from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.linuxcnc import refusal
 from toolpath_stiff.nc.words import split_lines
@@ -32,10 +35,13 @@ PRINTED = 0.011  # a move shorter than rs274's digits, and twice their sum
 CENTER_TOLERANCE = 0.05  # mm: a centre from R magnifies the digits where the chord is nearly a diameter
 MOST_REPAIRS = 15
 LENGTHS = {1: 50.0, 2: 75.5, 3: 101.6}  # mm
-SAME, RAPIDS, REFUSED, WE_REFUSE, ONLY_WE, OTHER = (
+SAME, RAPIDS, REFUSED, WE_REFUSE, ONLY_WE, UNANSWERED, OTHER = (
     "same feed path", "same feed path, other rapids", "refused by both", "refused by the built-in reader",
-    "refused by LinuxCNC alone", "OTHER PATH",
+    "refused by LinuxCNC alone", "LinuxCNC gave no answer within a minute", "OTHER PATH",
 )  # fmt: skip
+COMMENT, CODE = re.compile(r"\([^)]*\)|;.*"), re.compile(r"([GM]) *0*(\d+(?:\.\d)?)(?![\d.])")
+WITHHELD = "not given to LinuxCNC"
+VERDICTS = (SAME, RAPIDS, REFUSED, WE_REFUSE, ONLY_WE, WITHHELD, UNANSWERED, OTHER)
 Move = tuple[str, np.ndarray, np.ndarray, "tuple[np.ndarray, np.ndarray, float] | None"]
 
 
@@ -114,7 +120,10 @@ def hunt_one(text: str, folder: Path, controller: Controller = UNKNOWN_CONTROL) 
         file.write_text(text, newline="")
         for left in ("rs274.var", "canon.txt"):  # it keeps its parameters from run to run
             (folder / left).unlink(missing_ok=True)
-        theirs = rs274.run(file, folder, their_table)
+        try:
+            theirs = rs274.run(file, folder, their_table)
+        except subprocess.TimeoutExpired:
+            return Outcome(UNANSWERED, "", text)
         program, answer = None, ""
         try:
             program = read_program(file, tool_table=folder / "ours.tbl", controller=controller)
@@ -159,17 +168,50 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.hunt", description=__doc__)
     parser.add_argument("--programs", type=int, default=2000, metavar="N", help="how many (default: 2000)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the first one (default: 0)")
+    parser.add_argument("--out", help="write the table to this file as well")
     args = parser.parse_args()
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as name:
         for seed in range(args.seed, args.seed + args.programs):
             outcome = hunt_one(program_of(seed), Path(name), control_of(seed))
-            counts[outcome.verdict if outcome else "not given to LinuxCNC"] += 1
+            counts[outcome.verdict if outcome else WITHHELD] += 1
             if outcome and outcome.verdict == OTHER:
                 print(f"seed {seed}: {outcome.detail}\n{outcome.text}\n")
-    for verdict, count in counts.most_common():
-        print(f"{count:7d}  {verdict}")
+    text = table(counts, args.programs, args.seed)
+    print(text)
+    if args.out:
+        write_atomically(args.out, text)
     return 1 if counts[OTHER] else 0
+
+
+def codes_of(text: str) -> set[str]:
+    """The codes in a program, and the words F, S, T that act like codes."""
+    bare = COMMENT.sub("", text).upper()
+    codes = {code_name(letter, float(number)) for letter, number in CODE.findall(bare)}
+    return codes | {letter for letter in "FST" if letter in bare}
+
+
+def table(counts: Counter[str], programs: int, seed: int) -> str:
+    """The document."""
+    rows = [f"| {verdict} | {counts[verdict]} |" for verdict in VERDICTS if counts[verdict] or verdict == OTHER]
+    command = f"python -m benchmarks.hunt --programs {programs} --seed {seed} --out benchmarks/hunt.md"
+    return "\n".join(
+        [
+            "# Random programs through both readers",
+            "",
+            f"{programs} random programs, of the seeds {seed} to {seed + programs - 1}: of lines at odds with each "
+            "other, as CAM writes them, with variables and flow, contours under cutter compensation, arcs at the "
+            "tolerance. A line that one of the readers refuses is left out; the feed paths must agree within "
+            f"{TOLERANCE} mm and degrees, move by move.",
+            "",
+            "| what became of it | programs |",
+            "| --- | --- |",
+            *rows,
+            "",
+            f"Made by `{command}`.",
+            "",
+        ]
+    )
 
 
 KINDS = (Harsh, Zeros, Harsh, Cam, Parametric, Beside, Tolerances)

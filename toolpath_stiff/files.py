@@ -287,7 +287,10 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
             shutil.rmtree(left, ignore_errors=True)
     while True:
         folder = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
-        handle = os.open(folder, os.O_RDONLY) if sys.platform != "win32" else None
+        try:
+            handle = os.open(folder, os.O_RDONLY) if sys.platform != "win32" else None
+        except FileNotFoundError:  # another run took it for a killed one's before it was held
+            continue
         if handle is None or (hold(handle) and _is_at(folder, handle)):
             break
         os.close(handle)

@@ -49,7 +49,7 @@ def test_an_offsets_file_may_hold_them(tmp_path):
 @pytest.mark.parametrize(
     ("text", "dialect", "message"),
     [
-        ("G54.1 P3 G1 X1. F9.", "generic", r"P3 is an offset that nothing defines.*controller file"),
+        ("G54.1 P3 G1 X1. F9.", "generic", r"G54.1 P3, an offset that nothing defines.*controller file"),
         ("G54.1 G1 X1. F9.", "fanuc", "needs the number of its offset"),
         ("G54.1 P301 X1.", "fanuc", "P1 to P300"),
         ("G154 P100 X1.", "haas", "P1 to P99"),

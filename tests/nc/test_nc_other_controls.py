@@ -10,7 +10,7 @@ from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.codes.registry import would_change
 from toolpath_stiff.nc.controller import Controller, dialect_named
-from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.words import read_block
 
 HEAD = "G21 G90 F600.\nG0 Z5.\n"
@@ -222,10 +222,11 @@ def test_fine_boring_is_that_of_the_control_that_is_named():
     assert cuts(program) == [[1, 0, -2]]
     assert [note.word for note in program.unsupported] == ["Q.1"]
     assert [note.word for note in read("G76 X1. Z-2. R1. I.1 J0. P100", "haas").unsupported] == ["I.1", "J0."]
-    for dialect in ("generic", "linuxcnc"):
-        with pytest.raises(InputError, match="threading cycle on LinuxCNC, fine boring on Fanuc's") as refusal:
-            read("G76 X1. Z-2. R1. Q.1", dialect)
-        assert refusal.value.hint.startswith("name the control with --dialect")
+    with pytest.raises(InputError, match="threading cycle on LinuxCNC, fine boring on Fanuc's") as refusal:
+        read("G76 X1. Z-2. R1. Q.1", "generic")
+    assert refusal.value.hint.startswith("name the control with --dialect")
+    with pytest.raises(InputError, match="lathe's threading cycle on LinuxCNC"):
+        read("G76 X1. Z-2. R1. Q.1", "linuxcnc")
 
 
 def test_pecks_that_get_shallower():
@@ -384,3 +385,54 @@ def test_text_before_the_tape_mark_is_no_part_of_the_program():
 def test_text_that_is_no_leader_is_refused(text):
     with pytest.raises(InputError):
         parse_program(text, "p.nc")
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+@pytest.mark.parametrize(("before", "kind"), [("G0", RAPID), ("G1", FEED)])
+def test_a_cycle_off_leaves_the_motion_of_its_own_group(dialect, before, kind):
+    """Fanuc, operator's manuals, Canned cycle cancel: normal operation goes on; cycles are of group 09, G0 of 01."""
+    moves = read(f"F100.\n{before} X1.\nG99 G81 X2. Z-2. R1.\nG80 Z25.\nX9.", dialect).moves
+    assert moves.motion[-2:].tolist() == [kind, kind] and moves.end[-1, 0] == pytest.approx(9e-3)
+
+
+def test_a_cycle_off_leaves_no_arc():
+    with pytest.raises(InputError, match="no motion mode"):
+        read("G2 X4. I2.\nG81 X2. Z-2. R1.\nG80 Z25.", "fanuc")
+
+
+@pytest.mark.parametrize(("mode", "depth"), [("G90", "Z-2."), ("G91", "Z-7.")])
+def test_a_cycle_without_r_begins_where_the_tool_stands(mode, depth):
+    program = read(f"{mode} G98 G81 X2. {depth}\nX3.", "haas")
+    assert [x[2] for x in cuts(program)] == [-2.0, -2.0] and any("without R" in text for text in program.assumptions)
+    with pytest.raises(InputError, match="without R"):
+        read("G98 G81 X2. Z-2.", "fanuc")
+
+
+@pytest.mark.parametrize(
+    ("dialect", "line"),
+    [
+        ("fanuc", "G0 G15 G17 G23 G25 G40 G49 G50 G50.1 G64 G69 G80 G90 G94 G98 G13.1"),
+        ("fanuc", "G22 X10. Y10. Z10. I0. J0. K0."),
+        ("fanuc", "G62\nG63\nG64\nG26 P100 Q5 R10\nG5.4 Q1"),
+        ("haas", "G100"),
+    ],
+)
+def test_safe_start_changes_no_path(dialect, line):
+    assert cuts(read(f"{line}\nG1 X5.", dialect)) == [[5, 0, 5]]
+    with pytest.raises(InputError):
+        read(f"{line}\nG1 X5.", "linuxcnc")
+
+
+@pytest.mark.parametrize(("dialect", "lines"), [("haas", "G10 L20 P2 X7.\nG111"), ("fanuc", "G10 L20 P2 X7.\nG54 P2")])
+def test_other_names_of_additional_offsets(dialect, lines):
+    """G110 to G129 are Haas' G154 P1 to P20; Fanuc's G54 P is G54.1 P."""
+    moves = read(f"G10 L2 P1 X0\nG1 X0\n{lines}\nG1 X1.", dialect).moves
+    assert moves.end[-1, 0] == pytest.approx(8e-3)
+    with pytest.raises(InputError, match=r"G154 P3|G54\.1 P3"):
+        read({"haas": "G112", "fanuc": "G54 P3"}[dialect], dialect)
+
+
+def test_the_second_reference_point_by_its_number():
+    assert len(read("G91 G30 P2 Z0.\nG90 G1 X1. Y1. Z1.", "fanuc").moves)
+    with pytest.raises(InputError, match="P3 is a reference point"):
+        read("G91 G30 P3 Z0.", "fanuc")

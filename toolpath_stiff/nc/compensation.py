@@ -1,5 +1,7 @@
 """Cutter compensation: the path of the tool centre beside a programmed contour, as LinuxCNC makes it. mm, rad.
 
+What other controls make of the first move and of corners is in `straight_corners`.
+
 Sources: LinuxCNC's manual, "Cutter Compensation"; what `rs274` 2.9 prints, against which the tests hold this on random
 contours. In a plane: the first move ends beside its end point; a convex corner is rounded by an arc about it (a rapid
 cuts it straight); a concave one moves the end of the move before to where both offset moves meet, and is an error where
@@ -64,6 +66,10 @@ class Cutter:
         Where the pending moves begin, in the plane.
     pending
         Moves since the last corner, the one in the plane first.
+    straight
+        As Fanuc's and Haas' manuals have it (`straight_corners`), not LinuxCNC's.
+    entering
+        The first move waits for the next one, which says where it ends.
     """
 
     side: int
@@ -73,6 +79,8 @@ class Cutter:
     at: list[float] | None = None
     anchor: Point2 = (0.0, 0.0)
     pending: list[Pending] = field(default_factory=list)
+    straight: bool = False
+    entering: bool = False
 
     @property
     def center(self) -> Point2:
@@ -89,6 +97,8 @@ class Step:
     trim: Point2 | None = None
     corner: Point2 | None = None  # where the tool centre leaves the arc about the programmed start
     center: Point2 | None = None  # of its own arc, where that is not the programmed one
+    outside: bool = False  # a corner that straight moves go round: `way`, after the move before is made longer
+    way: tuple[Point2, ...] = ()
 
 
 def _beside(point: Point2, length: float, angle: float) -> Point2:
@@ -123,7 +133,7 @@ def enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, tur
     _check_length(cutter, start, target)
     inside = cutter.side * turn > 0
     if inside:
-        _check_fits(cutter, math.dist(center, start) - TIGHT)
+        check_fits(cutter, math.dist(center, start) - TIGHT)
     end = _beside(target, cutter.radius, _angle(target, center) if inside else _angle(center, target))
     inward = _angle(end, center)
     cosine = math.cos(_angle(end, start) - inward)
@@ -140,7 +150,8 @@ def _check_length(cutter: Cutter, start: Point2, target: Point2) -> None:
         )
 
 
-def _check_fits(cutter: Cutter, radius: float) -> None:
+def check_fits(cutter: Cutter, radius: float) -> None:
+    """Raise `ArcError` for an arc that the tool, inside it, cannot follow."""
     if radius <= cutter.radius:
         raise ArcError(f"an inside arc of radius {radius:.4f} mm", f"more than the tool's radius, {cutter.radius:g} mm")
 
@@ -148,8 +159,11 @@ def _check_fits(cutter: Cutter, radius: float) -> None:
 # -- further moves -----------------------------------------------------------------------------------------------------
 
 
-def go_straight(cutter: Cutter, start: Point2, target: Point2) -> Step:
-    """A straight move from one programmed point to another, after others. Raises `ArcError`."""
+def go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CORNER) -> Step:
+    """A straight move from one programmed point to another, after others; `least`: rad that make a corner.
+
+    Raises `ArcError`.
+    """
     before, along = _angle(start, cutter.center), _angle(start, target)
     turned = cutter.side * (before - along)
     corner = (turned + math.tau if turned < 0.0 else turned) - math.pi / 2.0  # above 0: convex
@@ -158,18 +172,21 @@ def go_straight(cutter: Cutter, start: Point2, target: Point2) -> Step:
     arc = cutter.pending[0].arc
     # Over the round part of an "h" and along its upright: the tool stays above, it does not go round.
     over = corner > math.pi - CORNER and arc is not None and cutter.side * arc.turn < 0
-    if corner < -CORNER or corner > math.pi + CORNER or over:
+    if corner < -least or corner > math.pi + least or over:
         if arc is not None:
             return Step(end, trim=_arc_meets_line(cutter, arc, start, along))
         retreat = cutter.radius / math.tan((corner + math.pi) / 2.0)
         return Step(end, trim=_beside(cutter.center, retreat, before + cutter.side * math.pi / 2.0))
-    if corner > CORNER:
+    if corner > least:
         return Step(end, trim=cutter.center, corner=_beside(start, cutter.radius, across))
     return Step(end)
 
 
-def go_round(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int) -> Step:
-    """An arc from one programmed point to another, after other moves. Raises `ArcError`."""
+def go_round(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn: int, least: float = CORNER) -> Step:
+    """An arc from one programmed point to another, after other moves; `least`: rad that make a corner.
+
+    Raises `ArcError`.
+    """
     inside = cutter.side * turn > 0
     radius = math.dist(center, target)
     heading = _angle(start, cutter.center) - cutter.side * math.pi / 2.0  # of the move before
@@ -180,15 +197,15 @@ def go_round(cutter: Cutter, start: Point2, target: Point2, center: Point2, turn
     elif corner < -math.pi / 2.0:
         corner += math.tau
     if inside:
-        _check_fits(cutter, radius)
+        check_fits(cutter, radius)
     end = _beside(target, cutter.radius, _angle(target, center) if inside else _angle(center, target))
     straight_back = abs(corner - math.pi) < CORNER and not inside
-    if corner < -CORNER or corner > math.pi + CORNER or straight_back:
+    if corner < -least or corner > math.pi + least or straight_back:
         arc = cutter.pending[0].arc
         if arc is not None:
             return Step(end, trim=_arc_meets_arc(cutter, arc, center, turn, radius))
         return Step(end, trim=_line_meets_arc(cutter, heading, corner, center, turn, radius))
-    if corner > CORNER:
+    if corner > least:
         return Step(end, corner=_beside(start, cutter.radius, inward if inside else inward + math.pi))
     return Step(end)
 

@@ -204,6 +204,8 @@ def _move(state: State, block: CurrentBlock) -> None:
     """Change the motion mode, and move as the block asks."""
     given = block.groups.get(MOTION)
     if given is not None:
+        if given in (*CYCLES, "G80") and state.dialect.increments and state.motion not in CYCLES:
+            state.group_01 = state.motion
         if given in CYCLES:
             begin_cycle(state, given)
         state.motion = given

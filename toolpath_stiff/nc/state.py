@@ -178,6 +178,8 @@ class State:
         Its coordinates (with the present point), its tool table (None: there is none), what its words mean.
     motion
         The motion mode: "G0", "G1", "G2", "G3" or a drilling cycle; None after G80, and at the start.
+    group_01
+        On Fanuc's and Haas' controls, whose cycles are of another group (09): the last of G0 to G3, which G80 leaves.
     plane
         "G17", "G18" or "G19".
     absolute, arc_absolute, inch
@@ -238,6 +240,7 @@ class State:
     tools: dict[int, ToolEntry] | None = None
     dialect: Dialect = GENERIC
     motion: str | None = None
+    group_01: str | None = None
     plane: str = "G17"
     absolute: bool = True
     arc_absolute: bool = field(init=False)

@@ -22,6 +22,7 @@ POLAR, ROTATION, SCALING = "polar", "rotation", "scaling"
 M_STOP, M_TOOL, M_SPINDLE, M_COOLANT = "M stop", "M tool change", "M spindle", "M coolant"
 M_SUBPROGRAM, M_OVERRIDES = "M subprogram", "M overrides"
 EXACT_STOP, SMOOTHING, DYNAMIC, CORNER = "exact stop", "look-ahead", "dynamic offset", "corner"
+MIRROR, STROKE_CHECK, SPEED_WATCH, POLAR_PLANE = "mirror image", "stroke check", "speed watch", "polar interpolation"
 M_TAPPING, M_STATE = "M rigid tapping", "M modal state"
 DWELL, FEED, SPEED, TOOL = "dwell", "F", "S", "T"  # steps of their own: G4, and words that act without a code
 
@@ -30,7 +31,7 @@ DWELL, FEED, SPEED, TOOL = "dwell", "F", "S", "T"  # steps of their own: G4, and
 MODES = (
     UNITS, FEED_MODE, FEED, SPEED, TOOL, M_TOOL, DWELL, PLANE, POLAR, LENGTH, M_SUBPROGRAM, OFFSET,
     PATH_CONTROL, EXACT_STOP, SMOOTHING, DYNAMIC, SPINDLE_MODE, DISTANCE, ARC_DISTANCE, RETRACT, CUTTER, DIAMETER,
-    SCALING, M_SPINDLE, M_COOLANT, M_OVERRIDES, M_TAPPING, M_STATE,
+    SCALING, MIRROR, STROKE_CHECK, SPEED_WATCH, POLAR_PLANE, M_SPINDLE, M_COOLANT, M_OVERRIDES, M_TAPPING, M_STATE,
 )  # fmt: skip
 ACTS = (ROTATION, ONCE, M_STOP)
 STEPS = {step: at for at, step in enumerate((*MODES, *ACTS, MOTION, CORNER))}

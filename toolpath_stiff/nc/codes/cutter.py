@@ -1,4 +1,4 @@
-"""G40, G41, G42: cutter compensation by the tool's radius, as LinuxCNC has it (`compensation`). mm.
+"""G40, G41, G42: cutter compensation by the tool's radius, as LinuxCNC has it (`compensation`), or Fanuc and Haas. mm.
 
 The program keeps its own coordinates: `Frames.position` is the programmed point. What is recorded is the path of the
 tool centre; the ends of the last moves are set back in the recorder when the next corner is concave.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from toolpath_stiff.nc import compensation, geometry
+from toolpath_stiff.nc import compensation, geometry, straight_corners
 from toolpath_stiff.nc.codes import (
     ARC_DISTANCE,
     CUTTER,
@@ -30,7 +30,7 @@ from toolpath_stiff.nc.codes import (
 )
 from toolpath_stiff.nc.compensation import Cutter, OffsetArc, Pending, Step
 from toolpath_stiff.nc.geometry import Point2
-from toolpath_stiff.nc.moves import ARC, RAPID, Arc
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 LEFT, RIGHT = 1, -1
@@ -41,10 +41,7 @@ GROUPS = frozenset(
 )
 MOTIONS = ("G0", "G1", "G2", "G3")
 OTHER_CONTROLS = "cutter compensation, whose entry and corners differ from control to control"
-CENTRE_PATH = {
-    "generic": "post the path of the tool centre, or take LinuxCNC's path with --dialect linuxcnc",
-    "fanuc": "post the path of the tool centre",
-}
+NAME_CONTROL = "name the control with --dialect (linuxcnc, fanuc, haas), or post the path of the tool centre"
 
 Ends = tuple[list[float], list[float]]
 
@@ -55,8 +52,9 @@ Ends = tuple[list[float], list[float]]
 def switch_on(state: State, block: CurrentBlock, code: str) -> None:
     """G41, G42 D: the tool is left or right of the contour, by the diameter in the tool table; D of G41.1 is it."""
     word = block.codes[code]
-    if state.dialect.name != "linuxcnc":
-        raise block.fail(word, f"is {OTHER_CONTROLS}", hint=CENTRE_PATH.get(state.dialect.name, CENTRE_PATH["fanuc"]))
+    straight = state.dialect.increments  # Fanuc, Haas
+    if state.dialect.name == "generic" or (straight and code.endswith(".1")):
+        raise block.fail(word, f"is {OTHER_CONTROLS}", hint=NAME_CONTROL)
     if state.cutter is not None:
         raise block.fail(word, "while cutter compensation is on", "G40 before it")
     _check_codes(state, block, (PLANE, UNITS, M_TOOL))
@@ -64,10 +62,19 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
     if state.plane == "G19":
         raise block.fail(word, "in the plane G19", "G17 or G18")
     if frames.rotation is not None or state.polar is not None or frames.tip_held:
-        raise block.fail(word, "under G68, G16 or G43.4, which LinuxCNC does not have", "G69, G15 or G49 before it")
+        raise block.fail(word, "under G68, G16 or G43.4, which is not supported", "G69, G15 or G49 before it")
+    if straight and "D" not in block.values:
+        raise block.fail(word, "without D, whose last value the control would take", "D with the tool's number")
+    if straight and block.values["D"].value == 0:  # no offset: the programmed path is the tool centre's
+        block.take("D")
+        return
     diameter = _diameter(state, block, code)
     side = SIDES[code] if diameter >= 0.0 else -SIDES[code]
-    state.cutter = Cutter(side, abs(diameter) / 2.0, geometry.PLANES[state.plane], state.length_scale)
+    state.cutter = Cutter(
+        side, abs(diameter) / 2.0, geometry.PLANES[state.plane], state.length_scale, straight=straight
+    )
+    if straight:
+        state.assume(straight_corners.TYPE_A)
 
 
 def _diameter(state: State, block: CurrentBlock, code: str) -> float:
@@ -95,6 +102,8 @@ def switch_off(state: State, block: CurrentBlock, code: str) -> None:
     cutter, state.cutter = state.cutter, None
     if cutter is None or cutter.at is None:
         return
+    if cutter.entering:
+        raise block.fail(block.codes[code], "right after the first move of cutter compensation", "a contour between")
     _settle(state, block, cutter, cutter.center)
     frames = state.frames
     there, here = frames.to_setup(frames.to_control(cutter.at)), frames.to_setup(frames.position)
@@ -175,12 +184,16 @@ def offset_move(
 
 
 def _enter(cutter: Cutter, start: Point2, target: Point2, own: OffsetArc | None) -> tuple[Step, Point2]:
+    if cutter.straight:
+        return straight_corners.enter(cutter, target, own), (0.0, 0.0)
     if own is not None:
         return compensation.enter_arc(cutter, start, target, own.center, own.turn), (0.0, 0.0)
     return compensation.enter_straight(cutter, start, target)
 
 
 def _go_on(cutter: Cutter, start: Point2, target: Point2, own: OffsetArc | None) -> Step:
+    if cutter.straight:
+        return straight_corners.go_on(cutter, start, target, own)
     if own is not None:
         return compensation.go_round(cutter, start, target, own.center, own.turn)
     return compensation.go_straight(cutter, start, target)
@@ -202,6 +215,8 @@ def _round_corner(
         _settle(state, block, cutter, step.trim)
     cutter.pending.clear()
     cutter.anchor = cutter.center
+    if step.outside:
+        _go_straight_round(state, block, cutter, step, motion, there, feed, bound)
     if step.corner is None:
         return
     assert cutter.at is not None
@@ -209,6 +224,26 @@ def _round_corner(
     around[cutter.axes[0]], around[cutter.axes[1]] = step.corner
     arc = None if motion == RAPID else OffsetArc(start, -cutter.side)
     _add(state, block, motion if motion == RAPID else ARC, cutter, around, feed, (bound[0], bound[0]), arc)
+    cutter.anchor = cutter.center
+
+
+def _go_straight_round(
+    state: State,
+    block: CurrentBlock,
+    cutter: Cutter,
+    step: Step,
+    motion: int,
+    there: list[float],
+    feed: float,
+    bound: tuple[bool, bool],
+) -> None:
+    """Straight moves round a corner, at the feed of the block; rotary axes have turned at the first one's end."""
+    assert cutter.at is not None
+    state.assume(straight_corners.STRAIGHT)
+    for place in step.way:
+        around = [*cutter.at[:3], *there[3:]]
+        around[cutter.axes[0]], around[cutter.axes[1]] = place
+        _add(state, block, motion if motion == RAPID else FEED, cutter, around, feed, (bound[0], bound[0]), None)
     cutter.anchor = cutter.center
 
 
@@ -319,11 +354,15 @@ def _recorded(state: State, cutter: Cutter, arc: OffsetArc, start: list[float], 
     return Arc((x, y, z), state.frames.turn_direction(geometry.normal_of(state.plane)), sweep)
 
 
-_CUTTER, _DYNAMIC = g_codes("G41 G42"), g_codes("G41.1 G42.1")
+_CUTTER, _DYNAMIC = (
+    f"{g_codes('G41 G42')}; Fanuc, operator's manuals, Details of cutter compensation",
+    g_codes("G41.1 G42.1"),
+)
+_NAMED = ("linuxcnc", "fanuc", "haas")
 CUTTER_CODES = (
     Code("G40", CUTTER, switch_off, "cutter compensation off", g_codes("G40")),
-    Code("G41", CUTTER, switch_on, "cutter compensation, tool on the left", _CUTTER, ("linuxcnc",)),
-    Code("G42", CUTTER, switch_on, "cutter compensation, tool on the right", _CUTTER, ("linuxcnc",)),
+    Code("G41", CUTTER, switch_on, "cutter compensation, tool on the left", _CUTTER, _NAMED),
+    Code("G42", CUTTER, switch_on, "cutter compensation, tool on the right", _CUTTER, _NAMED),
     Code("G41.1", CUTTER, switch_on, "the same by the diameter in D, on the left", _DYNAMIC, ("linuxcnc",)),
     Code("G42.1", CUTTER, switch_on, "the same by the diameter in D, on the right", _DYNAMIC, ("linuxcnc",)),
 )

@@ -42,6 +42,8 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     if not given and not any(block.has(letter) for letter in POINT_WORDS):
         return
     if code == "G76" and not state.dialect.increments:
+        if state.dialect.name == "linuxcnc":
+            raise block.fail(block.codes.get(code), "is a lathe's threading cycle on LinuxCNC", hint="this is a mill")
         raise block.fail(
             block.codes.get(code),
             "is a threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls",
@@ -49,7 +51,9 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
         )
     if code in TAPS and state.plane != "G17" and not state.dialect.increments:
         found = f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis"
-        raise block.fail(None, found, "G17", "name the control with --dialect")
+        raise block.fail(
+            None, found, "G17", "" if state.dialect.name == "linuxcnc" else "name the control with --dialect"
+        )
     normal = geometry.PLANES[state.plane][2]
     repeats = _repeats(state, block)
     _keep_heights(state, block, code, normal)
@@ -149,6 +153,10 @@ def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, give
         raise block.fail(None, f"{code} with rotary axes", "the rotary axes in a block before it")
     if normal in words:
         state.sticky["Z"] = words.pop(normal)
+    if state.dialect.name == "haas" and "R" not in state.sticky:  # Haas, mill operator's manual, G81: R is optional
+        frames = state.frames
+        state.sticky["R"] = frames.to_program(frames.position)[normal] if state.absolute else 0.0
+        state.assume("a drilling cycle without R begins where the tool stands (Haas: R is optional)")
     _check_cycle(state, block, code, normal)
     return words
 

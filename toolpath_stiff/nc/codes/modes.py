@@ -243,9 +243,13 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
         )
     if block.groups.get(ONCE) in ("G4", "G10"):
         raise block.fail(word, "beside a code that uses the P word too", "two blocks")
-    number, repeats = block.whole("P", word), block.whole("L", word)
+    number = block.whole("P", word)
     if number is None:
         raise block.fail(word, "without P", "P with the number of what it calls")
+    if state.dialect.name == "linuxcnc" and "L" in block.values and block.values["L"].value == 0:
+        block.take("L")  # LinuxCNC's tests/interp/m98m99: L0 calls nothing
+        return
+    repeats = block.whole("L", word)
     block.flow = Call(number, repeats, word.column, local=code == "M97")
 
 

@@ -134,8 +134,8 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def motion_off(state: State, block: CurrentBlock, code: str) -> None:
-    """G80: no motion mode; axis words have none to move in."""
-    state.motion = None
+    """G80: no motion mode; axis words have none to move in. On Fanuc's and Haas' controls G0 or G1 hold on."""
+    state.motion = state.group_01 if state.group_01 in ("G0", "G1") else None
 
 
 def machine_move(state: State, block: CurrentBlock, code: str) -> None:
@@ -170,6 +170,8 @@ def go_home(state: State, block: CurrentBlock, code: str) -> None:
     """G28, G30: rapid to the intermediate point, then the axes named there, or all, to the reference point."""
     standing = {axis for axis, letter in enumerate(INCREMENTAL_AXES) if block.take(letter) is not None}
     words = axis_words(state, block)
+    if code == "G30" and state.dialect.increments and block.take("P") not in (None, 2):  # P2: as G30 alone (Fanuc)
+        raise block.fail(block.values["P"], "is a reference point that nothing gives", "P2")
     frames = state.frames
     _leave_program_coordinates(state, block, block.codes[code], {**dict.fromkeys(standing, 0.0), **words})
     if words:
@@ -211,7 +213,13 @@ _G28, _G30 = g_codes("G28 - G28.1"), g_codes("G30 - G30.1")
 STRAIGHT_CODES = (
     Code("G0", MOTION, straight, "rapid", g_codes("G0"), many=True),
     Code("G1", MOTION, straight, "feed", g_codes("G1"), many=True),
-    Code("G80", MOTION, motion_off, "motion mode off", g_codes("G80")),
+    Code(
+        "G80",
+        MOTION,
+        motion_off,
+        "motion mode off; on Fanuc's and Haas' controls the cycle alone",
+        f"{g_codes('G80')}; Fanuc, operator's manuals, Canned cycle cancel (G80)",
+    ),
     Code("G53", ONCE, machine_move, "machine coordinates", g_codes("G53"), step=MOTION),
     Code("G28", ONCE, go_home, "to the first reference point", _G28, takes_axes=True),
     Code("G30", ONCE, go_home, "to the second reference point", _G30, takes_axes=True),

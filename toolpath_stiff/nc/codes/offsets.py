@@ -14,11 +14,16 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, ToolEntry, WorkOffset
 from toolpath_stiff.nc.words import Word
 
+FIRST_NUMBERED = 110  # G110 to G129
+
 # -- work offsets ------------------------------------------------------------------------------------------------------
 
 
 def work_offset(state: State, block: CurrentBlock, code: str) -> None:
-    """G54 to G59.3: that work offset from here on."""
+    """G54 to G59.3: that work offset from here on; G54 P of Fanuc's controls is G54.1 P."""
+    if code == "G54" and "P" in block.values and state.dialect.name == "fanuc":
+        _additional(state, block, block.codes[code], "G54.1", block.whole("P", block.codes[code]))
+        return
     _other_offset(state, block, block.codes[code], WORK_OFFSETS.index(code))
 
 
@@ -30,13 +35,25 @@ def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(
             word, f"is not a code of the dialect {state.dialect.name}", f"{known} P" if known else "G54 to G59.3"
         )
-    number = block.whole("P", word)
+    _additional(state, block, word, code, block.whole("P", word))
+
+
+def numbered_offset(state: State, block: CurrentBlock, code: str) -> None:
+    """G110 to G129: Haas' older names of G154 P1 to P20."""
+    word = block.codes[code]
+    if state.dialect.name != "haas":
+        raise block.fail(word, "is a work offset of Haas' controls", hint="name the control with --dialect")
+    _additional(state, block, word, "G154", int(code[1:]) - FIRST_NUMBERED + 1)
+
+
+def _additional(state: State, block: CurrentBlock, word: Word, code: str, number: int | None) -> None:
+    """An additional offset, by the code and the number that the controller file has it under."""
     if number is None or number > ADDITIONAL_OFFSETS[code]:
         raise block.fail(word, "needs the number of its offset", f"P1 to P{ADDITIONAL_OFFSETS[code]}")
     if number not in state.frames.offsets.additional:
         raise block.fail(
             word,
-            f"P{number} is an offset that nothing defines",
+            f"is {code} P{number}, an offset that nothing defines",
             hint=f'give it in the controller file: [offsets] "{code} P{number}" = [x, y, z]',
         )
     _other_offset(state, block, word, len(WORK_OFFSETS) + number - 1)
@@ -227,6 +244,13 @@ OFFSET_CODES = (
         "G154", OFFSET, additional_offset, "additional work offset (Haas)", "Haas, mill operator's manual, G154",
         controls=("generic", "haas"),
     ),
+    *(
+        Code(
+            f"G{number}", OFFSET, numbered_offset, "additional work offset (Haas: G154 P1 to P20)",
+            "Haas, mill operator's manual, G110-G129", ("haas",), label=OFFSET,
+        )
+        for number in range(FIRST_NUMBERED, FIRST_NUMBERED + 20)
+    ),
     Code("G10", ONCE, set_offsets, "set offsets", g_codes("G10 L1, G10 L2, G10 L20"), takes_axes=True),
     Code("G52", ONCE, local_shift, "local shift", g_codes("G52"), takes_axes=True),
     Code("G92", ONCE, present_point, "shift", g_codes("G92"), takes_axes=True),
@@ -359,10 +383,17 @@ def _hold_tip(state: State, block: CurrentBlock, word: Word, hold: bool) -> None
 def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
     """Length of the tool that G43 names by H, or of the one in the spindle."""
     number = block.take("H")
+    if number == 0 and state.dialect.name == "linuxcnc":  # find_tool_pocket(0): the tool in the spindle
+        number = None
     if number == 0:
         if state.dialect.increments:
             return math.nan
-        raise block.fail(block.values["H"], "is no offset on some controls, on LinuxCNC that of the tool", "H or G49")
+        raise block.fail(
+            block.values["H"],
+            "is no offset on some controls, on LinuxCNC that of the tool",
+            "H or G49",
+            "name the control with --dialect",
+        )
     tool = state.tool if number is None else int(number)
     if number is None and state.named_length not in (None, state.tool):
         raise block.fail(

@@ -388,8 +388,7 @@ class ParametricRun(ProgramRun):
             raise self._fail(at, f"{steering.kind.lower()} outside any subprogram", column=steering.column)
         value = number(steering.values[0](self.variables)) if steering.values else None
         self.variables.named["_VALUE_RETURNED"] = float(value is not None)
-        if value is not None:
-            self.variables.named["_VALUE"] = value
+        self.variables.named["_VALUE"] = 0.0 if value is None else value
         return self._leave(at)
 
     def _call_sub(self, at: int, steering: Steering) -> int | None:

@@ -315,6 +315,7 @@ def _plain(read: Callable[[State], float]) -> Callable[[Variables], float]:
 # LinuxCNC's predefined named parameters that a path can depend on.
 PREDEFINED: dict[str, Callable[[Variables], float]] = {
     **{f"_{letter}": _axis(axis) for axis, letter in enumerate(AXES)},
+    **dict.fromkeys(("_VALUE", "_VALUE_RETURNED"), lambda variables: 0.0),  # before any call has returned
     "_LINE": lambda variables: float(variables.line),
     "_CALL_LEVEL": lambda variables: float(len(variables.levels) - 1),
     "_REMAP_LEVEL": lambda variables: 0.0,
