@@ -162,8 +162,8 @@ class PlainLines:
                     form = BARE if "." not in word else POINTED if word.endswith(".") else BROKEN
                     found.append((row, rank, float(word), form))
         where = np.array([word[:2] for word in found], dtype=np.int64).reshape(-1, 2)
-        value, form = np.array([word[2] for word in found]), np.array([word[3] for word in found], dtype=np.uint8)
-        return (where[:, 0], where[:, 1], value, form), np.array(others, dtype=np.int64)
+        value, forms = np.array([word[2] for word in found]), np.array([word[3] for word in found], dtype=np.uint8)
+        return (where[:, 0], where[:, 1], value, forms), np.array(others, dtype=np.int64)
 
 
 def _tokens(text: str) -> tuple[IntArray, IntArray, FloatArray, ByteArray, IntArray]:

@@ -71,14 +71,15 @@ def house_style() -> Iterator[None]:
     import matplotlib as mpl
 
     settings = _settings()
-    before = {name: value for name, value in dict.items(mpl.rcParams) if name in settings}
+    held: Any = mpl.rcParams  # a dict that checks each value: these have been
+    before = {name: value for name, value in dict.items(held) if name in settings}
     try:
-        dict.update(mpl.rcParams, settings)
+        dict.update(held, settings)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)
             yield
     finally:
-        dict.update(mpl.rcParams, before)
+        dict.update(held, before)
 
 
 @cache

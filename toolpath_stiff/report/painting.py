@@ -30,7 +30,10 @@ _WORDS: dict[tuple[Any, ...], tuple[NDArray[np.uint8], int, int]] = {}
 
 def painted_axes(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
     """Axes at `box` (left, bottom, width, height as parts of the figure) for `add_scales`: they make no ticks."""
-    return cast("Axes", figure.add_axes(_tickless()(figure, box)))
+    axes = figure.add_axes(_tickless()(figure, box))
+    for spine in axes.spines.values():
+        spine.set_position(("outward", 0.0))  # its default, which only making a tick would put in force
+    return axes
 
 
 @cache
@@ -176,7 +179,9 @@ def _write(renderer: Any, pen: Any, x: float, y: float, text: str, font: Any, an
 
     if isinstance(renderer, RendererAgg) and text:
         image, left, below = _word(renderer, pen, text, font, angle)
-        renderer.draw_image(pen, round(x) - left, round(y) - below, image)
+        # No half a pixel: which way it is rounded would hang on the last digit.
+        column, row = (int(np.floor(at + 0.501)) for at in (x, y))
+        renderer.draw_image(pen, column - left, row - below, image)
         return
     renderer.draw_text(
         pen, x, renderer.get_canvas_width_height()[1] - y if renderer.flipy() else y, text, font, angle, ismath=False
