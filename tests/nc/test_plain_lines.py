@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc import frames, geometry, interpreter, plain_lines
+from toolpath_stiff.nc import frames, geometry, interpreter, plain_lines, plain_words
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.codes import modes, points
 from toolpath_stiff.nc.controller import DIALECTS, Controller
@@ -128,6 +128,20 @@ def arc(draw):
     return draw(
         st.sampled_from([f"{code}I{radius}J0", f"{code}I-{radius}", f"G91\n{code}X{2 * radius}Y0R{radius}\nG90"])
     )
+
+
+@given(st.lists(st.from_regex(r"([NGFSXYZABCIJKRfx][-+]?[0-9]{0,16}[.]?[0-9]{0,3}){0,3}", fullmatch=True), min_size=1))
+@example(
+    ["X9007199254740993", "X.1Y0.30Z-0.000001", "F1X2F3", "F1F2", "G03X1", "G010", "S-1", "X-0.", "7", "X1X2", "-"]
+)
+def test_words_by_arithmetic_are_those_of_the_pattern(lines):
+    quick = plain_words.PlainLines(lines, semicolon=True)
+    slow = plain_words.PlainLines([f"{line}(c)" for line in lines], semicolon=True)
+    for at in range(len(lines)):
+        assert quick.run(at) == slow.run(at)
+        if quick.run(at):
+            ours, theirs = (repr(found.words(at, 1)) for found in (quick, slow))
+            assert ours == theirs
 
 
 modal = st.sampled_from(

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import copy
 import re
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import cutter_location
@@ -23,7 +22,6 @@ from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
-from toolpath_stiff.nc.plain_words import G_COLUMN
 from toolpath_stiff.nc.reader import (
     INTERPRETERS,
     ZERO,
@@ -36,6 +34,9 @@ from toolpath_stiff.nc.state import Flow, State, Then
 from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
 from toolpath_stiff.nc.words import Block, looks_like_cutter_location
 from toolpath_stiff.units import Pose, m_from_mm, pose_in_mm, pose_in_si
+
+if TYPE_CHECKING:
+    from toolpath_stiff.nc.plain_words import PlainWords
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 NO_CHANGE = "nothing of the path"
@@ -142,12 +143,11 @@ class _CheckingRun(ProgramRun):
             self._add(error)
             return at + 1
 
-    def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
-        codes = [row[G_COLUMN] for row in rows]
-        for number, count in Counter(code for code in codes if code).items():
-            code = f"G{number}"
+    def _executed(self, at: int, words: PlainWords) -> None:
+        found = [(words.code == number).nonzero()[0] for number in range(int(words.code.max()) + 1)]
+        for rows in sorted((rows for rows in found if len(rows)), key=lambda rows: int(rows[0])):
+            code, line, count = f"G{words.code[rows[0]]}", at + int(rows[0]), len(rows)
             if code not in self.first:
-                line = at + codes.index(number)
                 column = next(word.column for word in self._read(line).words if word.letter == "G")
                 self.first[code] = (line + 1, column)
             self.count[code] = self.count.get(code, 0) + count

@@ -18,6 +18,7 @@ from toolpath_stiff.units import MM_PER_INCH
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 Point2 = tuple[float, float]
 Vector = tuple[float, float, float]
 
@@ -136,6 +137,13 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
         sweep = math.tau
     sweep += math.tau * (turns - 1)
     return -sweep if clockwise else sweep
+
+
+def radii_clearly_agree(start: FloatArray, end: FloatArray, center: FloatArray, inch: bool) -> BoolArray:
+    """(n,) whether arcs (n, 2) are so far within the bounds of `check_radii` that no rounding of a radius matters."""
+    first, last = (np.sqrt(((point - center) ** 2).sum(axis=1)) for point in (start, end))
+    least = INCH_TOLERANCE if inch else MM_TOLERANCE
+    return np.asarray((np.minimum(first, last) > 2.0 * SMALLEST_RADIUS) & (np.abs(first - last) < 0.5 * least))
 
 
 def corner(

@@ -44,6 +44,7 @@ from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word, leader, read_blo
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.plain_lines import PlainRun
+    from toolpath_stiff.nc.plain_words import PlainWords
 
 
 COORDINATES = frozenset((*AXES, "@"))
@@ -291,11 +292,11 @@ class ProgramRun:
             self.state.warnings.append(f"what stands before the tape mark (%) in line {at + 1} is not read")
         while at < len(self.lines):
             if self._plain is not None and not self._levels:
-                rows = self._plain.execute(at)
-                if rows:
-                    self._executed(at, rows)
-                    percent = percent or any(any(row) for row in rows)
-                    at += len(rows)
+                words = self._plain.execute(at)
+                if words is not None:
+                    self._executed(at, words)
+                    percent = percent or bool(words.count.any())
+                    at += len(words)
                     continue
             steered = self._steered(at)
             if steered is not None:
@@ -350,8 +351,8 @@ class ProgramRun:
     def _execute(self, block: Block) -> Then:
         return execute(self.state, block)
 
-    def _executed(self, at: int, rows: list[tuple[str, ...]]) -> None:
-        """Plain lines from `at` were executed; `rows` are their words (`plain_words.PlainLines.rows`)."""
+    def _executed(self, at: int, words: PlainWords) -> None:
+        """Plain lines from `at` were executed; `words` are theirs."""
 
     def _read(self, at: int) -> Block:
         block = read_block(self.lines[at], at + 1, self.name, self.state.dialect.semicolon)

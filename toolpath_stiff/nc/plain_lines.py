@@ -1,7 +1,7 @@
 """Plain lines of CAM programs, many at a time: a G0 to G3, X Y Z A B C, I J K R, F, S, an N word, comments.
 
-Most of a big program is such lines. One regular expression reads them some twenty times faster than `words.read_block`
-reads blocks; a line that it does not match as a whole is not plain and is left to `read_block`, with every error.
+Most of a big program is such lines. `plain_words` reads them many times faster than `words.read_block` reads blocks; a
+line that it does not take as a whole is not plain and is left to `read_block`, with every error.
 
 The lines become moves by the codes' own rules (`codes`, `frames`) on arrays, digit for digit. Here is only what a mode
 does along lines: a word holds until the next one. What a number, a feed, a point, an arc means is decided by the
@@ -41,19 +41,18 @@ from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, MovesInMm
 from toolpath_stiff.nc.plain_holes import LEAST, drill, rows_of_hole, suits
 from toolpath_stiff.nc.plain_words import (
+    BARE,
     FIRST_F,
-    FIRST_LETTER,
-    G_COLUMN,
     LAST_F,
-    LAST_S,
     LENGTH_LETTERS,
     LETTERS,
+    NO_CODE,
+    NONE,
     PlainLines,
-    Row,
+    PlainWords,
     first_bare,
     has_pointed,
     is_bare,
-    is_place,
 )
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
@@ -81,48 +80,49 @@ class PlainRun:
         self.lines = PlainLines(lines, state.dialect.semicolon)
         self._pause = 0  # the line before which another run is not worth trying
 
-    def execute(self, at: int) -> list[Row]:
-        """Execute plain lines from `at` (from 0); returns their words. None may be executed."""
+    def execute(self, at: int) -> PlainWords | None:
+        """Execute plain lines from `at` (from 0); returns the words of those that were, None if there are none."""
         count = self.lines.run(at)
         if count < FEWEST or at < self._pause or not _suits(self.state):
-            return []
-        rows = self.lines.rows(at, count)
-        if self.state.motion not in MODES and not rows[0][G_COLUMN] and any(rows[0]):
-            return self._holes(at, rows)
-        lines = _Lines(self.state, rows)
-        done = lines.execute(at)
-        if done < FEWEST:
-            self._pause = at + done + 4 * FEWEST
-        self._watch_points(at, lines, done)
-        return rows[:done]
+            return None
+        words = self.lines.words(at, count)
+        if self.state.motion not in MODES and words.code[0] == NO_CODE and words.count[0]:
+            done = self._holes(at, words)
+        else:
+            lines = _Lines(self.state, words)
+            done = lines.execute(at)
+            if done < FEWEST:
+                self._pause = at + done + 4 * FEWEST
+            self._watch_points(at, words, done)
+        return words.part(0, done) if done else None
 
-    def _holes(self, at: int, rows: list[Row]) -> list[Row]:
-        """Drill holes like that of the line before; returns the words of the lines executed."""
+    def _holes(self, at: int, words: PlainWords) -> int:
+        """Drill holes like that of the line before; returns how many lines were executed."""
         state = self.state
         if state.motion not in CYCLES or not self.lines.has(at - 1) or not suits(state):
-            return []
+            return 0
         hole = rows_of_hole(state.recorder, at)
-        count = next((i for i, row in enumerate(rows) if not is_place(row)), len(rows))
-        if hole is None or not is_place(self.lines.rows(at - 1, 1)[0]) or not count:
-            return []
-        lines = _Lines(state, rows[:count])
+        others = np.flatnonzero(~words.are_places())
+        count = int(others[0]) if len(others) else len(words)
+        if hole is None or not self.lines.words(at - 1, 1).are_places().all() or not count:
+            return 0
+        lines = _Lines(state, words.part(0, count))
         places = lines.places()
         if not len(places):
-            return []
+            return 0
         drill(state, hole, at + 1, places)
         if state.dialect.increments and lines.counted[: len(places)].any():
             assume_increments(state)
-        self._watch_points(at, lines, len(places))
-        return rows[: len(places)]
+        self._watch_points(at, words, len(places))
+        return len(places)
 
-    def _watch_points(self, at: int, lines: _Lines, done: int) -> None:
+    def _watch_points(self, at: int, plain: PlainWords, done: int) -> None:
         """As `points.read_numbers`, of all lines executed."""
         state = self.state
         if not watches_points(state):
             return
-        columns = [lines.texts[letter][:done] for letter in LENGTH_LETTERS if letter in lines.texts]
-        state.pointed = state.pointed or any(has_pointed(column) for column in columns)
-        row = first_bare(columns) if state.bare is None else None
+        state.pointed = state.pointed or has_pointed(plain, done)
+        row = first_bare(plain, done) if state.bare is None else None
         if row is not None:
             words = read_block(self.lines.lines[at + row], at + row + 1, self.name, state.dialect.semicolon).words
             word = next(w for w in words if w.letter in LENGTH_LETTERS and is_bare("".join(w.text[1:].split())))
@@ -149,26 +149,16 @@ def _suits(state: State) -> bool:
 class _Lines:
     """The words of lines in columns, and what they make of the state; the line `end` is left to the interpreter."""
 
-    def __init__(self, state: State, rows: list[Row]) -> None:
-        self.state = state
-        self.n = self.end = len(rows)
-        columns = list(zip(*rows, strict=True))
-        self.codes: Sequence[str] = columns[G_COLUMN]
-        self.feeds = (columns[FIRST_F], columns[LAST_F])
-        self.speeds = columns[LAST_S]
-        self.texts = {
-            letter: column for letter, column in zip(LETTERS, columns[FIRST_LETTER:LAST_F], strict=True) if any(column)
-        }
-        self.values = {
-            letter: np.array([float(text) if text else math.nan for text in column])
-            for letter, column in self.texts.items()
-        }
-        self.given = {letter: ~np.isnan(values) for letter, values in self.values.items()}
+    def __init__(self, state: State, words: PlainWords) -> None:
+        self.state, self.words = state, words
+        self.n = self.end = len(words)
+        self.values = {letter: words.values[letter] for letter in LETTERS if letter in words.values}
+        self.given = {letter: words.forms[letter] != NONE for letter in self.values}
         self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
         for letter, values in self.values.items():
             self._stop(np.abs(values) > (LARGEST_MM if letter in AXES else LARGEST_WORD))
-        if any(self.speeds):
-            self._stop(np.array([text != "" and float(text) > LARGEST_WORD for text in self.speeds]))
+        if "S" in words.values:
+            self._stop(words.values["S"] > LARGEST_WORD)
         if state.dialect.increments:
             self._count_increments()
 
@@ -178,8 +168,8 @@ class _Lines:
             self.end = min(self.end, int(np.argmax(where)))
 
     def _count_increments(self) -> None:
-        for letter, column in self.texts.items():
-            bare = np.array([text != "" and "." not in text for text in column]) & (self.values[letter] != 0.0)
+        for letter in self.values:
+            bare = (self.words.forms[letter] == BARE) & (self.values[letter] != 0.0)
             unit = increment(letter in ANGLES, self.state.inch)
             self.values[letter] = np.where(bare, self.values[letter] * unit, self.values[letter])
             self.counted |= bare
@@ -237,10 +227,9 @@ class _Lines:
 
     def _modes(self) -> None:
         """The motion mode of each line."""
-        self.coded = np.array([code != "" for code in self.codes])
-        codes = np.array([int(code) for code in self.codes if code], dtype=np.int64)
+        self.coded = self.words.code != NO_CODE
         before = MODES.get(self.state.motion or "", NO_MODE)
-        self.mode = np.concatenate([[before], codes])[np.cumsum(self.coded)]
+        self.mode = np.concatenate([[before], self.words.code[self.coded]])[np.cumsum(self.coded)]
 
     def _any(self, letters: str) -> BoolArray:
         found = np.zeros(self.n, dtype=bool)
@@ -252,21 +241,20 @@ class _Lines:
     def _feed_words(self) -> None:
         """F in force on each line, and the line that set it (-1: a line before these)."""
         state = self.state
-        first, last = self.feeds
-        texts = (
-            last if not any(first) else first if not any(last) else [a or b for a, b in zip(first, last, strict=True)]
-        )
-        if any(first) and any(last):
-            self._stop(np.array([bool(a and b) for a, b in zip(first, last, strict=True)]))
-        said = np.array([text != "" for text in texts])
-        values = np.array([float(text) for text in texts if text], dtype=float)
+        said, values, bare = np.zeros(self.n, dtype=bool), np.full(self.n, math.nan), np.zeros(self.n, dtype=bool)
+        for key in (FIRST_F, LAST_F):
+            if key in self.words.forms:
+                form = self.words.forms[key]
+                self._stop(said & (form != NONE))  # a second one
+                values = np.where(said, values, self.words.values[key])
+                said, bare = said | (form != NONE), bare | (form == BARE)
         order = np.cumsum(said)
         self.feed_row = np.concatenate([[-1], np.flatnonzero(said)])[order]
         before = math.nan if state.feed is None else state.feed
-        self.feed = np.concatenate([[before], values * state.feed_scale])[order]
+        self.feed = np.concatenate([[before], values[said] * state.feed_scale])[order]
         self._stop((self.feed < SLOWEST) | (self.feed > LARGEST_WORD))
         if bare_feed_is_open(state):
-            self._stop(np.array([text != "" and "." not in text for text in texts]))
+            self._stop(bare)
 
     def _no_feed(self) -> BoolArray:
         """Cutting lines without a feed."""
@@ -336,7 +324,7 @@ class _Lines:
         return start, np.where(still, start, end)
 
     def _arcs(self, rows: IntArray, control: FloatArray) -> dict[int, Arc]:
-        """The arcs of some lines, one by one; the first that is not right ends the run."""
+        """The arcs of some lines; the first that is not right ends the run."""
         if not len(rows):
             return {}
         state = self.state
@@ -350,20 +338,11 @@ class _Lines:
             geometry.CENTER_LETTERS[normal],
         )
         nothing = np.full(self.n, math.nan)
-        words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
+        words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters])
         points = self._programmed(control[rows])
-        starts = points[:, [first, second]].tolist()
-        middles, sweeps = list[geometry.Point2](), list[float]()
-        for row, start, word in zip(rows.tolist(), starts, words, strict=True):
-            try:
-                center, sweep = self._arc(row, start, *word)
-            except geometry.ArcError:
-                self.end = row
-                break
-            middles.append(center)
-            sweeps.append(sweep)
+        middles, sweeps = self._all_arcs(rows, points[:, [first, second]], words)
         frames, found = state.frames, points[: len(sweeps)]
-        found[:, [first, second]] = np.array(middles).reshape(-1, 2)
+        found[:, [first, second]] = middles
         if frames.rotated:
             turned = [frames.to_setup(frames.to_control(point))[:3] for point in found.tolist()]
             centers = np.array(turned).reshape(-1, 3)
@@ -372,8 +351,31 @@ class _Lines:
                 [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
             )
         vector = frames.turn_direction(geometry.normal_of(state.plane))
-        done = zip(rows.tolist(), centers.tolist(), sweeps, strict=False)
+        done = zip(rows.tolist(), centers.tolist(), sweeps.tolist(), strict=False)
         return {row: Arc((x, y, z), vector, sweep) for row, (x, y, z), sweep in done}
+
+    def _all_arcs(self, rows: IntArray, start: FloatArray, words: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(m, 2) centres and (m,) sweeps of the first m of some lines; what is wrong with the next one ends the run.
+
+        `words` (6, n): X, Y, I, J of the plane, R and the offset off the plane, nan where there is none.
+        """
+        state, scale = self.state, self.state.length_scale
+        x, y, i, j, radius, off_plane = words
+        end = np.stack([x, y], axis=1) * scale
+        end = np.where(np.isnan(end), start, end if state.absolute else start + end)
+        center = start + np.stack([np.where(np.isnan(i), 0.0, i), np.where(np.isnan(j), 0.0, j)], axis=1) * scale
+        clockwise = (self.mode[rows] == CLOCKWISE).tolist()
+        arcs = zip(start.tolist(), end.tolist(), center.tolist(), clockwise, strict=True)
+        sweep = np.array([geometry.arc_sweep(here, there, middle, way, 1) for here, there, middle, way in arcs])
+        about = ~(np.isnan(i) & np.isnan(j)) & np.isnan(radius) & ~(np.abs(off_plane) > 0.0)
+        clear = about & geometry.radii_clearly_agree(start, end, center, state.inch)
+        for row in np.flatnonzero(~clear).tolist():
+            try:
+                center[row], sweep[row] = self._arc(int(rows[row]), start[row].tolist(), *words[:, row].tolist())
+            except geometry.ArcError:
+                self.end = int(rows[row])
+                return center[:row], sweep[:row]
+        return center, sweep
 
     def _programmed(self, control: FloatArray) -> FloatArray:
         """Program coordinates of points (n, 6)."""
@@ -428,9 +430,10 @@ class _Lines:
             return 0
         if state.dialect.increments and self.counted[: self.end].any():
             assume_increments(state)
-        speed = next((text for text in reversed(self.speeds[: self.end]) if text), "")
-        if speed:
-            state.speed = float(speed)
+        if "S" in self.words.forms:
+            said = np.flatnonzero(self.words.forms["S"][: self.end])
+            if len(said):
+                state.speed = float(self.words.values["S"][said[-1]])
         if self.mode[last] != NO_MODE:
             state.motion = MODE_NAMES[self.mode[last]]
         if state.feed_mode == "G93":

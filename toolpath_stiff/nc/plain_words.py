@@ -1,34 +1,101 @@
-"""The words of plain lines, lexed many at a time by one regular expression (`plain_lines`)."""
+"""The words of plain lines, lexed many at a time (`plain_lines`): by array arithmetic over the characters of a chunk.
+
+Lines of words alone are most of a program. A character is a digit, a point, a sign, a letter or the end of a line; a
+word reaches from its letter to the next one, and its number is its digits as a whole number over a power of ten. Both
+are exact up to 15 digits, so that their quotient is rounded once, as `float` rounds (Clinger, "How to read floating
+point numbers accurately", 1990). A line with a comment, a longer number or anything else goes to a regular expression;
+what that does not match as a whole is not plain.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.words import AXES
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+ByteArray = NDArray[np.uint8]
+BoolArray = NDArray[np.bool_]
+Tokens = tuple[IntArray, IntArray, FloatArray, ByteArray]  # line, rank, value, form of each word
 
 CHUNK = 8192  # lines: their words fit into a processor's cache
 LONGEST_PLAIN = 256  # characters; longer lines are left to `read_block`
 LETTERS = AXES + CENTER_LETTERS
 LENGTH_LETTERS = "XYZIJKR"
-G_COLUMN, FIRST_F, FIRST_LETTER = 0, 1, 2
-LAST_F = FIRST_LETTER + len(LETTERS)
-LAST_S = LAST_F + 1
-OTHER = LAST_S + 1  # the text of a line that is not plain
+# Keys of the columns of words, in the order in which a plain line has them: that of every CAM system, F in front or
+# behind, S last.
+FIRST_F, LAST_F = "F in front", "F behind"
+KEYS = ("N", "G", FIRST_F, *LETTERS, LAST_F, "S")
+NO_CODE = -1  # of a line without a G word
+NONE, BARE, POINTED, BROKEN = range(4)  # form of a number: none, without a point, ending with it, with decimals
 
 _NUMBER = r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)"
 _FEED = r"(?:F((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
 _SPEED = r"(?:S((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
 _WORDS = "".join(f"(?:{letter}({_NUMBER}))?" for letter in LETTERS)
 _COMMENT = r"(?:\([^()\n]*+\))*+"
-# The order of words is that of every CAM system, F in front or behind, S last; any other order is not plain.
 _LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_SPEED}{_COMMENT}%s$|^(.+)$"
 _PATTERNS = {True: re.compile(_LINE % r"(?:;.*)?", re.MULTILINE), False: re.compile(_LINE % ";?", re.MULTILINE)}
-_BARE = re.compile(r"^[+-]?0*[1-9][0-9]*$", re.MULTILINE)
-_POINTED = re.compile(r"^[+-]?0*[1-9][0-9]*\.$", re.MULTILINE)
+_BARE_NUMBER = re.compile(r"^[+-]?0*[1-9][0-9]*$")
 
-Row = tuple[str, ...]
+_DIGIT, _POINT, _SIGN, _LETTER, _END, _OTHER = range(6)
+MOST_DIGITS = 15
+_TENS = 10.0 ** np.arange(MOST_DIGITS + 1)  # exact
+_FEED_RANK = KEYS.index(FIRST_F)
+
+
+def _tables() -> tuple[ByteArray, NDArray[np.int8]]:
+    """Class and rank (place in `KEYS`; -1 for none) of each byte; small letters are as large ones."""
+    kinds, ranks = np.full(256, _OTHER, dtype=np.uint8), np.full(256, -1, dtype=np.int8)
+    kinds[ord("0") : ord("9") + 1], kinds[ord(".")], kinds[ord("\n")] = _DIGIT, _POINT, _END
+    kinds[[ord("+"), ord("-")]] = _SIGN
+    for rank, key in enumerate(KEYS):
+        if key != LAST_F:
+            for letter in (key[0], key[0].lower()):
+                kinds[ord(letter)], ranks[ord(letter)] = _LETTER, rank
+    return kinds, ranks
+
+
+_KINDS, _RANKS = _tables()
+
+
+@dataclass(frozen=True)
+class PlainWords:
+    """Words of n plain lines in columns.
+
+    `code` (n,) is the digit of the G word or `NO_CODE`; `count` (n,) how many words there are besides N. `values` has
+    for each of `KEYS` after G that any line has the number (n,), nan where there is none, `forms` how it is written.
+    """
+
+    code: IntArray
+    count: IntArray
+    values: dict[str, FloatArray]
+    forms: dict[str, ByteArray]
+
+    def __len__(self) -> int:
+        return len(self.code)
+
+    def part(self, start: int, end: int) -> PlainWords:
+        """Some of the lines, with the columns that they have words in."""
+        forms = {key: form[start:end] for key, form in self.forms.items()}
+        forms = {key: form for key, form in forms.items() if form.any()}
+        values = {key: self.values[key][start:end] for key in forms}
+        return PlainWords(self.code[start:end], self.count[start:end], values, forms)
+
+    def are_places(self) -> BoolArray:
+        """(n,) whether a line names X or Y and nothing else."""
+        named = np.zeros(len(self), dtype=np.int64)
+        for key in "XY":
+            if key in self.forms:
+                named += self.forms[key] != NONE
+        return np.asarray((named > 0) & (named == self.count))
 
 
 class PlainLines:
@@ -45,12 +112,12 @@ class PlainLines:
     def __init__(self, lines: Sequence[str], semicolon: bool) -> None:
         self.lines = lines
         self._pattern = _PATTERNS[semicolon]
-        self._start, self._rows = 0, list[Row]()
+        self._start, self._words = -1, _in_columns(1, *_tokens("")[:4])
         self._others: list[int] = []  # lines of the chunk that are not plain, and its end, in falling order
 
     def run(self, at: int) -> int:
         """How many lines from `at` (from 0) are plain; no more than the chunk's rest."""
-        if not self._start <= at < self._start + len(self._rows):
+        if not self.has(at):
             self._lex(at)
         while self._others[-1] < at:
             self._others.pop()
@@ -58,48 +125,127 @@ class PlainLines:
 
     def has(self, at: int) -> bool:
         """Whether a line is in the present chunk."""
-        return self._start <= at < self._start + len(self._rows)
+        return self._start <= at < self._start + len(self._words)
 
-    def rows(self, at: int, count: int) -> list[Row]:
-        """The words of lines that `run` has counted, as texts: G, F, `LETTERS`, F, S; "" where there is none."""
-        return self._rows[at - self._start : at - self._start + count]
+    def words(self, at: int, count: int) -> PlainWords:
+        """The words of lines that `run` has counted."""
+        return self._words.part(at - self._start, at - self._start + count)
 
     def _lex(self, at: int) -> None:
         chunk = self.lines[at : at + CHUNK]
         if max(map(len, chunk)) > LONGEST_PLAIN:
             chunk = [line if len(line) <= LONGEST_PLAIN else "!" for line in chunk]
         text = "\n".join(chunk).replace(" ", "").replace("\t", "")
+        line, rank, value, form, odd = _tokens(text)
+        others = np.empty(0, dtype=np.int64)
+        if len(odd):
+            every = text.split("\n")
+            more, others = self._by_pattern([every[row] for row in odd.tolist()], odd)
+            line, rank = np.append(line, more[0]), np.append(rank, more[1])
+            value, form = np.append(value, more[2]), np.append(form, more[3])
+        self._start, self._words = at, _in_columns(len(chunk), line, rank, value, form)
+        self._others = [at + len(chunk), *(at + others[::-1]).tolist()]
+
+    def _by_pattern(self, lines: list[str], at: IntArray) -> tuple[Tokens, IntArray]:
+        """Words of lines as `_tokens` has them, and the lines that are not plain."""
+        text = "\n".join(lines)
         if text.isascii():  # of other scripts some letters become ASCII ones in upper case
             text = text.upper()
-        rows = self._pattern.findall(text)
-        self._start, self._rows = at, rows
-        end = at + len(rows)
-        self._others = [end, *(at + i for i in range(len(rows) - 1, -1, -1) if rows[i][OTHER])]
+        found: list[tuple[int, int, float, int]] = []
+        others = []
+        for row, texts in zip(at.tolist(), self._pattern.findall(text), strict=True):
+            if texts[-1]:
+                others.append(row)
+                continue
+            for rank, word in enumerate(texts[:-1], KEYS.index("G")):
+                if word:
+                    form = BARE if "." not in word else POINTED if word.endswith(".") else BROKEN
+                    found.append((row, rank, float(word), form))
+        where = np.array([word[:2] for word in found], dtype=np.int64).reshape(-1, 2)
+        value, forms = np.array([word[2] for word in found]), np.array([word[3] for word in found], dtype=np.uint8)
+        return (where[:, 0], where[:, 1], value, forms), np.array(others, dtype=np.int64)
 
 
-def is_place(row: Row) -> bool:
-    """Whether a plain line names X or Y and nothing else."""
-    named = row[FIRST_LETTER : FIRST_LETTER + 2]
-    return any(named) and not any(row[:FIRST_LETTER]) and not any(row[FIRST_LETTER + 2 :])
+def _tokens(text: str) -> tuple[IntArray, IntArray, FloatArray, ByteArray, IntArray]:
+    """Line, rank, value and form of each word of the lines of words alone; the other lines."""
+    codes = np.frombuffer(f"\n{text}\n".encode("ascii", "replace"), dtype=np.uint8)
+    kinds = _KINDS[codes]
+    at = np.flatnonzero(kinds >= _LETTER)  # what begins a word, ends a line, or is none of it
+    begins, kind = codes[at], kinds[at]
+    size = np.diff(at, append=len(codes))  # characters, the first one included
+    of = np.repeat(np.arange(len(at)), size)
+    is_end = kind == _END
+    line = np.cumsum(is_end) - 1
+    points, signs = np.flatnonzero(kinds == _POINT), np.flatnonzero(kinds == _SIGN)
+    point_count = np.bincount(of[points], minlength=len(at))
+    signed = np.bincount(of[signs], minlength=len(at))
+    digits = size - 1 - point_count - signed
+    decimals = np.zeros(len(at), dtype=np.int64)
+    decimals[of[points]] = at[of[points]] + size[of[points]] - 1 - points
+    rank = _ranks(begins, kind)
+    unsigned = (rank < _FEED_RANK + 1) | (rank >= len(KEYS) - 2)
+    whole = rank < _FEED_RANK
+    bad = (digits < 1) | (digits > MOST_DIGITS) | (point_count > 1) | (unsigned & (signed > 0))
+    bad |= (whole & (point_count > 0)) | (rank <= np.concatenate([[-1], rank[:-1]])) | (kind == _OTHER)
+    bad[is_end] = size[is_end] > 1  # numbers without a letter
+    bad[of[signs[kinds[signs - 1] != _LETTER]]] = True
+    value = _values(codes, kinds, of, digits, np.minimum(decimals, MOST_DIGITS))
+    value[of[signs[codes[signs] == ord("-")]]] *= -1.0
+    bad |= (rank == KEYS.index("G")) & ((digits > 2) | (value > 3.0))
+    odd = np.zeros(int(line[-1]) + 1, dtype=bool)
+    odd[line[bad]] = True
+    kept = ~is_end & ~odd[line]
+    form = np.where(point_count == 0, BARE, np.where(decimals == 0, POINTED, BROKEN)).astype(np.uint8)
+    return line[kept], rank[kept], value[kept], form[kept], np.flatnonzero(odd)
+
+
+def _ranks(begins: ByteArray, kind: ByteArray) -> IntArray:
+    """Place in `KEYS` of each word; -1 of what is none. An F is in front unless more than N and G stands before it."""
+    rank = _RANKS[begins].astype(np.int64)
+    feeds = np.flatnonzero(rank == _FEED_RANK)
+    rank[feeds[(rank[feeds - 1] >= _FEED_RANK) & (kind[feeds - 1] == _LETTER)]] = KEYS.index(LAST_F)
+    return rank
+
+
+def _values(codes: ByteArray, kinds: ByteArray, of: IntArray, digits: IntArray, decimals: IntArray) -> FloatArray:
+    """The numbers, without their signs, of words of up to `MOST_DIGITS` digits."""
+    at = np.flatnonzero(kinds == _DIGIT)
+    word = of[at]
+    after = np.cumsum(digits)[word] - 1 - np.arange(len(at))  # digits of the word that follow
+    parts = (codes[at] - np.uint8(ord("0"))) * _TENS[np.minimum(after, MOST_DIGITS)]
+    return np.asarray(np.bincount(word, weights=parts, minlength=len(digits)) / _TENS[decimals])
+
+
+def _in_columns(n: int, line: IntArray, rank: IntArray, value: FloatArray, form: ByteArray) -> PlainWords:
+    """Words of n lines in columns."""
+    code = np.full(n, NO_CODE, dtype=np.int64)
+    values, forms = dict[str, FloatArray](), dict[str, ByteArray]()
+    for place in np.flatnonzero(np.bincount(rank, minlength=len(KEYS))).tolist():
+        words = np.flatnonzero(rank == place)
+        key, into = KEYS[place], line[words]
+        if key == "G":
+            code[into] = value[words]
+        elif key != "N":
+            values[key], forms[key] = np.full(n, np.nan), np.full(n, NONE, dtype=np.uint8)
+            values[key][into], forms[key][into] = value[words], form[words]
+    return PlainWords(code, np.bincount(line[rank > 0], minlength=n), values, forms)
 
 
 def is_bare(text: str) -> bool:
     """Whether a number other than 0 stands without a decimal point."""
-    return _BARE.match(text) is not None
+    return _BARE_NUMBER.match(text) is not None
 
 
-def has_pointed(column: Sequence[str]) -> bool:
-    """Whether a number other than 0 ends with its decimal point."""
-    return _POINTED.search("\n".join(column)) is not None
+def has_pointed(words: PlainWords, done: int) -> bool:
+    """Whether a length of the first lines, other than 0, ends with its decimal point."""
+    return any(rows.any() for rows in _lengths(words, POINTED, done))
 
 
-def first_bare(columns: Sequence[Sequence[str]]) -> int | None:
-    """The first row in which a number other than 0 has no decimal point."""
-    found = None
-    for column in columns:
-        text = "\n".join(column)
-        match = _BARE.search(text)
-        if match is not None:
-            row = text.count("\n", 0, match.start())
-            found = row if found is None else min(found, row)
-    return found
+def first_bare(words: PlainWords, done: int) -> int | None:
+    """The first of these lines in which a length other than 0 has no decimal point."""
+    return min((int(np.argmax(rows)) for rows in _lengths(words, BARE, done) if rows.any()), default=None)
+
+
+def _lengths(words: PlainWords, form: int, done: int) -> list[BoolArray]:
+    columns = [(words.values[key][:done], words.forms[key][:done]) for key in LENGTH_LETTERS if key in words.forms]
+    return [np.asarray((forms == form) & (values != 0.0)) for values, forms in columns]

@@ -13,10 +13,10 @@ import re
 import struct
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache, partial, update_wrapper
-from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar, cast
+from functools import cache, update_wrapper
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,6 @@ from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from toolpath_stiff.analysis import Analysis
@@ -37,8 +36,7 @@ P = ParamSpec("P")
 Made = TypeVar("Made", bound=bytes)
 
 DPI = 100
-TICK, GAP, NAME_GAP = 3.5, 3.5, 4.0  # points: a tick, from it to its figure, from the figures to the name
-LABEL_SIZE = 10.0  # points
+POINTS = 72.0  # per inch
 DEFLATE = 3
 INK, MUTED, GRID = "#1f2933", "#616e7c", "#e4e7eb"
 PLUNGE_SLATE, RAPID_GREY, UNREACHABLE_RED, SECOND_ORANGE = "#52606d", "#9aa5b1", "#d64545", "#de6b12"
@@ -72,11 +70,27 @@ def house_style() -> Iterator[None]:
     """Defaults of matplotlib with our style, whatever the user's own settings are; undone at the end."""
     import matplotlib as mpl
 
-    with mpl.rc_context(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)
+    settings = _settings()
+    held: Any = mpl.rcParams  # a dict that checks each value: these have been
+    before = {name: value for name, value in dict.items(held) if name in settings}
+    try:
+        dict.update(held, settings)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)
+            yield
+    finally:
+        dict.update(held, before)
+
+
+@cache
+def _settings() -> dict[str, Any]:
+    """Every setting of matplotlib in the house style, the backend left out, checked once and not for each picture."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        yield
+        return {name: value for name, value in dict.items(mpl.rcParams) if name != "backend"}
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -99,10 +113,11 @@ def png_bytes(figure: Figure) -> bytes:
 
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    pixels = np.asarray(canvas.buffer_rgba())
     height, width, _ = pixels.shape
     rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # the first byte of a row names its filter
-    rows[:, 1:] = pixels.reshape(height, 3 * width)
+    for channel in range(3):  # much faster than three bytes at a time
+        rows[:, 1 + channel :: 3] = pixels[:, :, channel]
     header = struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)
     size = struct.pack(">2IB", *(2 * [round(DPI / m_from_mm(MM_PER_INCH))]), 1)
     chunks = {b"IHDR": header, b"pHYs": size, b"IDAT": zlib.compress(rows.data, DEFLATE), b"IEND": b""}
@@ -164,235 +179,6 @@ def add_heading(figure: Figure, analysis: Analysis) -> None:
     )
 
 
-def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Sequence[str], below: bool = False) -> None:
-    """Ring places and write beside each, where no other label or ring nor the edge of the axes is in the way.
-
-    `below`: rather below the place (a low point of a curve) than beside it.
-    """
-    taken = []
-    for x, y in axes.transData.transform(np.reshape(places, (-1, 2))):
-        taken.append((float(x) - 8.0, float(y) - 8.0, float(x) + 8.0, float(y) + 8.0))
-    for at, text in zip(places, texts, strict=True):
-        _label_place(axes, at, text, taken, below)
-
-
-def _label_place(
-    axes: Axes, at: tuple[float, float], text: str, taken: list[tuple[float, float, float, float]], below: bool
-) -> None:
-    """One ring and its label; `taken` holds boxes in pixels (x0, y0, x1, y1) to keep clear of, and gets the label's."""
-    sides = [(1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1)]
-    if below:
-        sides.sort(key=lambda side: (side[1], abs(side[0])))
-    x, y = axes.transData.transform(at)
-    width, height = 7.2 * len(text) + 6.0, 17.0  # pixels, at 10 points and 100 dpi
-    box = axes.get_window_extent()
-    chosen = None
-    for reach in (16.0, 30.0, 48.0, 70.0):
-        for dx, dy in sides:
-            left = x + dx * reach - (width if dx < 0 else width / 2 if dx == 0 else 0.0)
-            base = y + dy * reach - height / 2
-            spot = (left, base, left + width, base + height)
-            inside = box.x0 < spot[0] and spot[2] < box.x1 and box.y0 < spot[1] and spot[3] < box.y1
-            free = all(spot[2] < t[0] or t[2] < spot[0] or spot[3] < t[1] or t[3] < spot[1] for t in taken)
-            if free and (inside or (chosen is None and reach > 60.0)):
-                chosen = spot
-                break
-        if chosen:
-            break
-    chosen = chosen or (x + 16.0, y + 16.0 - height / 2, x + 16.0 + width, y + 16.0 + height / 2)
-    taken.append(chosen)
-    middle = ((chosen[0] + chosen[2]) / 2 - x) * POINTS / DPI, ((chosen[1] + chosen[3]) / 2 - y) * POINTS / DPI
-    paint(axes, partial(_paint_label, at=at, middle=middle, text=text), zorder=10)
-
-
-def _paint_label(renderer: Any, axes: Axes, at: tuple[float, float], middle: tuple[float, float], text: str) -> None:
-    """A ring at `at` (data), a line to the words, their middle `middle` points away, on a pale box."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.path import Path
-    from matplotlib.transforms import Affine2D
-
-    pt, font = renderer.points_to_pixels(1.0), FontProperties(size=LABEL_SIZE)
-    here = axes.transData.transform(at)
-    width, height, descent = _extent(renderer, text, font)
-    there, half = here + pt * np.array(middle), np.array([width, height]) / 2.0 + 2.0 * pt
-    way = there - here
-    length = float(np.hypot(*way)) or 1.0
-    stop = min([float(h / abs(w)) for h, w in zip(half, way, strict=True) if w] or [1.0])  # where it meets the box
-    ends = [here + way * 5.0 * pt / length, there - way * min(stop, 1.0)]
-    if length * (1.0 - stop) > 5.0 * pt:
-        with _pen(renderer, axes, INK, 0.8) as pen:
-            renderer.draw_path(pen, Path(ends), Affine2D())
-    for colour, wide in (("white", 3.5), (INK, 1.6)):
-        with _pen(renderer, axes, colour, wide) as pen:
-            renderer.draw_path(pen, Path.unit_circle(), Affine2D().scale(4.5 * pt).translate(*here))
-    with _pen(renderer, axes, "white", 0.0) as pen:
-        pen.set_alpha(0.85)
-        box = Path.unit_rectangle(), Affine2D().scale(*(2.0 * half)).translate(*(there - half))
-        renderer.draw_path(pen, *box, (1.0, 1.0, 1.0, 0.85))
-    with _pen(renderer, None, INK, 0.0) as pen:
-        _write(renderer, pen, there[0] - width / 2.0, there[1] - height / 2.0 + descent, text, font)
-
-
-_EXTENTS: dict[tuple[Any, ...], tuple[float, float, float]] = {}
-MOST_EXTENTS = 4096
-
-# -- painted straight through the renderer: a fraction of the cost of an artist for each line, tick and word -----------
-
-
-def paint(axes: Axes, how: Callable[[Any, Axes], None], zorder: float) -> None:
-    """Add to the axes what `how(renderer, axes)` paints."""
-    artist = _painting()(how)
-    artist.set_zorder(zorder)
-    axes.add_artist(artist)
-
-
-@cache
-def _painting() -> Any:
-    from matplotlib.artist import Artist
-
-    class Painting(Artist):
-        """An artist that is one function."""
-
-        def __init__(self, how: Callable[[Any, Axes], None]) -> None:
-            super().__init__()
-            self.how = how
-
-        def draw(self, renderer: Any) -> None:
-            if self.get_visible() and self.axes is not None:
-                self.how(renderer, cast("Axes", self.axes))
-
-        def get_window_extent(self, renderer: Any = None) -> Any:
-            return self.axes.bbox if self.axes is not None else None
-
-    return Painting
-
-
-@contextmanager
-def _pen(renderer: Any, clip: Axes | None, colour: Any, width: float, cap: str = "butt") -> Iterator[Any]:
-    """A graphics context for lines of some points; clipped to the axes, if given."""
-    pen = renderer.new_gc()
-    pen.set_foreground(colour)
-    pen.set_linewidth(width)
-    pen.set_snap(False)
-    pen.set_joinstyle("round")
-    pen.set_capstyle(cap)
-    if clip is not None:
-        pen.set_clip_rectangle(clip.bbox)
-    yield pen
-    pen.restore()
-
-
-def _write(renderer: Any, pen: Any, x: float, y: float, text: str, font: Any, angle: float = 0.0) -> None:
-    """Words whose baseline begins at x, y, in pixels from below."""
-    renderer.draw_text(
-        pen, x, renderer.get_canvas_width_height()[1] - y if renderer.flipy() else y, text, font, angle, ismath=False
-    )
-
-
-def _extent(renderer: Any, text: str, font: Any) -> tuple[float, float, float]:
-    """Width, height and descent of a word in pixels; the figures of a tick come again and again."""
-    about = type(renderer), renderer.points_to_pixels(1.0), font.get_size_in_points(), text
-    if about not in _EXTENTS:
-        if len(_EXTENTS) >= MOST_EXTENTS:
-            _EXTENTS.clear()
-        _EXTENTS[about] = renderer.get_text_width_height_descent(text, font, False)
-    return _EXTENTS[about]
-
-
-def add_strokes(axes: Axes, strokes: Sequence[tuple[FloatArray, Any]], width: float, zorder: float) -> None:
-    """Lines (n, 2), broken by nan, each of its colour, in order; all of them one width in points."""
-    paint(axes, partial(_paint_strokes, strokes=strokes, width=width), zorder)
-
-
-def _paint_strokes(renderer: Any, axes: Axes, strokes: Sequence[tuple[FloatArray, Any]], width: float) -> None:
-    from matplotlib.path import Path
-
-    at = axes.transData.frozen()
-    for points, colour in strokes:
-        with _pen(renderer, axes, colour, width, "round") as pen:
-            renderer.draw_path(pen, Path(points), at)
-
-
-def add_scales(axes: Axes) -> None:
-    """Ticks, figures, grids and names of both axes, painted; locators, formatters and names stay the axes' own."""
-    for side, axis in (("bottom", axes.xaxis), ("left", axes.yaxis)):
-        axis.set_visible(False)
-        paint(axes, partial(_paint_axis, side=side), zorder=0.5)
-
-
-def _paint_axis(renderer: Any, axes: Axes, side: str) -> None:
-    axis, (low, high) = (axes.xaxis, axes.get_xlim()) if side == "bottom" else (axes.yaxis, axes.get_ylim())
-    values = np.asarray(axis.get_major_locator().tick_values(low, high), dtype=float)
-    values = values[(values >= low - 1e-9 * (high - low)) & (values <= high + 1e-9 * (high - low))]
-    words = axis.get_major_formatter().format_ticks(values.tolist())
-    name = "  ".join(part for part in (axis.get_label_text(), axis.get_major_formatter().get_offset()) if part)
-    grid = axis.get_tick_params()["gridOn"]
-    paint_scale(renderer, axes, side=side, values=values, words=words, name=name, grid=grid)
-
-
-def paint_scale(
-    renderer: Any, axes: Axes, *, side: str, values: FloatArray, words: Sequence[str], name: str, grid: bool = False,
-    size: float = 10.0, colour: str = INK, edge: float = 0.0,
-) -> None:  # fmt: skip
-    """Ticks at values (data) of one side of the axes, their words, a grid, and the name in `colour`.
-
-    `side` is "bottom", "left" or "top"; of "top" `edge` says where, in heights of the axes.
-    """
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.path import Path
-    from matplotlib.transforms import IdentityTransform
-
-    pt, font, box = renderer.points_to_pixels(1.0), FontProperties(size=size), axes.bbox
-    upright, along = side != "left", np.zeros((len(values), 2))
-    along[:, 0 if upright else 1] = values
-    at = axes.transData.transform(along)[:, 0 if upright else 1]
-    ends = {
-        "bottom": (box.y0, box.y1, -1.0),
-        "left": (box.x0, box.x1, -1.0),
-        "top": (box.y0 + edge * box.height, 0.0, 1.0),
-    }
-    start, stop, out = ends[side]
-
-    def lines(first: float, last: float, pen: Any) -> None:
-        across = np.tile([first, last], len(at))
-        both = (np.repeat(at, 2), across) if upright else (across, np.repeat(at, 2))
-        codes = np.tile([Path.MOVETO, Path.LINETO], len(at))
-        renderer.draw_path(pen, Path(np.column_stack(both), codes), IdentityTransform())
-
-    if grid and len(at):
-        with _pen(renderer, axes, GRID, 0.8, "projecting") as pen:
-            lines(start, stop, pen)
-    if len(at):
-        with _pen(renderer, None, MUTED, 0.8) as pen:
-            lines(start, start + out * TICK * pt, pen)
-    _, tall, below = _extent(renderer, "lp", font)
-    room, widest = (TICK + GAP) * pt, 0.0
-    with _pen(renderer, None, MUTED, 0.0) as pen:
-        for where, text in zip(at.tolist(), words, strict=True):
-            wide, high, deep = _extent(renderer, text, font)
-            widest = max(widest, wide)
-            if not upright:
-                _write(renderer, pen, start - room - wide, where - (high - deep) / 2.0, text, font)
-            else:
-                base = start + room + below if out > 0.0 else start - room - (tall - below)
-                _write(renderer, pen, where - wide / 2.0, base, text, font)
-    wide, *_ = _extent(renderer, name, font) if name else (0.0,)
-    with _pen(renderer, None, colour, 0.0) as pen:
-        if name and upright:
-            base = start + out * (room + tall + NAME_GAP * pt) + (below if out > 0.0 else -(tall - below))
-            _write(renderer, pen, box.x0 + (box.width - wide) / 2.0, base, name, font)
-        elif name:
-            _write(
-                renderer,
-                pen,
-                start - room - widest - NAME_GAP * pt - below,
-                box.y0 + (box.height - wide) / 2.0,
-                name,
-                font,
-                90.0,
-            )
-
-
 CLASSES = 32  # colours; more cannot be told apart along a line, and each costs a drawing call
 
 
@@ -432,7 +218,6 @@ PAGE_COLOURS = {
 MOST_MARKS = 4000  # of a picture; beyond, the marks are put in as one image: the browser would toil
 FEW_MARKS = 50  # of one artist: lines and letters stay sharp
 SHARP = 2 * DPI  # of that image
-POINTS = 72.0  # per inch
 
 
 class Drawing(bytes):

@@ -19,13 +19,10 @@ from toolpath_stiff.report.figure import (
     SECOND_ORANGE,
     UNREACHABLE_RED,
     add_heading,
-    add_scales,
-    label_places,
     new_figure,
-    paint,
-    paint_scale,
     picture,
 )
+from toolpath_stiff.report.painting import add_scales, label_places, paint, paint_scale, painted_axes
 from toolpath_stiff.report.words import number, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
@@ -73,7 +70,7 @@ def profile_picture(
     strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
     figure = new_figure(WIDTH, HEIGHT)
     frame = HEIGHT - TOP - BOTTOM - strip
-    axes = figure.add_axes((LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
+    axes = painted_axes(figure, (LEFT / WIDTH, BOTTOM / HEIGHT, 1.0 - (LEFT + RIGHT) / WIDTH, frame / HEIGHT))
     s, k = profile_curve(analysis, show_plunges)
     band = profile_band(analysis, show_plunges)
     _set_limits(axes, analysis, other, required, band, show_plunges)

@@ -16,12 +16,10 @@ from toolpath_stiff.report.figure import (
     RAPID_GREY,
     UNREACHABLE_RED,
     add_heading,
-    add_scales,
-    add_strokes,
-    label_places,
     new_figure,
     picture,
 )
+from toolpath_stiff.report.painting import add_scales, add_strokes, label_places, painted_axes
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
@@ -158,7 +156,7 @@ def _lay_out(span: FloatArray) -> tuple[Figure, list[Axes], tuple[float, float, 
     figure = new_figure(WIDTH, height)
 
     def view(across: float, up: float, wide: float, tall: float) -> Axes:
-        return figure.add_axes((across / WIDTH, up / height, wide / WIDTH, tall / height))
+        return painted_axes(figure, (across / WIDTH, up / height, wide / WIDTH, tall / height))
 
     upper, second = BOTTOM + z * scale + BETWEEN, left + x * scale + BETWEEN
     views = [
@@ -203,7 +201,7 @@ def _legend(
     width, height = figure.get_size_inches()
     x, y, wide, tall = corner
     across, middle = min(wide, 5.0), y + tall / 2.0
-    bar = figure.add_axes((x / width, (middle + 0.25) / height, across / width, 0.22 / height))
+    bar = painted_axes(figure, (x / width, (middle + 0.25) / height, across / width, 0.22 / height))
     mappable = ScalarMappable(Normalize(*limits), colormaps[COLOUR_MAP].resampled(CLASSES))
     extend = legend_extend(analysis, limits)
     colour_bar = figure.colorbar(mappable, cax=bar, orientation="horizontal", extend=extend)
