@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.updating.comparison import Comparison as Compared
     from toolpath_stiff.updating.diagnosis import Diagnosis as Diagnosed
+    from toolpath_stiff.updating.inference.evidence import Fit
     from toolpath_stiff.updating.measurements import Measurements as Readings
 
 Noise = float | tuple[float, float] | None
@@ -252,6 +253,7 @@ class Preview:
             effect_files=asked.on.effect_files,
         )
         self._on = asked.on
+        self._near: tuple[Mapping[str, Mapping[str, Any]], Fit] | None = None
 
     def machine(self, effects: Mapping[str, Mapping[str, Any]]) -> Machine:
         """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
@@ -272,7 +274,13 @@ class Preview:
         model = build_model(added, self._on.effect_files, conditions=self._on.model.conditions)
         return replace(self._on, model=model)
 
-    def at(self, effects: Mapping[str, Mapping[str, Any]] | None = None, *, strut_law: bool = True) -> dict[str, Any]:
+    def at(
+        self,
+        effects: Mapping[str, Mapping[str, Any]] | None = None,
+        *,
+        strut_law: bool = True,
+        near: Mapping[str, Mapping[str, Any]] | None = None,
+    ) -> dict[str, Any]:
         """Errors in per cent with these effects beside those of the machine file.
 
         Parameters
@@ -281,6 +289,9 @@ class Preview:
             Name -> the keys of its entry in a machine file: {"weak_strut": {"strut": 4, "factor": 0.8}}.
         strut_law
             Refit the strut law beside them; otherwise it stays that of the machine file.
+        near
+            Effects of other sizes, whose wild readings are taken for wild here too: quicker, for thousands of readings
+            while a slider moves. Unless given, wild readings are found anew.
 
         Returns
         -------
@@ -298,13 +309,20 @@ class Preview:
         from toolpath_stiff.units import n_per_mm_from_n_per_m
         from toolpath_stiff.updating.inference.fits import deviation_percent, error_figures
 
-        fit = self._hand.fit(_entries(effects or {}), strut_law)
+        fit = self._hand.fit(_entries(effects or {}), strut_law, None if near is None else self._fit_near(near))
         modelled = n_per_mm_from_n_per_m(np.exp(self._hand.problem.observed - fit.residual))
         return {
             **error_figures(fit.residual),
             "deviation_percent": deviation_percent(fit.residual).tolist(),
             "modelled_N_per_mm": modelled.tolist(),
         }
+
+    def _fit_near(self, effects: Mapping[str, Mapping[str, Any]]) -> Fit:
+        """The fit beside these effects; the last one is kept."""
+        asked = {name: dict(keys) for name, keys in effects.items()}
+        if self._near is None or self._near[0] != asked:
+            self._near = (asked, self._hand.fit(_entries(asked)))
+        return self._near[1]
 
 
 def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:

@@ -25,7 +25,7 @@ def document(session: Session) -> dict[str, Any]:
 def _document(session: Session) -> dict[str, Any]:
     case, state = session.case, session.case.state
     has_data = bool(state.data)
-    now = session.preview.at(state.on, strut_law=bool(state.on)) if has_data else None
+    now = session.errors() if has_data else None
     return {
         "case": session.name,
         "machine": machine(session.machine),

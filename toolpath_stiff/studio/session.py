@@ -108,6 +108,14 @@ class Session:
         found: tps.Preview = self.once("preview", self.data_key, lambda: tps.preview(self.machine, self.case.data))
         return found
 
+    def errors(self) -> dict[str, Any]:
+        """The error of every reading in use as the switches stand."""
+        on = self.case.state.on
+        found: dict[str, Any] = self.once(
+            "errors", (self.data_key, on), lambda: self.preview.at(on, strut_law=bool(on))
+        )
+        return found
+
     def found(self, kind: str) -> dict[str, Any] | None:
         """What was found last, if it still holds."""
         return self._found.get((kind, self.key(kind)))
@@ -149,7 +157,8 @@ class Session:
         return answer or {}
 
     def _by_hand(self, on: Mapping[str, Any]) -> dict[str, Any]:
-        found = self.preview.at(on, strut_law=bool(on))
+        # Which readings are wild is found out when the slider is let go.
+        found = self.preview.at(on, strut_law=bool(on), near=self.case.state.on or None)
         return {**found, "deviation_percent": [round(one, 3) for one in found["deviation_percent"]],
                 "modelled_N_per_mm": [round(one) for one in found["modelled_N_per_mm"]]}  # fmt: skip
 
