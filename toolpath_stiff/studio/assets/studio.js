@@ -145,7 +145,9 @@ function drawProfile() {
     profile.drawOverlay = function () { const g = this.clear(this.overlay); if (here >= 0 && here < this.model.s.length) { ring(g, ...this.at(here), 5, ink.panel, 4); ring(g, ...this.at(here), 5, ink.ink, 2); } };
   }
   $("scrub").max = path.s_mm.length - 1;
-  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])].map((name) => h("button", { type: "button", "aria-pressed": String(which === name), onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
+  const focus = document.activeElement?.id;
+  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])].map((name) => h("button", { type: "button", id: `which-${name}`, "aria-pressed": String(which === name), onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
+  refocus(focus, "");
   const other = which === "now" && path.given?.some((v, i) => v !== path.now[i]);
   $("curves").textContent = [other ? "orange: as given" : "", which === "now" && path.sd ? "grey: 95 % band of what was fitted" : "", state.program.require ? "dashed: required" : ""].filter(Boolean).join(", ");
 }
@@ -170,10 +172,12 @@ function drawText(line) {
     p.path?.line.forEach((n, i) => { if (p.path.cut[i] && p.path.now[i] !== null) lowest.lines.set(n, Math.min(lowest.lines.get(n) ?? Infinity, p.path.now[i])); });
   }
   const from = Math.max(1, Math.min(line - 8, p.lines.length - 16)), colours = theme.dark ? COLOURS.dark : COLOURS.light, [low, high] = scene.ends ?? [0, 1];
+  const focus = document.activeElement?.id;
   box.replaceChildren(...p.lines.slice(from - 1, from + 16).map((text, k) => {
     const n = from + k, v = lowest.lines.get(n), c = v === undefined ? "transparent" : colours[Math.max(0, Math.min(colours.length - 1, Math.floor((v - low) / (high - low || 1) * colours.length)))];
-    return h("button", { type: "button", class: n === line ? "here" : "", title: v === undefined ? "" : `${group(v)} N/mm`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i); else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
+    return h("button", { type: "button", id: `line-${n}`, class: n === line ? "here" : "", title: v === undefined ? "" : `${group(v)} N/mm`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i); else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
   }));
+  refocus(focus, "");
 }
 function play() {
   const path = state.program?.path;
@@ -193,14 +197,22 @@ function drawPanel() {
   const focus = document.activeElement?.id, [, , make] = PANELS.find(([name]) => name === panel);
   $("tabs").replaceChildren(...PANELS.map(([name, label]) => h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-selected": String(name === panel), "aria-controls": "panel", tabindex: name === panel ? "0" : "-1", onclick: () => open(name) }, label)));
   $("panel").setAttribute("aria-labelledby", `tab-${panel}`);
+  const within = $("panel").contains(document.activeElement);
   $("panel").replaceChildren(...[make(state, act)].flat(9).filter(Boolean));
   if (panel === "program") drawText(state.program?.path?.line[Math.max(0, here)] ?? 1);
-  if (focus) $(focus)?.focus({ preventScroll: true });
+  refocus(focus, within ? "panel" : "");
+}
+// What was drawn anew takes the focus that it had; where it is gone or can no longer be used, its surroundings do.
+function refocus(id, instead) {
+  if (!id || document.activeElement?.id === id) return;
+  $(id)?.focus({ preventScroll: true });
+  if (document.activeElement?.id !== id && instead) $(instead).focus({ preventScroll: true });
 }
 function open(name) { panel = name; drawPanel(); $(`tab-${name}`).focus({ preventScroll: true }); }
 $("tabs").addEventListener("keydown", (e) => {
   const by = { ArrowRight: 1, ArrowLeft: -1 }[e.key], names = PANELS.map(([name]) => name);
   if (by) { e.preventDefault(); open(names[(names.indexOf(panel) + by + names.length) % names.length]); }
+  if (e.key === "Home" || e.key === "End") { e.preventDefault(); open(names.at(e.key === "Home" ? 0 : -1)); }
 });
 function draw() {
   scene.state = state;
@@ -292,7 +304,7 @@ else {
   addEventListener("dragleave", (e) => { if (!e.relatedTarget) $("drop").hidden = true; });
   addEventListener("drop", async (e) => { e.preventDefault(); $("drop").hidden = true; for (const file of [...e.dataTransfer.files]) await take(file); });
   addEventListener("keydown", (e) => {
-    if (!(e.ctrlKey || e.metaKey) || /^(input|textarea|select)$/i.test(e.target.tagName)) return;
+    if (!(e.ctrlKey || e.metaKey) || e.target.matches("textarea, input[type=number], input[type=text]")) return;
     const name = { z: "undo", y: "redo" }[e.key.toLowerCase()];
     if (name) { e.preventDefault(); act({ do: name }); }
   });
