@@ -112,12 +112,14 @@ def measure_one(
 ) -> list[tuple[str, bool]]:
     """The rows of one case. The diagnosis beside the page is stopped: it is not what is measured."""
     hand = [{"do": "hand", "on": {"weak_strut": {"strut": 4, "factor": 0.7 + 0.005 * k}}} for k in range(ROUNDS)]
+    on = {"do": "switch", "effect": "weak_strut", "values": {"strut": 4, "factor": 0.8}}
     at = [{"do": "at", "origin": [k, -k, 800, 0, 0, 2 * k]} for k in range(ROUNDS)]
     with studio(case, *words) as address:
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         page.goto(address)
         page.wait_for_selector("#sw-table_compliance", timeout=PATIENCE)
         page.click("#cancel")
+        page.evaluate(ASKING, [[on]])
         page.wait_for_selector("#profile-card:not([hidden])", timeout=PATIENCE)
         found = []
         for what, questions in ((f"{readings}: a size moved by hand", hand), (f"{program}: the work dragged", at)):

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -345,7 +346,9 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     settled(running)
     case = tps.Case.open(running.folder)
     there = tps.try_placement(case.machine, case.program).at(case.state.origin)
-    assert tab.number("#pl-mean") == pytest.approx(there["mean_N_per_mm"], abs=0.5)
+    for name in ("mean", "range", "min"):
+        assert tab.number(f"#pl-{name}") == pytest.approx(there[f"{name}_N_per_mm"], abs=0.5)
+    assert tab.number("#pl-margin") == pytest.approx(100 * there["margin"], abs=0.05)
     # For the shop floor: every warning, offsets, the set-up sheet, the program for this place.
     page.click("#set-up")
     page.wait_for_selector("#set-up-files")
@@ -361,9 +364,13 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     # The best place; a point of the front becomes the placement.
     page.click("#best")
     page.wait_for_selector("button[id^=use-]")
+    front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
+    cells = [re.sub(r"[^\d.-]", "", one) for one in page.locator("tr:has(button[id^=use-]) td").all_inner_texts()][:8]
+    first = front["front"][0]
+    keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "x_mm", "y_mm", "z_mm", "rotation_deg")
+    assert [float(one) for one in cells[1:]] == pytest.approx([first[key] for key in keys], abs=0.51)
     page.locator("button[id^=use-]").first.click()
     tab.until("document.querySelector('#set-up-files') === null")
-    front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
     settled(running)
     assert tps.Case.open(running.folder).state.origin[0] == pytest.approx(front["front"][0]["x_mm"], abs=1e-5)
     # Reveal, export.
@@ -383,6 +390,11 @@ class Keys:
 
     def __init__(self, tab: Tab) -> None:
         self.tab, self.press = tab, tab.page.keyboard.press
+        self.choosers: list[Any] = []
+        tab.page.on("filechooser", self._asked)
+
+    def _asked(self, chooser: Any) -> None:
+        self.choosers.append(chooser)
 
     def reach(self, selector: str) -> None:
         """Press Tab until the element has the focus; it must show that it has it."""
@@ -417,10 +429,12 @@ class Keys:
             self.press("ArrowRight")
 
     def add(self, file: Path) -> None:
-        self.reach("#open")
-        with self.tab.page.expect_file_chooser() as chooser:
-            self.press("Enter")
-        chooser.value.set_files(file)
+        self.on("#open", "Enter")
+        for _ in range(PATIENCE // 100):
+            if self.choosers:
+                return self.choosers.pop().set_files(file)
+            self.tab.page.wait_for_timeout(100)
+        raise AssertionError("no file chooser")
 
 
 def test_the_journey_by_keyboard(running, browser, tmp_path):
@@ -483,13 +497,11 @@ def test_the_journey_by_keyboard(running, browser, tmp_path):
     keys.on("#accept:not(:disabled)", "Enter")
     page.wait_for_selector("#sw-weak_strut", state="detached")
     assert page.evaluate("document.activeElement.id") == "panel"  # the button is of no use any more
-    keys.stop()
     # The program, where it sits, the best place.
     (tmp_path / "keys.nc").write_text(SLOT)
     keys.add(tmp_path / "keys.nc")
-    tab.until(
-        "document.querySelector('#p-mean') !== null && document.querySelector('#machine-name').textContent.includes('keys.nc')"
-    )
+    tab.until("document.querySelector('#machine-name').textContent.includes('keys.nc')")
+    page.wait_for_selector("#p-mean")
     keys.on("#profile .overlay", "ArrowRight")
     tab.until("document.querySelector('#status').textContent.startsWith('line ')")
     settled(running)
@@ -605,16 +617,61 @@ def test_a_killed_studio_resumes_where_it_was(resumed):
         assert after[name] == before[name]
 
 
-def test_the_export_is_read_without_a_studio(resumed, browser, tmp_path):
+PORTRAIT = {
+    "text": "What is missing gives way along X, the more the higher it is loaded.",
+    "links": [{"link": "frame", "probability": 0.83}, {"link": "table", "probability": 0.17}],
+    "variables": [{"variable": "y", "probability": 0.72}],
+    "held_out_rms_percent": 2.346,
+    "noise_floor_percent": 1.987,
+    "smooth_rms_percent": 2.111,
+    "explained_percent": 61.0,
+    "terms": [],
+}
+
+
+def of_command(folder: Path, result: str) -> dict[str, Any]:
+    """The JSON document that the command has written to a result's folder."""
+    return json.loads(next((folder / result).glob("*.json")).read_text())
+
+
+def test_the_export_is_read_without_a_studio_and_has_the_figures_of_the_commands(resumed, browser, tmp_path):
     _, again = resumed
-    content = again.ask("GET", "/export")[1]
+    content = again.ask("GET", "/export")[1].decode()
     state = again.idle()
     again.end()
-    assert again.token.encode() not in content
-    (tmp_path / "case.html").write_bytes(content)
+    assert again.token not in content
+    head, mark, tail = content.partition('id="state">')
+    document, end, rest = tail.partition("</script>")
+    exported = json.loads(document)
+    exported["verdict"]["portrait"] = PORTRAIT  # these data leave nothing to portray
+    text = json.dumps(exported).replace("<", "\\u003c")
+    (tmp_path / "case.html").write_text("".join([head, mark, text, end, rest]), "utf-8")
     tab = Tab(browser, (tmp_path / "case.html").as_uri())
     tab.page.wait_for_selector("#sw-table_compliance")
-    assert tab.number("#g-as_given") == pytest.approx(state["gauge"]["as_given"], abs=0.005)
     assert tab.page.locator("#undo").count() == 0
+    # The gauge, the table of effects.
+    said = of_command(again.folder, tps.Case.open(again.folder).latest("diagnose"))
+    figures = said["baseline"]["as_given"]
+    assert tab.number("#g-as_given") == pytest.approx(figures["mean_abs_error_percent"], abs=0.005)
+    assert tab.number("#g-left_out") == pytest.approx(figures["held_out_error_percent"], abs=0.005)
+    assert tab.number("#g-floor") == pytest.approx(said["baseline"]["noise_floor_percent"], abs=0.005)
+    rows = {}
+    for row in tab.page.locator(".effect").all():
+        rows[row.locator("code").inner_text()] = " ".join(row.inner_text().split())
+    for one in said["candidates"]:
+        shown = rows.pop(one["effect"])
+        if one["finding"]:
+            errors = [one[f"{key}_error_percent"] for key in ("mean_abs", "held_out")]
+            assert [f"{v:.2f} %" in shown for v in errors] == [True, True], one["effect"]
+        p = one["probability"]
+        assert p is None or ("> 99" if p > 0.99 else "< 1" if p < 0.01 else f"{100 * p:.0f}") + " %" in shown
+    shown = " ".join(tab.text("#portrait").split())
+    for figure in ("83 %", "17 %", "72 %", "61 %", "2.35 %", "1.99 %", "2.11 %"):
+        assert figure in shown
+    # The program.
+    tab.go("program")
+    kept = of_command(again.folder, state["program"]["result"])
+    for name in ("mean", "min", "range"):
+        assert tab.number(f"#p-{name}") == pytest.approx(kept[f"{name}_N_per_mm"], abs=0.5)
     assert tab.faults == []
     tab.close()
