@@ -10,6 +10,7 @@ from one frame to the next while the machine turns. Absolute times: they are wha
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import subprocess
 import sys
@@ -130,6 +131,14 @@ def measure_one(
     return [*found, row(f"{readings}, {program}: a frame while turning", times[1:], FRAME_BAR)]
 
 
+def load() -> str:
+    """What else the machine was doing: times on a busy one are longer than those that a user sees."""
+    mean, count = os.getloadavg()[0], os.cpu_count() or 1
+    return f"{count} processors, load {mean:.0f}: " + (
+        "idle but for this." if mean <= count + 1 else "busy with other work, an idle machine answers sooner."
+    )
+
+
 def main() -> int:
     """Measure, print, exit with 1 where a bar is not cleared."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -148,7 +157,7 @@ def main() -> int:
     print(text)
     if args.out:
         args.out.write_text(
-            f"# The studio's answers\n\n{text}\nMade by `python -m benchmarks.studio --out {args.out}`.\n"
+            f"# The studio's answers\n\n{text}\n{load()}\n\nMade by `python -m benchmarks.studio --out {args.out}`.\n"
         )
     return 0 if all(clears for _, clears in rows) else 1
 
