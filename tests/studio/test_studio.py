@@ -585,7 +585,8 @@ def test_axe_finds_nothing_serious(running, browser):
     serious = []
     for panel in ("effects", "why", "next", "program", "placement", "exercise", "history"):
         tab.go(panel)
-        for width, scheme in ((1400, "light"), (400, "light"), (400, "dark"), (1400, "dark")):
+        every = ((1400, "light"), (400, "dark"), (400, "light"), (1400, "dark"))
+        for width, scheme in every if panel == "effects" else every[:2]:
             tab.page.set_viewport_size({"width": width, "height": 900})
             tab.page.emulate_media(color_scheme=scheme)
             serious += [

@@ -16,13 +16,21 @@ function tell(text) {
   $("message").hidden = !text;
   $("message").textContent = text;
 }
-const act = async (asked) => {
-  if (readonly) return;
-  try {
-    const answer = await post("/do", JSON.stringify(asked));
-    tell(answer.message ?? "");
-  } catch (error) { tell(error.message); }
-  await refresh();
+// One thing after the other, in the order of the keys; until all is done the page's own placement holds.
+let pending = 0, before = Promise.resolve();
+const act = (asked) => {
+  if (readonly) return before;
+  pending++;
+  before = before.then(async () => {
+    try {
+      const answer = await post("/do", JSON.stringify(asked));
+      tell(answer.message ?? "");
+    } catch (error) { tell(error.message); }
+    pending--;
+    // What is being asked for may be from before this.
+    try { await asking; await refresh(); } catch (error) { tell(error.message); }
+  });
+  return before;
 };
 // Of what follows the pointer only the last is asked for, one question at a time.
 function latest(ask, show) {
@@ -223,7 +231,7 @@ function draw() {
   scene.lit = state.effects.filter((one) => one.on).map((one) => ({ link: one.link, number: one.on.strut }));
   if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
   if (scene.selected < 0 && here < 0) scene.pose = [...state.machine.origin];
-  act.origin = [...(state.program?.origin ?? state.machine.origin)];
+  if (!pending) act.origin = [...(state.program?.origin ?? state.machine.origin)];
   $("title").textContent = state.case;
   $("machine-name").textContent = `${state.machine.title}${r ? `, ${r.line.length - r.aside.filter(Boolean).length} readings` : ""}${state.program ? `, ${state.program.name}` : ""}`;
   document.title = `${state.case}: toolpath_stiff studio`;
@@ -250,13 +258,14 @@ let asking = null;
 async function refresh() {
   if (readonly) return;
   asking ??= (async () => {
-    const found = await (await fetch("/state")).json();
-    asking = null;
-    if (found.error) { tell(found.error); return; }
-    state = found;
-    version = found.version;
-    drawJob(found.job);
-    draw();
+    try {
+      const found = await (await fetch("/state")).json();
+      if (found.error) { tell(found.error); return; }
+      state = found;
+      version = found.version;
+      drawJob(found.job);
+      draw();
+    } finally { asking = null; }
   })();
   await asking;
 }
