@@ -145,7 +145,7 @@ function drawProfile() {
   const model = {
     s, value: (i) => shown[i], curves, ends: () => scene.ends, here: () => here,
     beside: () => null,
-    levels: () => (state.program.require && which !== "difference" ? [{ value: state.program.require, colour: ink.bad, dash: [6, 4], held: true }] : []),
+    levels: () => (state.program?.require && which !== "difference" ? [{ value: state.program.require, colour: ink.bad, dash: [6, 4], held: true }] : []),
   };
   if (profile) { profile.model = model; profile.all(); profile.redraw(); }
   else {
