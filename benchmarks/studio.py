@@ -10,6 +10,7 @@ from one frame to the next while the machine turns. Absolute times: they are wha
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import subprocess
 import sys
@@ -112,12 +113,14 @@ def measure_one(
 ) -> list[tuple[str, bool]]:
     """The rows of one case. The diagnosis beside the page is stopped: it is not what is measured."""
     hand = [{"do": "hand", "on": {"weak_strut": {"strut": 4, "factor": 0.7 + 0.005 * k}}} for k in range(ROUNDS)]
+    on = {"do": "switch", "effect": "weak_strut", "values": {"strut": 4, "factor": 0.8}}
     at = [{"do": "at", "origin": [k, -k, 800, 0, 0, 2 * k]} for k in range(ROUNDS)]
     with studio(case, *words) as address:
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         page.goto(address)
         page.wait_for_selector("#sw-table_compliance", timeout=PATIENCE)
         page.click("#cancel")
+        page.evaluate(ASKING, [[on]])
         page.wait_for_selector("#profile-card:not([hidden])", timeout=PATIENCE)
         found = []
         for what, questions in ((f"{readings}: a size moved by hand", hand), (f"{program}: the work dragged", at)):
@@ -126,6 +129,14 @@ def measure_one(
         times = page.evaluate(TURNING, ROUNDS)
         page.close()
     return [*found, row(f"{readings}, {program}: a frame while turning", times[1:], FRAME_BAR)]
+
+
+def load() -> str:
+    """What else the machine was doing: times on a busy one are longer than those that a user sees."""
+    mean, count = os.getloadavg()[0], os.cpu_count() or 1
+    return f"{count} processors, load {mean:.0f}: " + (
+        "idle but for this." if mean <= count + 1 else "busy with other work, an idle machine answers sooner."
+    )
 
 
 def main() -> int:
@@ -146,7 +157,7 @@ def main() -> int:
     print(text)
     if args.out:
         args.out.write_text(
-            f"# The studio's answers\n\n{text}\nMade by `python -m benchmarks.studio --out {args.out}`.\n"
+            f"# The studio's answers\n\n{text}\n{load()}\n\nMade by `python -m benchmarks.studio --out {args.out}`.\n"
         )
     return 0 if all(clears for _, clears in rows) else 1
 

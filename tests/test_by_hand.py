@@ -35,6 +35,15 @@ def test_with_the_sizes_of_an_update_the_error_is_that_of_the_update(hand):
     assert hand.at({"weak_strut": keys})["mean_abs_error_percent"] == pytest.approx(there, rel=1e-3)
 
 
+def test_near_another_setting_the_error_is_that_of_the_setting_itself(hand):
+    there, here = ({"weak_strut": {"strut": 4, "factor": factor}} for factor in (0.8, 0.82))
+    found = hand.at(here)
+    for near in (here, there):  # the same readings are wild at both: none
+        quick = hand.at(here, near=near)
+        assert quick["mean_abs_error_percent"] == pytest.approx(found["mean_abs_error_percent"], rel=1e-4)
+        assert quick["deviation_percent"] == pytest.approx(found["deviation_percent"], rel=1e-3, abs=2e-3)
+
+
 def test_the_machine_by_hand_carries_effect_and_law(hand):
     keys = {"strut": 2, "factor": 0.8}
     machine = hand.machine({"weak_strut": keys})

@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
+    from toolpath_stiff.api.by_hand import Preview as Preview
+    from toolpath_stiff.api.by_hand import preview as preview
     from toolpath_stiff.api.case import Case as Case
     from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
     from toolpath_stiff.api.case_studies import case_study as case_study
@@ -32,10 +34,8 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.diagnosis import Comparison as Comparison
     from toolpath_stiff.api.diagnosis import Diagnosis as Diagnosis
     from toolpath_stiff.api.diagnosis import Measurements as Measurements
-    from toolpath_stiff.api.diagnosis import Preview as Preview
     from toolpath_stiff.api.diagnosis import compare as compare
     from toolpath_stiff.api.diagnosis import diagnose as diagnose
-    from toolpath_stiff.api.diagnosis import preview as preview
     from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.api.effects import EffectCheck as EffectCheck
     from toolpath_stiff.api.effects import EffectDraft as EffectDraft
@@ -104,7 +104,8 @@ _PUBLIC = {
     ),
     "api.many": ("ManyAnalyses", "analyze_many"),
     "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
-    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "Preview", "compare", "diagnose", "preview"),
+    "api.by_hand": ("Preview", "preview"),
+    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
     "api.next_visits": ("NextVisit", "next_visit"),
     "api.placements": (
         "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",

@@ -12,6 +12,7 @@ import toolpath_stiff as tps
 from toolpath_stiff.cli.main import main
 
 SEED = 9006  # hides a weak strut
+TABLE = {"x_nm_per_N": 2.0, "y_nm_per_N": 2.0, "z_nm_per_N": 2.0, "rocking_nrad_per_N_per_m": 0.0}
 SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n"
 
 
@@ -86,7 +87,7 @@ def test_the_command_of_a_step_gives_the_figures_of_the_case(tmp_path, monkeypat
     case.set_aside("data/nist-table1.csv", 5)
     document = case.compare().to_dict()
     monkeypatch.chdir(case.folder)
-    assert main([*shlex.split(case.history[-1].command)[1:], "--json"]) == 0
+    assert main([*shlex.split(case.history[-1].command)[1:], "--json", "--no-plots"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["baseline"] == document["baseline"]
     kept = json.loads((case.folder / case.latest("compare") / "compare.json").read_text())
@@ -198,3 +199,56 @@ def test_what_no_effect_explains_is_drafted_and_competes(tmp_path):
     assert "missing" in [effect.name for effect in tps.effects([case.path("effects/missing.py")]).effects]
     case.undo()
     assert case.state.effects == ()
+
+
+def test_a_switch_set_by_hand_has_a_command_that_gives_its_error(case, monkeypatch, capsys):
+    keys = {"strut": 4, "factor": 0.83}
+    case.switch("weak_strut", keys)
+    shown = tps.preview(case.machine, case.data).at({"weak_strut": keys})
+    line = case.history[-1].command
+    assert "--machine machines/by-hand.toml" in line
+    monkeypatch.chdir(case.folder)
+    assert main([*shlex.split(line)[1:], "--json", "--no-plots"]) == 0
+    told = json.loads(capsys.readouterr().out)["baseline"]
+    assert told["mean_abs_error_percent"] == pytest.approx(shown["mean_abs_error_percent"], rel=1e-6)
+    assert told["bias_percent"] == pytest.approx(shown["bias_percent"], abs=1e-6)
+    case.switch("weak_strut", None)
+    assert "--machine machines/machine.toml" in case.history[-1].command  # as it stands
+
+
+def test_a_program_is_analyzed_with_the_effects_that_are_on_and_so_does_its_command(
+    case, tmp_path, monkeypatch, capsys
+):
+    (tmp_path / "slot.nc").write_text(SLOT)
+    case.add_program(tmp_path / "slot.nc")
+    plain = case.analyze().mean_N_per_mm
+    case.switch("table_compliance", TABLE)
+    found = case.analyze().to_dict()
+    assert found["mean_N_per_mm"] < 0.99 * plain
+    monkeypatch.chdir(case.folder)
+    assert main([*shlex.split(case.history[-1].command)[1:], "--json", "--no-plots"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    for name in ("mean_N_per_mm", "min_N_per_mm", "range_N_per_mm"):
+        assert told[name] == pytest.approx(found[name], rel=1e-9)
+
+
+def test_every_step_has_a_command_and_a_python_line(case, tmp_path):
+    (tmp_path / "slot.nc").write_text(SLOT)
+    case.set_aside("data/measurements.csv", 5)
+    case.set_aside("data/measurements.csv", 5, back=True)
+    case.switch("weak_strut", {"strut": 1, "factor": 0.9})
+    case.switch("weak_strut", None)
+    case.add_program(tmp_path / "slot.nc")
+    case.place_at((10, 0, 820))
+    case.require(20000)
+    assert [step.text for step in case.history if not (step.command.startswith(("tps ", "sed ")) and step.python)] == []
+    assert "--require 20000" in case.history[-1].command
+    assert case.history[0].python == "case = tps.Case.open('case', 'nist')"
+
+
+def test_without_readings_a_switch_leaves_the_strut_law(tmp_path):
+    case = tps.Case.open(tmp_path / "case")
+    case.switch("table_compliance", TABLE)
+    written = tps.Machine.load(case.path("machines/by-hand.toml"))
+    assert written.effects == ["table_compliance"]
+    assert written.model.machine.strut_law == case.machine.model.machine.strut_law

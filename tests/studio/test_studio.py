@@ -5,16 +5,19 @@ from __future__ import annotations
 import http.client
 import json
 import re
+import shlex
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import toolpath_stiff as tps
 from tests.browser import BROWSER
+from toolpath_stiff import rig
 
 SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG1 Y30\nM2\n"
 SEED, LAYOUT = 9006, "paper"
@@ -343,7 +346,9 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     settled(running)
     case = tps.Case.open(running.folder)
     there = tps.try_placement(case.machine, case.program).at(case.state.origin)
-    assert tab.number("#pl-mean") == pytest.approx(there["mean_N_per_mm"], abs=0.5)
+    for name in ("mean", "range", "min"):
+        assert tab.number(f"#pl-{name}") == pytest.approx(there[f"{name}_N_per_mm"], abs=0.5)
+    assert tab.number("#pl-margin") == pytest.approx(100 * there["margin"], abs=0.05)
     # For the shop floor: every warning, offsets, the set-up sheet, the program for this place.
     page.click("#set-up")
     page.wait_for_selector("#set-up-files")
@@ -359,9 +364,13 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     # The best place; a point of the front becomes the placement.
     page.click("#best")
     page.wait_for_selector("button[id^=use-]")
+    front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
+    cells = [re.sub(r"[^\d.-]", "", one) for one in page.locator("tr:has(button[id^=use-]) td").all_inner_texts()][:8]
+    first = front["front"][0]
+    keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "x_mm", "y_mm", "z_mm", "rotation_deg")
+    assert [float(one) for one in cells[1:]] == pytest.approx([first[key] for key in keys], abs=0.51)
     page.locator("button[id^=use-]").first.click()
     tab.until("document.querySelector('#set-up-files') === null")
-    front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
     settled(running)
     assert tps.Case.open(running.folder).state.origin[0] == pytest.approx(front["front"][0]["x_mm"], abs=1e-5)
     # Reveal, export.
@@ -376,38 +385,149 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     tab.close()
 
 
-def test_by_keyboard(running, browser):
+class Keys:
+    """A tab without a mouse: everything is reached by Tab, nothing is focused by script."""
+
+    def __init__(self, tab: Tab) -> None:
+        self.tab, self.press = tab, tab.page.keyboard.press
+        self.choosers: list[Any] = []
+        tab.page.on("filechooser", self._asked)
+
+    def _asked(self, chooser: Any) -> None:
+        self.choosers.append(chooser)
+
+    def reach(self, selector: str) -> None:
+        """Press Tab until the element has the focus; it must show that it has it."""
+        for _ in range(150):
+            if self.tab.page.evaluate("(one) => document.activeElement.matches(one)", selector):
+                ring = "getComputedStyle(document.activeElement).outlineStyle"
+                assert self.tab.page.evaluate(ring) != "none", selector
+                return
+            self.press("Tab")
+        raise AssertionError(f"not reached: {selector}")
+
+    def on(self, selector: str, key: str) -> None:
+        self.reach(selector)
+        self.press(key)
+
+    def type(self, selector: str, text: str) -> None:
+        self.reach(selector)
+        if not self.tab.page.evaluate("document.activeElement.matches('select')"):
+            self.press("Control+a")
+        self.tab.page.keyboard.type(text)
+
+    def stop(self) -> None:
+        """End the work beside the page, unless it has ended."""
+        while self.tab.page.is_visible("#cancel"):
+            here = self.tab.page.evaluate("document.activeElement.id === 'cancel'")
+            self.press("Enter" if here else "Tab")
+
+    def go(self, panel: str) -> None:
+        self.reach("[role=tab]")
+        self.press("Home")
+        while not self.tab.page.evaluate("(id) => document.activeElement.id === id", f"tab-{panel}"):
+            self.press("ArrowRight")
+
+    def add(self, file: Path) -> None:
+        self.on("#open", "Enter")
+        for _ in range(PATIENCE // 100):
+            if self.choosers:
+                return self.choosers.pop().set_files(file)
+            self.tab.page.wait_for_timeout(100)
+        raise AssertionError("no file chooser")
+
+
+def test_the_journey_by_keyboard(running, browser, tmp_path):
     tab = Tab(browser, running.address)
-    page = tab.page
-    page.wait_for_selector("#sw-table_compliance")
-    page.focus("#tab-effects")
-    page.keyboard.press("ArrowRight")
-    page.keyboard.press("ArrowLeft")
-    tab.until("document.activeElement.id === 'tab-effects'")
-    page.focus("#sw-table_compliance")
-    page.keyboard.press("Space")
-    page.wait_for_selector("#table_compliance-x_nm_per_N")
-    before = page.input_value("#table_compliance-x_nm_per_N")
-    page.focus("#table_compliance-x_nm_per_N")
-    page.keyboard.press("ArrowRight")
+    page, keys = tab.page, Keys(tab)
+    page.wait_for_selector("[id^=sw-]")
+    keys.go("exercise")
+    keys.type("#seed", str(SEED))
+    keys.type("#layout", "14")
+    keys.on("#start-exercise", "Enter")
+    tab.until("document.querySelector('#machine-name').textContent.includes('42 readings')")
     settled(running)
-    assert float(page.input_value("#table_compliance-x_nm_per_N")) > float(before)
-    tab.until("document.activeElement.id === 'table_compliance-x_nm_per_N'")
-    page.focus("#scene .overlay")
-    page.keyboard.press(".")
+    tab.until("document.querySelector('#sentence small') !== null")
+    # Look at a reading, set it aside, take it back.
+    keys.on("#scene .overlay", ".")
     tab.until("document.querySelector('#status').textContent.includes('measured')")
-    page.keyboard.press("Control+z")
-    tab.until(f"document.querySelector('#table_compliance-x_nm_per_N').value === {before!r}")
-    page.keyboard.press("Control+z")
-    page.wait_for_selector("#sw-table_compliance:not(:checked)")
-    page.focus("#scene .overlay")
-    title = tab.text("#machine-name")
-    page.keyboard.press("Enter")
-    tab.until(f"document.querySelector('#machine-name').textContent !== {title!r}")
-    assert len(tps.Case.open(running.folder).state.aside) == 1
-    page.keyboard.press("Control+z")
-    tab.until(f"document.querySelector('#machine-name').textContent === {title!r}")
-    assert tps.Case.open(running.folder).state.aside == ()
+    for key in ("ArrowLeft", "+", "Enter"):
+        keys.press(key)
+    tab.until("document.querySelector('#machine-name').textContent.includes('41 readings')")
+    keys.press("Control+z")
+    tab.until("document.querySelector('#machine-name').textContent.includes('42 readings')")
+    # Switch on, move the size, fit.
+    keys.go("effects")
+    keys.on("#sw-weak_strut", "Space")
+    page.wait_for_selector("#weak_strut-strut")
+    tab.until("document.activeElement.id === 'sw-weak_strut'")
+    keys.type("#weak_strut-strut", "4")
+    settled(running)
+    keys.on("#weak_strut-factor", "ArrowLeft")
+    state = settled(running)
+    tab.until("document.activeElement.id === 'weak_strut-factor'")
+    step = next(one for one in reversed(state["history"]) if one["kind"] == "switch")
+    told = subprocess.run(
+        [sys.executable, "-m", "toolpath_stiff", *shlex.split(step["command"])[1:], "--json", "--no-plots"],
+        cwd=running.folder, capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
+    by_command = json.loads(told.stdout)["baseline"]["mean_abs_error_percent"]
+    assert state["gauge"]["now"] == pytest.approx(by_command, rel=1e-6)
+    assert tab.number("#g-now") == pytest.approx(by_command, abs=0.005)
+    # Plan, download, measure, add the readings.
+    keys.go("next")
+    keys.type("#poses", "2")
+    keys.on("#make-plan", "Enter")
+    page.wait_for_selector("#plan-file")
+    keys.reach("#plan-file")
+    with page.expect_download() as plan:
+        keys.press("Enter")
+    plan.value.save_as(tmp_path / "plan.csv")
+    exercise = tps.Case.open(running.folder).state.exercise
+    rig.measure_again(running.folder / exercise, str(tmp_path / "plan.csv"), str(tmp_path / "measured.csv"), 1)
+    keys.add(tmp_path / "measured.csv")
+    tab.until("!document.querySelector('#machine-name').textContent.includes('42 readings')")
+    keys.stop()  # nothing here hangs on the new diagnosis
+    assert "case.add_data('measured.csv')" in [one["python"] for one in settled(running)["history"]]
+    # Fit, accept.
+    keys.go("effects")
+    keys.on("#fit", "Enter")
+    page.wait_for_selector("#fit-text")
+    settled(running)
+    keys.on("#accept:not(:disabled)", "Enter")
+    page.wait_for_selector("#sw-weak_strut", state="detached")
+    assert page.evaluate("document.activeElement.id") == "panel"  # the button is of no use any more
+    # The program, where it sits, the best place.
+    (tmp_path / "keys.nc").write_text(SLOT)
+    keys.add(tmp_path / "keys.nc")
+    tab.until("document.querySelector('#machine-name').textContent.includes('keys.nc')")
+    page.wait_for_selector("#p-mean")
+    keys.on("#profile .overlay", "ArrowRight")
+    tab.until("document.querySelector('#status').textContent.startsWith('line ')")
+    settled(running)
+    keys.go("placement")
+    keys.reach("#drag")
+    for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp"):
+        keys.press(key)
+    settled(running)
+    origin = tps.Case.open(running.folder).state.origin
+    assert (origin[0], origin[5]) == (20, 5)
+    keys.on("#best", "Enter")
+    page.wait_for_selector("button[id^=use-]")
+    keys.on("button[id^=use-]", "Enter")
+    front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
+    settled(running)
+    assert tps.Case.open(running.folder).state.origin[0] == pytest.approx(front["front"][0]["x_mm"], abs=1e-5)
+    # Export, reveal.
+    keys.reach("#export")
+    with page.expect_download() as exported:
+        keys.press("Enter")
+    assert exported.value.suggested_filename == "case.html"
+    keys.go("exercise")
+    keys.type("#claim", "weak_strut")
+    keys.on("#reveal", "Enter")
+    page.wait_for_selector("#revealed")
+    assert "claim weak_strut: " in tab.text("#revealed")
     assert tab.faults == []
     tab.close()
 
@@ -458,22 +578,25 @@ def test_broken_files_are_told_and_change_nothing(running, browser, tmp_path):
     tab.close()
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
-def test_axe_finds_nothing_serious(running, browser, width, scheme):
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
-    tab = Tab(browser, running.address, viewport={"width": width, "height": 900}, color_scheme=scheme)
+def test_axe_finds_nothing_serious(running, browser):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    tab = Tab(browser, running.address)
     tab.page.wait_for_selector("#sw-table_compliance")
+    serious = []
     for panel in ("effects", "why", "next", "program", "placement", "exercise", "history"):
         tab.go(panel)
-        found = axe.Axe().run(tab.page).response["violations"]
-        serious = [
-            f"{panel}: {one['id']}: {one['nodes'][0]['html'][:160]}"
-            for one in found
-            if one["impact"] in ("serious", "critical")
-        ]
-        assert serious == []
-    wide = tab.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-    assert wide <= 0
+        every = ((1400, "light"), (400, "dark"), (400, "light"), (1400, "dark"))
+        for width, scheme in every if panel == "effects" else every[:2]:
+            tab.page.set_viewport_size({"width": width, "height": 900})
+            tab.page.emulate_media(color_scheme=scheme)
+            serious += [
+                f"{panel}, {width}, {scheme}: {one['id']}: {one['nodes'][0]['html'][:160]}"
+                for one in axe.run(tab.page).response["violations"]
+                if one["impact"] in ("serious", "critical")
+            ]
+            wide = tab.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+            assert wide <= 0, (panel, width)
+    assert serious == []
     tab.close()
 
 
@@ -495,16 +618,61 @@ def test_a_killed_studio_resumes_where_it_was(resumed):
         assert after[name] == before[name]
 
 
-def test_the_export_is_read_without_a_studio(resumed, browser, tmp_path):
+PORTRAIT = {
+    "text": "What is missing gives way along X, the more the higher it is loaded.",
+    "links": [{"link": "frame", "probability": 0.83}, {"link": "table", "probability": 0.17}],
+    "variables": [{"variable": "y", "probability": 0.72}],
+    "held_out_rms_percent": 2.346,
+    "noise_floor_percent": 1.987,
+    "smooth_rms_percent": 2.111,
+    "explained_percent": 61.0,
+    "terms": [],
+}
+
+
+def of_command(folder: Path, result: str) -> dict[str, Any]:
+    """The JSON document that the command has written to a result's folder."""
+    return json.loads(next((folder / result).glob("*.json")).read_text())
+
+
+def test_the_export_is_read_without_a_studio_and_has_the_figures_of_the_commands(resumed, browser, tmp_path):
     _, again = resumed
-    content = again.ask("GET", "/export")[1]
+    content = again.ask("GET", "/export")[1].decode()
     state = again.idle()
     again.end()
-    assert again.token.encode() not in content
-    (tmp_path / "case.html").write_bytes(content)
+    assert again.token not in content
+    head, mark, tail = content.partition('id="state">')
+    document, end, rest = tail.partition("</script>")
+    exported = json.loads(document)
+    exported["verdict"]["portrait"] = PORTRAIT  # these data leave nothing to portray
+    text = json.dumps(exported).replace("<", "\\u003c")
+    (tmp_path / "case.html").write_text("".join([head, mark, text, end, rest]), "utf-8")
     tab = Tab(browser, (tmp_path / "case.html").as_uri())
     tab.page.wait_for_selector("#sw-table_compliance")
-    assert tab.number("#g-as_given") == pytest.approx(state["gauge"]["as_given"], abs=0.005)
     assert tab.page.locator("#undo").count() == 0
+    # The gauge, the table of effects.
+    said = of_command(again.folder, tps.Case.open(again.folder).latest("diagnose"))
+    figures = said["baseline"]["as_given"]
+    assert tab.number("#g-as_given") == pytest.approx(figures["mean_abs_error_percent"], abs=0.005)
+    assert tab.number("#g-left_out") == pytest.approx(figures["held_out_error_percent"], abs=0.005)
+    assert tab.number("#g-floor") == pytest.approx(said["baseline"]["noise_floor_percent"], abs=0.005)
+    rows = {}
+    for row in tab.page.locator(".effect").all():
+        rows[row.locator("code").inner_text()] = " ".join(row.inner_text().split())
+    for one in said["candidates"]:
+        shown = rows.pop(one["effect"])
+        if one["finding"]:
+            errors = [one[f"{key}_error_percent"] for key in ("mean_abs", "held_out")]
+            assert [f"{v:.2f} %" in shown for v in errors] == [True, True], one["effect"]
+        p = one["probability"]
+        assert p is None or ("> 99" if p > 0.99 else "< 1" if p < 0.01 else f"{100 * p:.0f}") + " %" in shown
+    shown = " ".join(tab.text("#portrait").split())
+    for figure in ("83 %", "17 %", "72 %", "61 %", "2.35 %", "1.99 %", "2.11 %"):
+        assert figure in shown
+    # The program.
+    tab.go("program")
+    kept = of_command(again.folder, state["program"]["result"])
+    for name in ("mean", "min", "range"):
+        assert tab.number(f"#p-{name}") == pytest.approx(kept[f"{name}_N_per_mm"], abs=0.5)
     assert tab.faults == []
     tab.close()

@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 
 from tests.updating.cases import campaign, predictor_for, simple_noise
 from toolpath_stiff.updating.comparison.structure import EXCESSES, Scattering, _Fit
-from toolpath_stiff.updating.inference.covariances import Covariance, Groups, inverse_root
+from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Widening, inverse_root
 from toolpath_stiff.updating.inference.gates import discrepancy_forms
 from toolpath_stiff.updating.inference.noise import Scatter
 
@@ -45,10 +45,23 @@ def test_covariance_and_its_inverse_are_those_of_the_matrix_written_out(case):
     assert found.squares(rows) == pytest.approx(np.diag(rows @ inverse @ rows.T), rel=1e-7, abs=tiny)
     assert found.diagonal == pytest.approx(np.diag(inverse), rel=1e-7, abs=tiny)
     some = rng.permutation(n)[: rng.integers(1, n + 1)]
-    assert found.columns(some) == pytest.approx(inverse[some], rel=1e-7, abs=tiny)
     assert found.block(some) == pytest.approx(inverse[np.ix_(some, some)], rel=1e-7, abs=tiny)
     assert found.white(rows) @ found.white(rows).T == pytest.approx(rows @ inverse @ rows.T, rel=1e-6, abs=10 * tiny)
     assert covariance.select(some).dense() == pytest.approx(whole[np.ix_(some, some)], rel=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(covariances())
+def test_readings_widened_one_by_one_have_the_inverse_of_the_matrix_written_out(case):
+    covariance, whole, rng = case
+    step_by_step = Widening(covariance)
+    for row in rng.integers(0, len(whole), 6).tolist():
+        more = rng.uniform(0.1, 5.0)
+        step_by_step.widen(row, more)
+        whole[row, row] += more
+        inverse = np.linalg.inv(whole)
+        for at in range(len(whole)):
+            assert step_by_step.column(at) == pytest.approx(inverse[at], rel=1e-6, abs=1e-7 * np.abs(inverse).max())
 
 
 @settings(max_examples=30, deadline=None)

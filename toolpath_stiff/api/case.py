@@ -13,9 +13,9 @@ The state is what the steps up to `done` have made of it; undo and redo move `do
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.api.case_files import (
     copied,
@@ -27,28 +27,23 @@ from toolpath_stiff.api.case_files import (
     without_lines,
     write_files,
 )
+from toolpath_stiff.api.case_results import Findings
 from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.effects import effects
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.results import FolderResult, Progress
-from toolpath_stiff.api.steps import CASE_FILE, History, Step, read_case
+from toolpath_stiff.api.steps import CASE_FILE, read_case
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.hints import command_line, options
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api.correction import Plan, Update
-    from toolpath_stiff.api.diagnosis import Comparison, Diagnosis
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.api.placements import Placement
-    from toolpath_stiff.api.programs import Analysis
-
-Found = TypeVar("Found", bound=FolderResult)
+    from toolpath_stiff.api.results import Progress
 
 
-class Case(History):
+class Case(Findings):
     r"""A folder that holds a machine, measurements, a program, and every step that was done with them.
 
     Attributes
@@ -76,10 +71,6 @@ class Case(History):
     (['machine', 'exercise'], ['aside'])
     (('data/measurements.csv', 'data/measured.csv'), 'right', 'results/006-compare')
     """
-
-    def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
-        super().__init__(folder, steps, done, text)
-        self.plots = False
 
     @classmethod
     def open(cls, folder: str | Path, machine: str | Path = MACHINE) -> Case:
@@ -116,39 +107,6 @@ class Case(History):
         case.set_machine(machine)
         return case
 
-    # -- what there is ------------------------------------------------------------------------------------------------
-
-    @property
-    def machine(self) -> Machine:
-        """The machine, effects of one's own included."""
-        state = self.state
-        return Machine.load(self.path(state.machine), effects=[self.path(name) for name in state.effects])
-
-    @property
-    def data_files(self) -> tuple[str, ...]:
-        """The files of the readings in use; those with readings set aside are in used/."""
-        state = self.state
-        touched = {entry.rpartition(":")[0] for entry in state.aside}
-        return tuple(used_name(name) if name in touched else name for name in state.data)
-
-    @property
-    def data(self) -> Measurements:
-        """The readings in use. Raises `InputError` where there are none."""
-        if not self.data_files:
-            raise InputError("this case has no measurements", hint="add a file with add_data, or start an exercise")
-        return Measurements([self.path(name) for name in self.data_files])
-
-    @property
-    def program(self) -> Program:
-        """The program. Raises `InputError` where there is none."""
-        if not self.state.program:
-            raise InputError("this case has no program", hint="add one with add_program")
-        return Program.read(self.path(self.state.program))
-
-    def latest(self, kind: str) -> str:
-        """Folder of the latest result of a kind among the steps that hold; "" without one."""
-        return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
-
     def __repr__(self) -> str:
         return f"<Case {self.folder.name}: {self._done} steps>"
 
@@ -175,7 +133,17 @@ class Case(History):
         except TpsError:
             (self.folder / name).unlink()
             raise
-        self.record("machine", f"machine {Path(machine).name}", change={"machine": name, "on": {}}, files=[name])
+        python = f"case.set_machine({str(machine)!r})"
+        if not self.history:
+            python = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
+        self.record(
+            "machine",
+            f"machine {Path(machine).name}",
+            change={"machine": name, "on": {}},
+            files=[name],
+            command=command_line("machine", "check", name),
+            python=python,
+        )
 
     def add_effects(self, file: str | Path) -> None:
         """Use a Python file with effects of one's own. Its code is run.
@@ -263,7 +231,7 @@ class Case(History):
             self._check_aside(file, line)
         text = f"{file} line {line} {'used again' if back else 'set aside'}"
         words = [f"-e '{one.rpartition(':')[2]}s/^/# /'" for one in aside if one.startswith(file + ":")]
-        sed = f"sed {' '.join(words)} {file} > {used_name(file)}" if words else ""
+        sed = f"sed {' '.join(words)} {file} > {used_name(file)}" if words else self._ask("compare", state.data)
         self.record(
             "aside",
             text,
@@ -291,13 +259,30 @@ class Case(History):
         on = {name: dict(keys) for name, keys in self.state.on.items() if name != effect}
         if values is not None:
             on[effect] = dict(values)
+        name = self._machine_by_hand(on)
         said = ", ".join(f"{key} {_short(value)}" for key, value in (values or {}).items())
         self.record(
             "switch",
             f"{effect} on: {said}" if values is not None else f"{effect} off",
             change={"on": on},
+            files=[name] if on else [],
+            command=self.question("compare", machine=name)
+            if self.state.data
+            else command_line("machine", "check", name),
             python=f"case.switch({effect!r}, {dict(values) if values is not None else None!r})",
         )
+
+    def _of_machine(self, name: str) -> str:
+        """What asks a machine file for its errors; without readings, for its slips."""
+        return self.question("compare", machine=name) if self.state.data else command_line("machine", "check", name)
+
+    def _machine_by_hand(self, on: Mapping[str, Mapping[str, Any]]) -> str:
+        """The file of the machine with these effects, written for whoever asks the commands; as it stands with none."""
+        if not on:
+            return self.state.machine
+        name = free_name(self.folder, "machines/by-hand.toml")
+        self.machine_with(on).save(self.folder / name)
+        return name
 
     def accept(self, file: str | Path) -> None:
         """Go on with the machine file that an update of this case wrote.
@@ -371,26 +356,16 @@ class Case(History):
 
     def require(self, stiffness_N_per_mm: float) -> None:
         """Ask a stiffness of every cut; 0: none."""
+        asked = float(stiffness_N_per_mm)
         self.record(
             "require",
-            f"{stiffness_N_per_mm:g} N/mm required",
-            change={"require": float(stiffness_N_per_mm)},
-            python=f"case.require({stiffness_N_per_mm:g})",
+            f"{asked:g} N/mm required",
+            change={"require": asked},
+            command=self._analyze_line(self.state.program, self.state.origin, require=asked)
+            if self.state.program
+            else "",
+            python=f"case.require({asked:g})",
         )
-
-    # -- what one finds out -------------------------------------------------------------------------------------------
-
-    def compare(self, progress: Progress | None = None) -> Comparison:
-        """Where the model fails, as `tps.compare`; kept in results/."""
-        from toolpath_stiff.api.diagnosis import compare
-
-        return self._kept("compare", compare(self.machine, self.data, progress=progress))
-
-    def diagnose(self, progress: Progress | None = None) -> Diagnosis:
-        """Which effect is missing, as `tps.diagnose`; kept in results/."""
-        from toolpath_stiff.api.diagnosis import diagnose
-
-        return self._kept("diagnose", diagnose(self.machine, self.data, progress=progress))
 
     def draft(self, progress: Progress | None = None) -> EffectDraft:
         """What a diagnosis leaves unexplained as an effect file, as `tps.draft_effect`; the case uses it from then on.
@@ -403,99 +378,6 @@ class Case(History):
         if found.text:
             self.add_effects(self.folder / result / f"{found.name}.py")
         return found
-
-    def draft_in(self, result: str, progress: Progress | None = None) -> tuple[EffectDraft, str]:
-        """What `draft` finds, kept in a folder of the case without a step; and its command."""
-        from toolpath_stiff.api.effects import draft_effect
-
-        file = f"{result}/{self._free_effect('missing')}.py"
-        found = draft_effect(self.machine, self.data, file, progress=progress)
-        (self.folder / result).mkdir(parents=True, exist_ok=True)
-        if found.text:
-            found.save(self.folder / file)
-        state = self.state
-        asked = options(machine=state.machine, effects=list(state.effects), out=file)
-        return found, command_line("effects", "draft", *self.data_files, *asked)
-
-    def _free_effect(self, name: str) -> str:
-        taken, number = {one.name for one in effects([self.path(one) for one in self.state.effects]).effects}, 1
-        free = name
-        while free in taken:
-            number += 1
-            free = f"{name}_{number}"
-        return free
-
-    def update(self, add: str | Iterable[str], progress: Progress | None = None) -> Update:
-        """Fit effects, as `tps.update`; kept in results/, where `accept` takes machine.toml from."""
-        from toolpath_stiff.api.correction import update
-
-        names = [add] if isinstance(add, str) else list(add)
-        return self._kept(
-            "update", update(self.machine, self.data, add=names, progress=progress), repr(names), add=names
-        )
-
-    def plan(self, n: int = 6) -> Plan:
-        """What to measure next, as `tps.plan`; kept in results/, plan.csv among it."""
-        from toolpath_stiff.api.correction import plan
-
-        return self._kept("plan", plan(self.machine, self.data if self.state.data else None, n=n), f"n={n}", n=n)
-
-    def analyze(self, progress: Progress | None = None) -> Analysis:
-        """The program on the machine, as `tps.analyze`; kept in results/."""
-        from toolpath_stiff.api.programs import analyze
-
-        state = self.state
-        found = analyze(
-            self.machine,
-            self.program,
-            origin_mm_deg=state.origin or None,
-            partial=True,
-            require_N_per_mm=state.require or None,
-            progress=progress,
-        )
-        return self._kept("analyze", found, program=state.program)
-
-    def place(self, progress: Progress | None = None, **bounds: Any) -> Placement:
-        """Where the work should sit, as `tps.place`; kept in results/."""
-        from toolpath_stiff.api.placements import place
-
-        found = place(self.machine, self.program, origin_mm_deg=self.state.origin or None, progress=progress, **bounds)
-        words = ", ".join(f"{name}={value!r}" for name, value in bounds.items())
-        return self._kept("place", found, words, program=self.state.program)
-
-    def set_up(self, progress: Progress | None = None) -> Placement:
-        """The program where it sits now, for the shop floor: offsets, set-up sheet and the program written for it.
-
-        As `tps.place` with every bound fixed there; figures and warnings are against where the program sat at first.
-        Kept in results/ with its pictures. A program that cannot be written for the place is not; not_written.txt says
-        why.
-        """
-        result = self.next_result("set_up")
-        found, command = self.set_up_in(result, progress)
-        self.record("set_up", found._short(), command=command, python="case.set_up()", result=result)
-        return found
-
-    def set_up_in(self, result: str, progress: Progress | None = None) -> tuple[Placement, str]:
-        """What `set_up` finds, kept in a folder of the case without a step; and its command."""
-        from toolpath_stiff.api.placements import place
-
-        state = self.state
-        if len(state.origin) < 3:
-            raise InputError("the program sits where it always did", hint="put it somewhere with place_at first")
-        names = ("x_mm", "y_mm", "z_mm", "tilt_a_deg", "tilt_b_deg", "rotate_deg")
-        at: dict[str, Any] = dict(zip(names, (*state.origin, 0.0, 0.0, 0.0), strict=False))
-        name, reason = Path(state.program).name, ""
-        try:
-            found = place(self.machine, self.program, write=name, progress=progress, **at)
-        except InputError as error:
-            found, reason = place(self.machine, self.program, progress=progress, **at), str(error)
-        found.save(self.folder / result)
-        beside = {"not_written.txt": f"{reason}\n"} if reason else {name: found.program_bytes}
-        write_files(self.folder / result, beside)
-        bounds = {key.rpartition("_")[0].replace("_", "-"): f"{value:.10g}" for key, value in at.items()}
-        written = None if reason else f"{result}/{name}"
-        asked = options(machine=state.machine, effects=list(state.effects), **bounds, out=result, write=written)
-        return found, command_line("place", state.program, *asked)
 
     # -- a blind exercise ---------------------------------------------------------------------------------------------
 
@@ -567,29 +449,6 @@ class Case(History):
         if not self.state.exercise:
             raise InputError("no exercise was started in this case", hint="start one with start_exercise(seed)")
         return self.state.exercise
-
-    def question(self, name: str, **own: Any) -> str:
-        """The command line that asks this of the readings in use."""
-        return self._ask(name, self.data_files, **own)
-
-    def _kept(self, kind: str, found: Found, words: str = "", **own: Any) -> Found:
-        result = self.next_result(kind)
-        found.save(self.folder / result, plots=self.plots)
-        program = own.pop("program", "")
-        line = self._analyze_line(program, self.state.origin, kind) if program else self.question(kind, **own)
-        self.record(kind, found._short(), command=line, python=f"case.{kind}({words})", result=result)
-        return found
-
-    def _ask(self, name: str, files: Sequence[str], **own: Any) -> str:
-        state = self.state
-        return command_line(name, *files, *options(machine=state.machine, **own, effects=list(state.effects)))
-
-    def _analyze_line(self, program: str, origin: Sequence[float], name: str = "analyze") -> str:
-        state, word = self.state, ",".join(f"{value:.10g}" for value in origin) or None
-        require = state.require if state.require and name == "analyze" else None
-        return command_line(
-            name, program, *options(machine=state.machine, origin=word, require=require, effects=list(state.effects))
-        )
 
     def _check_effect(self, name: str, values: Mapping[str, Any], on: bool) -> None:
         from toolpath_stiff.machine.model import EffectEntry

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from toolpath_stiff.machine.model import EffectEntry
     from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.updating.comparison import Comparison as Compared
     from toolpath_stiff.updating.diagnosis import Diagnosis as Diagnosed
@@ -267,111 +266,6 @@ def compare(
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
     teller(progress)("comparing")
     return Comparison(compare_readings(asked.model, asked.readings, asked=asked.asked, **asked.common), asked.inputs)
-
-
-class Preview:
-    """The error at every reading with effects of any size, at once: what a slider moves; `preview` makes one.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> hand = tps.preview("nist", "nist-table1", noise_percent=5)
-    >>> sorted(hand.at({}))
-    ['bias_percent', 'deviation_percent', 'mean_abs_error_percent', 'modelled_N_per_mm', 'rms_percent']
-    >>> hand.machine({"weak_strut": {"strut": 4, "factor": 0.8}})
-    <Machine nist: 6 struts, weak_strut>
-    """
-
-    def __init__(self, asked: Question) -> None:
-        from toolpath_stiff.updating.comparison import ByHand
-
-        self._hand = ByHand(
-            asked.model,
-            asked.readings,
-            noise=asked.noise,
-            strut_spread=asked.strut_spread,
-            effect_files=asked.on.effect_files,
-        )
-        self._on = asked.on
-
-    def machine(self, effects: Mapping[str, Mapping[str, Any]]) -> Machine:
-        """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
-        from dataclasses import replace
-
-        from toolpath_stiff.stiffness.effects import find_effect
-        from toolpath_stiff.stiffness.model import build_model
-        from toolpath_stiff.updating.inference.prediction import scaled_law
-
-        entries, given = _entries(effects), self._on.model.given or self._on.model.machine
-        law = scaled_law(given.strut_law, self._hand.fit(entries).law)
-        read = [one for one in entries if find_effect(one.name, self._on.effect_files).is_instrument]
-        added = given.with_changes(
-            strut_law=law,
-            effects=(*given.effects, *(one for one in entries if one not in read)),
-            instruments=(*given.instruments, *read),
-        )
-        model = build_model(added, self._on.effect_files, conditions=self._on.model.conditions)
-        return replace(self._on, model=model)
-
-    def at(self, effects: Mapping[str, Mapping[str, Any]] | None = None, *, strut_law: bool = True) -> dict[str, Any]:
-        """Errors in per cent with these effects beside those of the machine file.
-
-        Parameters
-        ----------
-        effects
-            Name -> the keys of its entry in a machine file: {"weak_strut": {"strut": 4, "factor": 0.8}}.
-        strut_law
-            Refit the strut law beside them; otherwise it stays that of the machine file.
-
-        Returns
-        -------
-        dict
-            "mean_abs_error_percent", "bias_percent", "rms_percent"; "deviation_percent", one a reading, of
-            (measured - modelled) / modelled; "modelled_N_per_mm", one a reading.
-
-        Raises
-        ------
-        InputError
-            An effect is unknown, or cannot have such values.
-        """
-        import numpy as np
-
-        from toolpath_stiff.units import n_per_mm_from_n_per_m
-        from toolpath_stiff.updating.inference.fits import deviation_percent, error_figures
-
-        fit = self._hand.fit(_entries(effects or {}), strut_law)
-        modelled = n_per_mm_from_n_per_m(np.exp(self._hand.problem.observed - fit.residual))
-        return {
-            **error_figures(fit.residual),
-            "deviation_percent": deviation_percent(fit.residual).tolist(),
-            "modelled_N_per_mm": modelled.tolist(),
-        }
-
-
-def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:
-    """Effects as a machine file would have them."""
-    from toolpath_stiff.machine.model import EffectEntry
-
-    return [EffectEntry(name, dict(keys)) for name, keys in effects.items()]
-
-
-def preview(
-    machine: Machine | str | Path, data: Data, *, noise_percent: Noise = None, strut_spread_percent: float = 1.0
-) -> Preview:
-    """Set effects by hand and see the error of every reading: made once, then some milliseconds a setting.
-
-    Arguments and errors as of `compare`.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> hand = tps.preview("nist", "nist-table1", noise_percent=5)
-    >>> round(hand.at(strut_law=False)["mean_abs_error_percent"], 2)
-    9.62
-    >>> round(hand.at({"weak_strut": {"strut": 4, "factor": 0.8}})["mean_abs_error_percent"], 2)
-    10.04
-    """
-    return Preview(Question(machine, data, noise_percent, strut_spread_percent, 0))
 
 
 class Diagnosis(FolderResult):

@@ -134,10 +134,13 @@ class History:
     ----------
     folder
         Where the case is.
+    sent_to
+        A folder that the Python lines leave out, with its last "/": where files lie that a page has sent.
     """
 
     def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
         self.folder, self._steps, self._done, self._written = folder, list(steps), done, text
+        self.sent_to = ""
 
     @property
     def history(self) -> list[Step]:
@@ -197,6 +200,7 @@ class History:
         A step that changes something forgets what was undone; one that only finds something out does not.
         """
         sums = {name: sha256((self.folder / name).read_bytes()) for name in files}
+        python = python.replace(self.sent_to, "") if self.sent_to else python
         step = Step(kind, text, command, python, dict(change or {}), sums, result)
         self._steps = [*self.history, step, *(() if change else self.undone)]
         self._done += 1

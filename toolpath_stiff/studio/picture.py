@@ -25,7 +25,7 @@ def document(session: Session) -> dict[str, Any]:
 def _document(session: Session) -> dict[str, Any]:
     case, state = session.case, session.case.state
     has_data = bool(state.data)
-    now = session.preview.at(state.on, strut_law=bool(state.on)) if has_data else None
+    now = session.errors() if has_data else None
     return {
         "case": session.name,
         "machine": machine(session.machine),
@@ -106,7 +106,7 @@ def readings(session: Session, now: dict[str, Any] | None) -> dict[str, Any]:
 
 def gauge(session: Session, now: dict[str, Any]) -> dict[str, Any]:
     """Mean errors in per cent: as the file stands, refitted, now, at left-out points; the noise floor."""
-    hand, on = session.preview, session.case.state.on
+    hand, on = session.case.preview, session.case.state.on
     key = session.data_key
     base = session.once(
         "base", key, lambda: [hand.at(strut_law=law)["mean_abs_error_percent"] for law in (False, True)]

@@ -102,10 +102,12 @@ class Session:
         found: tps.Machine = self.once("machine", (state.machine, state.effects), lambda: self.case.machine)
         return found
 
-    @property
-    def preview(self) -> tps.Preview:
-        """Errors for effects of any size."""
-        found: tps.Preview = self.once("preview", self.data_key, lambda: tps.preview(self.machine, self.case.data))
+    def errors(self) -> dict[str, Any]:
+        """The error of every reading in use as the switches stand."""
+        on = self.case.state.on
+        found: dict[str, Any] = self.once(
+            "errors", (self.data_key, on), lambda: self.case.preview.at(on, strut_law=bool(on))
+        )
         return found
 
     def found(self, kind: str) -> dict[str, Any] | None:
@@ -149,7 +151,8 @@ class Session:
         return answer or {}
 
     def _by_hand(self, on: Mapping[str, Any]) -> dict[str, Any]:
-        found = self.preview.at(on, strut_law=bool(on))
+        # Which readings are wild is found out when the slider is let go.
+        found = self.case.preview.at(on, strut_law=bool(on), near=self.case.state.on or None)
         return {**found, "deviation_percent": [round(one, 3) for one in found["deviation_percent"]],
                 "modelled_N_per_mm": [round(one) for one in found["modelled_N_per_mm"]]}  # fmt: skip
 
@@ -221,6 +224,7 @@ class Session:
         with tempfile.TemporaryDirectory() as folder, self.lock:
             file = Path(folder) / plain
             file.write_bytes(content)
+            self.case.sent_to = f"{folder}/"
             try:
                 add: dict[str, Callable[[Path], None]] = {
                     "data": self.case.add_data,
@@ -278,7 +282,7 @@ class Session:
         if kind == "analyze":
             fit = self.found("update")
             fitted = fit["result"] + "/machine.toml" if fit and fit.get("accepted") and self.is_fitted else ""
-            own = {"on": self.case.state.on, "fitted": fitted, "first": self.first_machine}
+            own = {"machine": fitted, "first": self.first_machine}
         job = Job(self.case.folder, kind, {"result": self.case.next_result(kind), **own}, self.key(kind))
         self._running = job
         job.follow(lambda: self._tell(state=False), self._done)
@@ -345,16 +349,13 @@ class Session:
 
     def _command(self, job: Job) -> str:
         state = self.case.state
-        if job.kind in ("analyze", "place"):
+        if job.kind == "place":
             origin = ",".join(f"{one:.10g}" for one in state.origin) or None
             bounds = {
                 name.partition("_")[0]: f"{v[0]:g}:{v[1]:g}" for name, v in job.options.items() if isinstance(v, list)
             }
-            require = state.require if state.require and job.kind == "analyze" else None
-            words = options(
-                machine=job.options.get("fitted") or state.machine, origin=origin, require=require, **bounds
-            )
-            return command_line(job.kind, state.program, *words, *options(effects=list(state.effects)))
+            words = options(machine=state.machine, origin=origin, **bounds, effects=list(state.effects))
+            return command_line(job.kind, state.program, *words)
         own = {"add": job.options.get("add"), "n": job.options.get("n")}
         return self.case.question(job.kind, **{name: value for name, value in own.items() if value})
 
@@ -458,7 +459,8 @@ def _word(effect: tps.Effect, keys: Mapping[str, Any]) -> str:
 
 def _python(job: Job) -> str:
     own = {name: value for name, value in job.options.items() if name in ("add", "n") or isinstance(value, list)}
-    return ", ".join(f"{name}={value!r}" for name, value in own.items())
+    machine = [repr(job.options["machine"])] if job.options.get("machine") else []
+    return ", ".join([*machine, *(f"{name}={value!r}" for name, value in own.items())])
 
 
 ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {

@@ -136,22 +136,16 @@ def plan(case: Any, tell: Tell, result: str, n: int) -> dict[str, Any]:
     return {"text": repr(found), "document": found.to_dict(), "rows": found.to_frame().to_dict("records")}
 
 
-def analyze(case: Any, tell: Tell, result: str, on: Mapping[str, Any], fitted: str, first: str) -> dict[str, Any]:
-    """The program on the first machine of the case and on the present one with the effects that are on."""
+def analyze(case: Any, tell: Tell, result: str, machine: str, first: str) -> dict[str, Any]:
+    """The program on the present machine with the effects that are on, or an update's, and on the case's first one."""
     import toolpath_stiff as tps
 
-    asked: dict[str, Any] = {
-        "origin_mm_deg": case.state.origin or None,
-        "partial": True,
-        "require_N_per_mm": case.state.require or None,
-    }
-    now = case.machine.like(case.path(fitted)) if fitted else case.machine
-    if on and not fitted:
-        now = tps.preview(case.machine, case.data).machine(on)
-    found = tps.analyze(now, case.program, progress=tell, **asked)
-    found.save(case.folder / result, plots=False)
-    before = tps.analyze(case.machine.like(case.path(first)), case.program, progress=tell, **asked)
-    return {"text": repr(found), "document": found.to_dict(), "path": _columns(found, before)}
+    found, command = case.analyze_in(result, machine, tell)
+    origin = case.state.origin or None
+    before = tps.analyze(
+        case.machine.like(case.path(first)), case.program, origin_mm_deg=origin, partial=True, progress=tell
+    )
+    return {"text": repr(found), "document": found.to_dict(), "command": command, "path": _columns(found, before)}
 
 
 def _columns(found: Any, before: Any) -> dict[str, Any]:

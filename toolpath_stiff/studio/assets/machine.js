@@ -21,6 +21,8 @@ function mix(a, b, t) {
   return `rgb(${p.map((v, i) => Math.round(v + (q[i] - v) * t)).join(",")})`;
 }
 
+// More readings than this are drawn without bars; dots stand so many pixels beside their pose; shades of each colour.
+const MANY = 900, BESIDE = 19.5, SHADES = 8;
 class MachineScene {
   constructor() {
     this.focus = "work";
@@ -145,23 +147,42 @@ class MachineScene {
   dots(view) {
     const r = this.state.readings, items = [];
     if (!r) return this.plan(view);
-    const many = r.line.length > 900;
+    if (r.line.length > MANY) return [this.cloud(r, view), ...this.plan(view)];
     for (let i = 0; i < r.line.length; i++) {
       const at = [r.x_mm[i], r.y_mm[i], r.z_mm[i]], [x, y, depth] = view.project(at), gone = r.aside[i], chosen = i === this.selected;
-      const along = [r.dx[i], r.dy[i], r.dz[i]], size = 26 / view.zoom, [ex, ey] = view.project(at.map((v, k) => v + along[k] * size));
-      const percent = this.deviation[i] ?? 0, big = gone ? 3 : 2.2 + 4 * Math.min(1, Math.abs(percent) / this.scale);
+      const along = [r.dx[i], r.dy[i], r.dz[i]], size = BESIDE / view.zoom, [px, py] = view.project(at.map((v, k) => v + along[k] * size));
       // Readings of one pose stand apart along their directions, so that each can be pointed at.
-      const [px, py] = [x + (ex - x) * 0.75, y + (ey - y) * 0.75];
+      const percent = this.deviation[i] ?? 0, big = this.radius(gone, percent);
       this.spots.push([px, py, i]);
       items.push({ depth: depth + 60 + (chosen ? 1e5 : 0), paint: (g) => {
         const colour = gone ? ink.line : errorColour(percent, this.scale);
-        if (!many || chosen) { g.beginPath(); g.moveTo(x, y); g.lineTo(px, py); g.strokeStyle = colour; g.lineWidth = 1.3; g.stroke(); }
+        g.beginPath(); g.moveTo(x, y); g.lineTo(px, py); g.strokeStyle = colour; g.lineWidth = 1.3; g.stroke();
         g.beginPath(); g.arc(px, py, big, 0, 7);
         if (gone) { g.strokeStyle = ink.muted; g.lineWidth = 1.4; g.stroke(); } else { g.fillStyle = colour; g.fill(); g.strokeStyle = ink.panel; g.lineWidth = 0.8; g.stroke(); }
         if (chosen) ring(g, px, py, big + 4, ink.ink, 2);
       } });
     }
     return [...items, ...this.plan(view)];
+  }
+  radius(gone, percent) { return gone ? 3 : 2.2 + 4 * Math.min(1, Math.abs(percent) / this.scale); }
+  // Thousands of readings: dots above the rest without bars, those of a shade as one path; the largest errors last.
+  cloud(r, view) {
+    const [right, up] = view.axes(), [mx, my, mz] = view.middle, size = BESIDE / view.zoom, gone = [], shades = Array.from({ length: 2 * SHADES + 1 }, () => []);
+    for (let i = 0; i < r.line.length; i++) {
+      const x = r.x_mm[i] + r.dx[i] * size - mx, y = r.y_mm[i] + r.dy[i] * size - my, z = r.z_mm[i] + r.dz[i] * size - mz;
+      const spot = [view.cx + view.zoom * (x * right[0] + y * right[1]), view.cy - view.zoom * (x * up[0] + y * up[1] + z * up[2]), i];
+      const share = Math.max(-1, Math.min(1, (this.deviation[i] ?? 0) / this.scale));
+      this.spots.push(spot);
+      (r.aside[i] ? gone : shades[SHADES + Math.round(SHADES * share)]).push(spot);
+    }
+    const paths = shades.map((spots, k) => ({ spots, percent: (k / SHADES - 1) * this.scale })).sort((a, b) => Math.abs(a.percent) - Math.abs(b.percent));
+    const trace = (g, spots, radius) => { g.beginPath(); for (const [x, y] of spots) { g.moveTo(x + radius, y); g.arc(x, y, radius, 0, 7); } };
+    return { depth: 1e5, paint: (g) => {
+      for (const { spots, percent } of paths) { trace(g, spots, this.radius(false, percent)); g.fillStyle = errorColour(percent, this.scale); g.fill(); }
+      trace(g, gone, this.radius(true, 0)); g.strokeStyle = ink.muted; g.lineWidth = 1.4; g.stroke();
+      const chosen = this.spots[this.selected];
+      if (chosen) ring(g, chosen[0], chosen[1], this.radius(r.aside[this.selected], this.deviation[this.selected] ?? 0) + 4, ink.ink, 2);
+    } };
   }
   plan(view) {
     return (this.state.plan?.visits ?? []).map((v) => {

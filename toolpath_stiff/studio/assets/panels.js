@@ -13,11 +13,11 @@ function h(tag, attributes = {}, ...children) {
 const SVG = new Set(["svg", "path", "circle", "line", "text", "g", "polyline", "polygon", "title", "rect"]);
 const percent = (v, digits = 2) => (v === null || v === undefined ? "\u2013" : `${v.toFixed(digits)} %`);
 const chance = (p) => (p > 0.99 ? "> 99 %" : p < 0.01 ? "< 1 %" : `${Math.round(100 * p)} %`);
-const short = (v) => (typeof v === "number" ? String(Number(v.toPrecision(4))) : String(v));
+const short = (v) => (typeof v !== "number" ? String(v) : Math.abs(v) >= 1e5 ? group(Number(v.toPrecision(4))) : String(Number(v.toPrecision(4))));
 const button = (label, run, attributes = {}) => h("button", { type: "button", class: "live", onclick: run, ...attributes }, label);
 const list = (items) => h("ul", {}, items.map((text) => h("li", {}, text)));
 const table = (head, rows) => h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "table" }, h("table", {}, h("thead", {}, h("tr", {}, head.map((t) => h("th", { scope: "col" }, t)))),
-  h("tbody", {}, rows.map((row) => h("tr", {}, row.map((cell) => h("td", {}, cell)))))));
+  h("tbody", {}, rows.map((row) => h("tr", {}, row.map((cell) => h("td", typeof cell === "string" && cell.length > 24 ? { class: "long" } : {}, cell)))))));
 const figures = (pairs) => h("div", { class: "figures" }, pairs.map(([name, value, id]) => h("div", {}, h("b", id ? { id } : {}, value), h("span", {}, name))));
 
 // ---------------------------------------------------------------- the gauge
@@ -153,7 +153,7 @@ function nextPanel(state, act) {
       h("div", { class: "actions live" }, h("a", { class: "button", id: "plan-file", href: `/case/${p.file}` }, "Download plan.csv"), button("Print", () => print()),
         state.exercise.folder ? button("Measure on the exercise's machine", () => act({ do: "measure" }), { id: "measure", class: "main live" }) : h("span", { class: "muted" }, "fill in the stiffness and drop the file on the page")),
       table(["clamping", "X mm", "Y mm", "Z mm", "A deg", "B deg", "C deg", "forces N", "why"], p.visits.map((v) => [v.clamp, v.x_mm, v.y_mm, v.z_mm, v.a_deg, v.b_deg, v.c_deg, v.forces_N.join(", "), v.why].map(String)))] : null,
-    (state.readings?.aside ?? []).some(Boolean) ? [h("h3", {}, "Set aside"), state.readings.aside.map((gone, i) => (gone ? h("div", { class: "actions" }, `${state.readings.file[i]} line ${state.readings.line[i]}`, button("Use again", () => act({ do: "aside", file: state.readings.file[i], line: state.readings.line[i] }))) : null))] : null,
+    (state.readings?.aside ?? []).some(Boolean) ? [h("h3", {}, "Set aside"), state.readings.aside.map((gone, i) => (gone ? h("div", { class: "actions" }, `${state.readings.file[i]} line ${state.readings.line[i]}`, button("Use again", () => act({ do: "aside", file: state.readings.file[i], line: state.readings.line[i] }), { id: `again-${i}` })) : null))] : null,
   ];
 }
 
@@ -172,7 +172,7 @@ function programPanel(state, act) {
       s.warnings.map((text) => h("p", { class: "warning" }, text))] : h("p", { class: "muted" }, p.error ? "" : "It is being analyzed."),
     h("div", { class: "actions" }, h("label", { for: "require" }, "required N/mm "), need, s?.required ? h("span", { id: "below", class: s.required.lines?.length ? "bad" : "good" }, s.required.lines?.length ? `${s.required.lines.length} lines are below` : "every cut has it") : null),
     h("div", { class: "text", id: "text", role: "group", "aria-label": "Program text" }),
-    p.path && s.per_operation?.length > 1 ? [h("h3", {}, "Operations"), table(["", "mean N/mm", "min N/mm", ""], s.per_operation.map((o, k) => [o.name ?? o.title ?? `operation ${k + 1}`, n(o.mean_N_per_mm), n(o.min_N_per_mm), button(act.operation === k + 1 ? "all" : "only this", () => act.only(k + 1))]))] : null,
+    p.path && s.per_operation?.length > 1 ? [h("h3", {}, "Operations"), table(["", "mean N/mm", "min N/mm", ""], s.per_operation.map((o, k) => [o.name ?? o.title ?? `operation ${k + 1}`, n(o.mean_N_per_mm), n(o.min_N_per_mm), button(act.operation === k + 1 ? "all" : "only this", () => act.only(k + 1), { id: `only-${k + 1}`, class: "" })]))] : null,
   ];
 }
 
@@ -184,6 +184,7 @@ function placementPanel(state, act) {
   return [
     h("h2", {}, "Where the work sits"),
     placementFigures(p.now, state, "pl"),
+    state.effects.some((one) => one.on) ? h("p", { class: "muted", id: "pl-without" }, "These figures are of the machine file, without the effects that are switched on: accept the fit to place the work on the machine that carries them.") : null,
     dragMap(state, act),
     h("div", { class: "place live" }, rows.map(([name, axis, low, high]) => {
       const number = h("input", { type: "number", id: `o-${name}n`, "aria-label": `${name} of program zero`, step: axis === 5 ? 1 : 5, value: Number(at[axis].toFixed(3)), onchange: (e) => act.move(axis, Number(e.target.value), true) });
@@ -241,7 +242,7 @@ function dragMap(state, act) {
   const put = () => work.setAttribute("transform", `translate(${act.origin[0]} ${act.origin[1]}) rotate(${act.origin[5]})`);
   put();
   act.put = put;
-  const svg = h("svg", { viewBox: `${-size} ${-size * 0.94} ${2 * size} ${1.88 * size}`, class: "drag live", id: "drag", role: "img", tabindex: "0", "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
+  const svg = h("svg", { viewBox: `${-size} ${-size * 0.94} ${2 * size} ${1.88 * size}`, class: "drag live", id: "drag", role: "application", tabindex: "0", "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
     h("g", { transform: "scale(1 -1)" }, h("polygon", { points: reach.map((p) => p.map((v) => v.toFixed(0)).join(",")).join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": 4 }), h("line", { x1: -60, x2: 60, y1: 0, y2: 0, stroke: "var(--muted)", "stroke-width": 3 }), h("line", { y1: -60, y2: 60, x1: 0, x2: 0, stroke: "var(--muted)", "stroke-width": 3 }), work));
   const where = (e) => { const m = svg.getScreenCTM().inverse(), p = new DOMPoint(e.clientX, e.clientY).matrixTransform(m); return [p.x, -p.y]; };
   let last = null;
@@ -278,7 +279,8 @@ function exercisePanel(state, act) {
 }
 function historyPanel(state, act) {
   const copy = (text) => button("copy", (e) => { navigator.clipboard?.writeText(text); e.target.textContent = "copied"; }, { "aria-label": `copy ${text.slice(0, 40)}` });
-  const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, text), copy(text)) : null);
+  const words = (text) => text.split(" ").flatMap((word, k) => [k ? " " : "", h("span", {}, word)]);  // broken between words alone
+  const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, words(text)), copy(text)) : null);
   const step = (one, undone) => h("div", { class: undone ? "step undone" : "step" }, h("b", {}, one.text), undone ? " (undone)" : null, line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" }, "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."), [...state.history].reverse().map((one) => step(one, false)), state.undone.map((one) => step(one, true))];
 }

@@ -16,13 +16,21 @@ function tell(text) {
   $("message").hidden = !text;
   $("message").textContent = text;
 }
-const act = async (asked) => {
-  if (readonly) return;
-  try {
-    const answer = await post("/do", JSON.stringify(asked));
-    tell(answer.message ?? "");
-  } catch (error) { tell(error.message); }
-  await refresh();
+// One thing after the other, in the order of the keys; until all is done the page's own placement holds.
+let pending = 0, before = Promise.resolve();
+const act = (asked) => {
+  if (readonly) return before;
+  pending++;
+  before = before.then(async () => {
+    try {
+      const answer = await post("/do", JSON.stringify(asked));
+      tell(answer.message ?? "");
+    } catch (error) { tell(error.message); }
+    pending--;
+    // What is being asked for may be from before this.
+    try { await asking; await refresh(); } catch (error) { tell(error.message); }
+  });
+  return before;
 };
 // Of what follows the pointer only the last is asked for, one question at a time.
 function latest(ask, show) {
@@ -137,7 +145,7 @@ function drawProfile() {
   const model = {
     s, value: (i) => shown[i], curves, ends: () => scene.ends, here: () => here,
     beside: () => null,
-    levels: () => (state.program.require && which !== "difference" ? [{ value: state.program.require, colour: ink.bad, dash: [6, 4], held: true }] : []),
+    levels: () => (state.program?.require && which !== "difference" ? [{ value: state.program.require, colour: ink.bad, dash: [6, 4], held: true }] : []),
   };
   if (profile) { profile.model = model; profile.all(); profile.redraw(); }
   else {
@@ -145,7 +153,9 @@ function drawProfile() {
     profile.drawOverlay = function () { const g = this.clear(this.overlay); if (here >= 0 && here < this.model.s.length) { ring(g, ...this.at(here), 5, ink.panel, 4); ring(g, ...this.at(here), 5, ink.ink, 2); } };
   }
   $("scrub").max = path.s_mm.length - 1;
-  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])].map((name) => h("button", { type: "button", "aria-pressed": String(which === name), onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
+  const focus = document.activeElement?.id;
+  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])].map((name) => h("button", { type: "button", id: `which-${name}`, "aria-pressed": String(which === name), onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
+  refocus(focus, "");
   const other = which === "now" && path.given?.some((v, i) => v !== path.now[i]);
   $("curves").textContent = [other ? "orange: as given" : "", which === "now" && path.sd ? "grey: 95 % band of what was fitted" : "", state.program.require ? "dashed: required" : ""].filter(Boolean).join(", ");
 }
@@ -170,10 +180,12 @@ function drawText(line) {
     p.path?.line.forEach((n, i) => { if (p.path.cut[i] && p.path.now[i] !== null) lowest.lines.set(n, Math.min(lowest.lines.get(n) ?? Infinity, p.path.now[i])); });
   }
   const from = Math.max(1, Math.min(line - 8, p.lines.length - 16)), colours = theme.dark ? COLOURS.dark : COLOURS.light, [low, high] = scene.ends ?? [0, 1];
+  const focus = document.activeElement?.id;
   box.replaceChildren(...p.lines.slice(from - 1, from + 16).map((text, k) => {
     const n = from + k, v = lowest.lines.get(n), c = v === undefined ? "transparent" : colours[Math.max(0, Math.min(colours.length - 1, Math.floor((v - low) / (high - low || 1) * colours.length)))];
-    return h("button", { type: "button", class: n === line ? "here" : "", title: v === undefined ? "" : `${group(v)} N/mm`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i); else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
+    return h("button", { type: "button", id: `line-${n}`, class: n === line ? "here" : "", title: v === undefined ? "" : `${group(v)} N/mm`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i); else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
   }));
+  refocus(focus, "");
 }
 function play() {
   const path = state.program?.path;
@@ -193,14 +205,22 @@ function drawPanel() {
   const focus = document.activeElement?.id, [, , make] = PANELS.find(([name]) => name === panel);
   $("tabs").replaceChildren(...PANELS.map(([name, label]) => h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-selected": String(name === panel), "aria-controls": "panel", tabindex: name === panel ? "0" : "-1", onclick: () => open(name) }, label)));
   $("panel").setAttribute("aria-labelledby", `tab-${panel}`);
+  const within = $("panel").contains(document.activeElement);
   $("panel").replaceChildren(...[make(state, act)].flat(9).filter(Boolean));
   if (panel === "program") drawText(state.program?.path?.line[Math.max(0, here)] ?? 1);
-  if (focus) $(focus)?.focus({ preventScroll: true });
+  refocus(focus, within ? "panel" : "");
+}
+// What was drawn anew takes the focus that it had; where it is gone or can no longer be used, its surroundings do.
+function refocus(id, instead) {
+  if (!id || document.activeElement?.id === id) return;
+  $(id)?.focus({ preventScroll: true });
+  if (document.activeElement?.id !== id && instead) $(instead).focus({ preventScroll: true });
 }
 function open(name) { panel = name; drawPanel(); $(`tab-${name}`).focus({ preventScroll: true }); }
 $("tabs").addEventListener("keydown", (e) => {
   const by = { ArrowRight: 1, ArrowLeft: -1 }[e.key], names = PANELS.map(([name]) => name);
   if (by) { e.preventDefault(); open(names[(names.indexOf(panel) + by + names.length) % names.length]); }
+  if (e.key === "Home" || e.key === "End") { e.preventDefault(); open(names.at(e.key === "Home" ? 0 : -1)); }
 });
 function draw() {
   scene.state = state;
@@ -211,7 +231,7 @@ function draw() {
   scene.lit = state.effects.filter((one) => one.on).map((one) => ({ link: one.link, number: one.on.strut }));
   if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
   if (scene.selected < 0 && here < 0) scene.pose = [...state.machine.origin];
-  act.origin = [...(state.program?.origin ?? state.machine.origin)];
+  if (!pending) act.origin = [...(state.program?.origin ?? state.machine.origin)];
   $("title").textContent = state.case;
   $("machine-name").textContent = `${state.machine.title}${r ? `, ${r.line.length - r.aside.filter(Boolean).length} readings` : ""}${state.program ? `, ${state.program.name}` : ""}`;
   document.title = `${state.case}: toolpath_stiff studio`;
@@ -238,13 +258,14 @@ let asking = null;
 async function refresh() {
   if (readonly) return;
   asking ??= (async () => {
-    const found = await (await fetch("/state")).json();
-    asking = null;
-    if (found.error) { tell(found.error); return; }
-    state = found;
-    version = found.version;
-    drawJob(found.job);
-    draw();
+    try {
+      const found = await (await fetch("/state")).json();
+      if (found.error) { tell(found.error); return; }
+      state = found;
+      version = found.version;
+      drawJob(found.job);
+      draw();
+    } finally { asking = null; }
   })();
   await asking;
 }
@@ -292,7 +313,7 @@ else {
   addEventListener("dragleave", (e) => { if (!e.relatedTarget) $("drop").hidden = true; });
   addEventListener("drop", async (e) => { e.preventDefault(); $("drop").hidden = true; for (const file of [...e.dataTransfer.files]) await take(file); });
   addEventListener("keydown", (e) => {
-    if (!(e.ctrlKey || e.metaKey) || /^(input|textarea|select)$/i.test(e.target.tagName)) return;
+    if (!(e.ctrlKey || e.metaKey) || e.target.matches("textarea, input[type=number], input[type=text]")) return;
     const name = { z: "undo", y: "redo" }[e.key.toLowerCase()];
     if (name) { e.preventDefault(); act({ do: name }); }
   });

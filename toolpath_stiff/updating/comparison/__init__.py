@@ -244,8 +244,11 @@ class ByHand:
         noises = noise_models(data, noise, strut_spread)
         self.problem = Problem.of(Predictor(machine, data, effect_files), max(noises, key=lambda one: one.typical))
 
-    def fit(self, entries: Sequence[EffectEntry] = (), law_free: bool = True) -> Fit:
+    def fit(self, entries: Sequence[EffectEntry] = (), law_free: bool = True, near: Fit | None = None) -> Fit:
         """The strut law fitted beside effects of these sizes, or left as it is.
+
+        With `near`, a fit of other sizes, from its law on and with the readings wild that are wild there: to find out
+        which are takes most of the time where readings are many.
 
         Raises
         ------
@@ -260,6 +263,8 @@ class ByHand:
             choice = tuple((one.name, values[one.name]) for one in effect.parameters if one.discrete)
             candidates.append(Candidate(effect, choice, real))
             sizes.append(np.array([component.size(values[component.parameter.name]) for component in real]))
+        if near is not None:
+            return fit_effects(self.problem, candidates, sizes, (), near.law, near.scatter, law_free)
         fit = fit_effects(self.problem, candidates, sizes, (), np.zeros(2), self.problem.scatter, law_free)
         again = self.problem.scatter.with_wild(fit.residual)
         if law_free and again.wild != fit.scatter.wild:

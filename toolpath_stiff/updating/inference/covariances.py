@@ -196,13 +196,6 @@ class Precision:
         blocks = (1.0 - self._pull[self.groups.of] / self.own) / self.own
         return np.asarray(blocks - (self.factors**2).sum(axis=0))
 
-    def columns(self, at: Rows) -> FloatArray:
-        """(k, n) some of its columns, as rows."""
-        same = self.groups.of[at][:, None] == self.groups.of[None, :]
-        blocks = -(same * (self._pull[self.groups.of] / self.own)) / self.own[at][:, None]
-        blocks[np.arange(len(at)), at] += 1.0 / self.own[at]
-        return np.asarray(blocks - self.factors[:, at].T @ self.factors)
-
     def block(self, at: Rows) -> FloatArray:
         """(..., k, k) some of its columns, of the same rows, for rows (..., k)."""
         own, of, factors = self.own[at], self.groups.of[at], np.moveaxis(self.factors[:, at], 0, -2)
@@ -247,6 +240,48 @@ class Precision:
     def _times_blocks(self, rows: FloatArray) -> FloatArray:
         """C x of rows (..., n)."""
         return np.asarray(rows * self.own + self.common * self.groups.sums(rows)[..., self.groups.of])
+
+
+class Widening:
+    """The inverse covariance of n readings while some get more scatter of their own, one after the other.
+
+    With blocks C and q shared nuisances S (q, n) the inverse is C^-1 - G^T M^-1 G, where G = S C^-1 and M = 1 + G S^T
+    (Woodbury 1950); more scatter of one reading changes C^-1 within its group by one rank, and with it G there and M
+    (Sherman and Morrison 1950). A column costs q n, however many readings were widened before.
+    """
+
+    def __init__(self, covariance: Covariance) -> None:
+        blocks = covariance.precision
+        self._of, self._members = covariance.groups.of, covariance.groups.members()
+        self._own, self._common, self._weights = covariance.own.copy(), covariance.common, blocks.weights.copy()
+        self._reached = replace(blocks, factors=blocks.factors[:0]).times(covariance.shared)
+        self._inverse = np.linalg.inv(np.eye(len(covariance.shared)) + self._reached @ covariance.shared.T)
+
+    def _block(self, row: int) -> tuple[Rows, FloatArray]:
+        """The readings of a reading's group, and its column of C^-1 there."""
+        members = self._members[self._of[row]]
+        pull = self._common / (1.0 + self._common * self._weights[self._of[row]])
+        column = -pull / self._own[members] / self._own[row]
+        column[members == row] += 1.0 / self._own[row]
+        return members, column
+
+    def column(self, row: int) -> FloatArray:
+        """(n,) a column of the inverse as it stands."""
+        members, block = self._block(row)
+        found = -((self._inverse @ self._reached[:, row]) @ self._reached)
+        found[members] += block
+        return np.asarray(found)
+
+    def widen(self, row: int, variance: float) -> None:
+        """Add to a reading's own variance."""
+        members, block = self._block(row)
+        share = variance / (1.0 + variance * float(block[members == row][0]))
+        reached = self._reached[:, row].copy()
+        moved = self._inverse @ reached
+        self._inverse += np.outer(moved, moved) * (share / (1.0 - share * float(reached @ moved)))
+        self._reached[:, members] -= share * np.outer(reached, block)
+        self._weights[self._of[row]] += 1.0 / (self._own[row] + variance) - 1.0 / self._own[row]
+        self._own[row] += variance
 
 
 def inverse_root(information: FloatArray) -> FloatArray:

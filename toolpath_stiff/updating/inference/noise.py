@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Precision
+from toolpath_stiff.updating.inference.covariances import Covariance, Groups, Precision, Widening
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.inference.repeats import (
     OUTLIER_WIDTH,
@@ -343,23 +343,24 @@ class Scatter:
         """With those readings taken for wild whose widening pays its price at these residuals (n,).
 
         Where these are the wild readings of `known`, that is the answer: nothing is worked out again. One by one, the
-        most wild first, each by Sherman and Morrison's formula beside those before it.
+        most wild first, each beside those before it.
         """
         diagonal, wild = self.precision.diagonal, list(self.wild)
         pull = self.precision.times(residual)
-        most = int(self.most * len(residual)) + 1
-        taken = np.zeros((most, len(residual)))  # the inverse falls by row^T row of each
-        for k in range(most):
+        widening: Widening | None = None
+        for _ in range(int(self.most * len(residual)) + 1):
             own = 1.0 + self.widening * diagonal
             gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
             gain[wild] = -np.inf
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            column = self.precision.columns(np.array([row]))[0] - taken[:k, row] @ taken[:k]
-            pull = pull - column * (self.widening[row] * pull[row] / own[row])
-            taken[k] = column * np.sqrt(self.widening[row] / own[row])
-            diagonal = diagonal - taken[k] ** 2
+            widening = widening or Widening(self.covariance)
+            column = widening.column(row)
+            share = self.widening[row] / own[row]
+            pull = pull - column * (share * pull[row])
+            diagonal = diagonal - column**2 * share
+            widening.widen(row, float(self.widening[row]))
             wild.append(row)
         if known is not None and set(known.wild) == set(wild):
             return known
