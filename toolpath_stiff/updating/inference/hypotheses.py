@@ -12,6 +12,7 @@ from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.inference.candidates import Table, candidates_of, table_of
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import Forms, Structure, set_wild_aside
+from toolpath_stiff.updating.inference.tails import normal_below
 
 FloatArray = NDArray[np.float64]
 
@@ -172,13 +173,12 @@ def _quantile(
     parts: list[tuple[float, float, float]], absent: float, bracket: tuple[float, float], share: float
 ) -> float:
     """Size up to which the mixture of cut-off normals (share, mean, sd) and of zero holds `share`."""
-    from scipy.special import ndtr
-
     def below(size: float) -> float:
         total = absent if size >= 0.0 else 0.0
         for part, mean, sd in parts:
             first, last, here = ((x - mean) / sd for x in (*bracket, size))
-            total += part * float((ndtr(here) - ndtr(first)) / max(ndtr(last) - ndtr(first), 1e-300))
+            start = normal_below(first)
+            total += part * (normal_below(here) - start) / max(normal_below(last) - start, 1e-300)
         return total
 
     low, high = bracket

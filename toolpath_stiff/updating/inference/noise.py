@@ -318,7 +318,7 @@ class Scatter:
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
-            column = self.precision.columns(np.array([row]))[0] - taken[:k, row] @ taken[:k]
+            column = self.precision.column(row) - taken[:k, row] @ taken[:k]
             pull = pull - column * (self.widening[row] * pull[row] / own[row])
             taken[k] = column * np.sqrt(self.widening[row] / own[row])
             diagonal = diagonal - taken[k] ** 2
