@@ -187,9 +187,9 @@ class Structure:
     def loads(self, residuals: FloatArray, taken: FloatArray, known: FloatArray | None = None) -> FloatArray:
         """(s, all features) L^T P (r - taken) of residuals (s, n); `known`: L^T A r."""
         whole = residuals @ self.forms.solved if known is None else known.copy()
-        for row, own in zip(whole, taken, strict=True):
-            if len(some := np.flatnonzero(own)):  # few readings of each set
-                row -= own[some] @ self.forms.solved[some]
+        for s in np.flatnonzero(taken.any(axis=1)).tolist():
+            some = np.flatnonzero(taken[s])  # few readings of each set
+            whole[s] -= taken[s, some] @ self.forms.solved[some]
         return np.asarray(whole - (residuals - taken) @ self.removed.T @ self.reached)
 
     def surprises(self, loads: FloatArray) -> FloatArray:

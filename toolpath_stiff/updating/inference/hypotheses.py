@@ -173,6 +173,7 @@ def _quantile(
     parts: list[tuple[float, float, float]], absent: float, bracket: tuple[float, float], share: float
 ) -> float:
     """Size up to which the mixture of cut-off normals (share, mean, sd) and of zero holds `share`."""
+
     def below(size: float) -> float:
         total = absent if size >= 0.0 else 0.0
         for part, mean, sd in parts:
