@@ -236,6 +236,7 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
 
 CONFOUNDED = 0.95  # canonical correlation above which two effects cannot be told apart by these data
 POWER_80 = 0.8416  # normal quantile of 80 % power
+TIED = 1e-9  # share by which changes differ that are one and the same: of a factor and of its inverse
 
 
 @dataclass(frozen=True)
@@ -337,12 +338,16 @@ def detectable_sizes(problem: Problem, families: Sequence[Family], gain_threshol
                     if table.knots and sign not in table.knots:
                         continue
                     one = _smallest(problem, table, j, sign, float(wanted))
-                    # Hardest to see: not at all, else by the largest change.
-                    if worst is None or (one.seen, -one.rms) < (worst.seen, -worst.rms):
+                    # Hardest to see: not at all, else by the largest change; of two alike the first.
+                    if worst is None or _harder(one, worst):
                         worst = one
             if worst is not None:
                 found.append(worst)
     return found
+
+
+def _harder(one: Detectable, other: Detectable) -> bool:
+    return one.rms > (1.0 + TIED) * other.rms if one.seen == other.seen else not one.seen
 
 
 def _smallest(problem: Problem, table: Table, j: int, sign: float, wanted: float) -> Detectable:
