@@ -136,6 +136,13 @@ def test_forward_kinematics_undoes_inverse_kinematics(several):
     np.testing.assert_allclose(rotation_matrices(found[:, 3:]), rotation_matrices(wanted[:, 3:]), atol=1e-9)
 
 
+def test_forward_kinematics_takes_a_tool_for_each_row():
+    position, tools = np.array([[0.1, -0.05, 0.8], [0.0, 0.1, 0.7], [-0.1, 0.0, 0.9]]), np.array([np.nan, 0.4, 0.55])
+    lengths = solve_struts(NIST, position, tool_length=tools).lengths
+    found = forward_kinematics(NIST, lengths, tool_length=tools)
+    np.testing.assert_allclose(found, np.concatenate([position, np.zeros((3, 3))], axis=1), atol=1e-9)
+
+
 @pytest.mark.parametrize("name", list(packaged_machines()))
 def test_forward_kinematics_of_every_machine_from_a_near_start(name):
     machine = load_machine(name)

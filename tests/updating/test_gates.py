@@ -20,7 +20,6 @@ from toolpath_stiff.updating.inference.gates import (
     Gate,
     Simulator,
     Structure,
-    _surprise,
     absolute_gate,
     discrepancy_forms,
     largest_gain,
@@ -142,14 +141,6 @@ def test_a_reading_set_aside_is_as_if_it_had_never_been_taken():
     rest = np.linalg.inv(spread[np.ix_(stay, stay)] + 0.2**2 * law[stay] @ law[stay].T)
     assert out[0][stay] == pytest.approx(rest @ residual[stay], rel=1e-6)
     assert abs(out[0][9]) < 1e-9 * np.abs(out).max()
-
-
-def test_surprise_is_the_tail_of_chi_square_even_where_it_underflows():
-    for freedom in (0.7, 3.0, 40.0):
-        values = np.array([0.0, 0.1, 1.0, 10.0, 100.0, 600.0])
-        assert _surprise(values, freedom) == pytest.approx(-chi2.logsf(values, freedom), rel=1e-6, abs=1e-9)
-    far = np.array([1500.0, 3000.0])  # with 4 degrees of freedom the tail is exp(-x / 2) (1 + x / 2)
-    assert _surprise(far, 4.0) == pytest.approx(0.5 * far - np.log1p(0.5 * far), rel=1e-3)
 
 
 def test_structure_of_pure_noise_surprises_no_one():

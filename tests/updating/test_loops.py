@@ -21,6 +21,9 @@ from toolpath_stiff.stiffness.effects.measuring_loop import MeasuringLoop, measu
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
 from toolpath_stiff.updating.comparison import compare
+from toolpath_stiff.updating.correction import update
+from toolpath_stiff.updating.correction.document import document as update_document
+from toolpath_stiff.updating.correction.document import residuals_csv
 from toolpath_stiff.updating.diagnosis import diagnose
 from toolpath_stiff.updating.diagnosis.document import document
 from toolpath_stiff.updating.inference.prediction import Predictor
@@ -246,6 +249,19 @@ def test_compare_shows_loops_in_a_section_of_their_own(joints):
     assert one["read_nm_per_N"] == pytest.approx(1e9 * data.compliance[42], rel=1e-6)
     assert one["off_nm_per_N"] == pytest.approx(one["read_nm_per_N"] - one["model_nm_per_N"], abs=1e-6)
     assert "indicators beside the tip" in text(found)
+
+
+def test_update_counts_errors_over_the_tip_as_compare_does(joints):
+    data = read_measurements(list(joints), nist())
+    compared, found = compare(nist(), data, draws=20).document, update(nist(), data, strut_law=True)
+    written = update_document(found)
+    assert written["readings"] == compared["readings"] == 42 < len(found.update.data)
+    step, given = compared["baseline"], written["steps"][0]
+    for name in ("mean_abs_error_percent", "bias_percent", "rms_percent"):
+        assert given[name] == pytest.approx(step[name], abs=1e-3)
+    assert sum(one["readings"] for one in given["by_direction"].values()) == 42
+    assert found.provenance["mean_error_before_percent"] == pytest.approx(step["mean_abs_error_percent"], abs=1e-3)
+    assert len(residuals_csv(found.update).splitlines()) == 1 + 42
 
 
 def test_a_plan_sets_an_indicator_where_the_tip_tells_less():

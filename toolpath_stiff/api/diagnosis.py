@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.machine.model import Machine as MachineModel
+    from toolpath_stiff.nc import Program as NcProgram
     from toolpath_stiff.updating.comparison import Comparison as Compared
     from toolpath_stiff.updating.diagnosis import Diagnosis as Diagnosed
     from toolpath_stiff.updating.measurements import Measurements as Readings
@@ -373,7 +374,6 @@ def diagnose(
     >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
     (['diagnose.json', 'residuals.csv'], 6)
     """
-    from toolpath_stiff.placement.case_study import case_study_program
     from toolpath_stiff.updating.diagnosis import diagnose as diagnose_readings
 
     asked = Question(machine, data, noise_percent, strut_spread_percent, seed)
@@ -391,7 +391,7 @@ def diagnose(
     found = diagnose_readings(
         asked.model,
         asked.readings,
-        program=lambda: case_study_program() if part is None else part.moves(origin, default),
+        program=lambda: _case_study() if part is None else part.moves(origin, default),
         origin=origin,
         setup=conditions.setup,
         temperature=conditions.temperature,
@@ -402,6 +402,13 @@ def diagnose(
         **asked.common,
     )
     return Diagnosis(found, (*asked.inputs, *(part.inputs if part else ())))
+
+
+def _case_study() -> NcProgram:
+    """The packaged case study, loaded only where the choice between explanations is worked out on it."""
+    from toolpath_stiff.placement.case_study import case_study_program
+
+    return case_study_program()
 
 
 def _table(csv: str) -> pd.DataFrame:

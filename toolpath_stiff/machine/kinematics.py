@@ -166,7 +166,7 @@ def singularity_index(machine: Machine, struts: Struts) -> FloatArray:
 
 
 def forward_kinematics(
-    machine: Machine, lengths: ArrayLike, start: ArrayLike | None = None, tool_length: float = np.nan
+    machine: Machine, lengths: ArrayLike, start: ArrayLike | None = None, tool_length: ArrayLike = np.nan
 ) -> FloatArray:
     """Poses at which the struts have the given lengths.
 
@@ -179,7 +179,7 @@ def forward_kinematics(
     start
         (6,) or (n, 6) pose to start from, m and rad; the machine's neutral pose unless given.
     tool_length
-        m; nan: the reference tool.
+        m, scalar or (n,); nan: the reference tool.
 
     Returns
     -------

@@ -295,9 +295,7 @@ def _where_control_goes(
     turn = np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (len(position), 3, 3))
     lengths = solve_struts(model.control, position, turn, tool_length).lengths
     poses = np.concatenate([position, roll_pitch_yaw(turn)], axis=1)
-    for tool in np.unique(tool_length):  # nan, the reference tool, counts as one value
-        rows = np.isnan(tool_length) if np.isnan(tool) else tool_length == tool
-        poses[rows] = forward_kinematics(model.machine, lengths[rows], poses[rows], float(tool))
+    poses = forward_kinematics(model.machine, lengths, poses, tool_length)
     return poses[:, :3], rotation_matrices(poses[:, 3:])
 
 

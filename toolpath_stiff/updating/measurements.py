@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -138,10 +139,17 @@ class Measurements:
         joined = 1.0 / self.stiffness
         return joined if self.beside is None else self.beside.alone(joined)
 
-    @property
+    @cached_property
     def rotation(self) -> FloatArray:
         """(n, 3, 3) orientation of the platform."""
         return rotation_matrices(self.angles)
+
+    @cached_property
+    def poses(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(p,) a row of each distinct pose with its tool, and (n,) which of them each reading was taken at."""
+        columns = np.concatenate([self.position, self.angles, self.tool_extension[:, None]], axis=1)
+        _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
+        return first, which.reshape(-1)
 
     def select(self, rows: NDArray[Any]) -> Measurements:
         """Some of the rows, by mask or index."""
@@ -491,10 +499,9 @@ def measured_path(model: StiffnessModel, data: Measurements) -> LoadPath:
 
     A pose is solved once, however often it was measured.
     """
-    poses = np.concatenate([data.position, data.angles, data.tool_extension[:, None]], axis=1)
-    _, first, which = np.unique(poses, axis=0, return_index=True, return_inverse=True)
+    first, which = data.poses
     length = data.tool_extension + model.machine.reference_tool_length
-    path = load_path(model, data.position[first], data.rotation[first], length[first]).take(which.reshape(-1))
+    path = load_path(model, data.position[first], data.rotation[first], length[first]).take(which)
     if data.beside is not None:
         path = replace(path, struts=data.beside.on_lengths(path.struts))
 

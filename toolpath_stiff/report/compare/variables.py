@@ -69,6 +69,8 @@ def variables_png(found: Comparison) -> Figure:
             axes.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
             axes.set_ylim(*limits)
             axes.tick_params(labelsize=7.5, pad=2)
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_label_coords(0.5, 0.0)  # without a name: none is to be kept clear of the figures
             if j:
                 axes.set_yticklabels([])
             unit = str(getattr(one, "unit", ""))
@@ -151,8 +153,13 @@ def _points(
     off = np.sign(residual) * ((residual < limits[0]) | (residual > limits[1]))
     for side, marker in ((0, "o"), (1, "^"), (-1, "v")):
         chosen = off == side
+        if not chosen.any():
+            continue
         seen = np.clip(residual[chosen], limits[0] + 0.3, limits[1] - 0.3) if side else residual[chosen]
-        axes.plot(x[chosen], seen, marker, color=colour, ms=size + abs(side), mew=0, alpha=0.55)
+        # Arrowheads above all dots: dots that follow each other become one image of a page, not one a direction.
+        axes.plot(
+            x[chosen], seen, marker, color=colour, ms=size + abs(side), mew=0, alpha=0.55, zorder=2 + 0.1 * abs(side)
+        )
 
 
 def _level_means(axes: Axes, x: FloatArray, held: FloatArray, shift: float, colour: str) -> None:

@@ -309,7 +309,7 @@ def _pictures(found: UpdateDocument, update: Update, bars: BarCurve | None) -> d
     entry = {"effect": called, "held_out_error_percent": last["held_out_error_percent"]}
     drawn = before_after_png(
         {"verdict": found["verdict"], "baseline": found["strut_law_refitted"], "candidates": [entry], "best": called},
-        update.data, update.steps[0].fit.residual, update.steps[-1].fit.residual, names=("as given", called),
+        update.data.of_tip, update.steps[0].residual, update.steps[-1].residual, names=("as given", called),
     )  # fmt: skip
     pictures: dict[str, bytes] = {}
     if bars is not None:

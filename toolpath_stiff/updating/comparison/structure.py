@@ -38,6 +38,7 @@ ALIKE = 0.9  # correlation from which two patterns cannot be told apart in these
 WILD = 3.0  # standard deviations at which a reading is drawn in
 FEWEST_REPEATED = 5  # readings beyond one a place from which the noise itself is checked
 WIDE = 60  # readings of a clamping or a place from which it counts as something that all readings share
+TIED = 1e-9  # share by which statistics differ that are one and the same: of patterns that cannot be told apart
 DEPENDENT = 1e-6  # of a column's square that is left after the patterns already found: less is nothing
 
 
@@ -373,7 +374,7 @@ def find_structure(
         if step == 0:
             excess = left
             tests = tuple(one for one in answers if one.standard_error > 0.0)
-        best = int(np.argmax(np.abs(t)))
+        best = int(np.argmax(np.abs(t) >= (1.0 - TIED) * np.abs(t).max()))
         if p[best] >= SIGNIFICANT or step == most:
             break
         found.append(answers[best])

@@ -109,7 +109,7 @@ def update(
     >>> from toolpath_stiff.updating.measurements import read_measurements
     >>> nist = load_machine("nist")
     >>> found = update(nist, read_measurements("nist-table1", nist), strut_law=True)
-    >>> [f"{step.name}: {100 * step.fit.errors.mean():.2f} %" for step in found.update.steps]
+    >>> [f"{step.name}: {100 * step.error:.2f} %" for step in found.update.steps]
     ['as given: 9.62 %', 'strut law refitted: 9.72 %']
     """
     files = tuple(files) or tuple(dict.fromkeys(data.file.tolist()))
@@ -165,8 +165,8 @@ def _provenance(update: Update, files: Sequence[str], command: str) -> dict[str,
         "readings": len(update.data),
         "command": command,
         "noise": update.noise.origin,
-        "mean_error_before_percent": round(100.0 * float(update.steps[0].fit.errors.mean()), 3),
-        "mean_error_after_percent": round(100.0 * float(update.last.fit.errors.mean()), 3),
+        "mean_error_before_percent": round(100.0 * update.steps[0].error, 3),
+        "mean_error_after_percent": round(100.0 * update.last.error, 3),
         "left_out_error_after_percent": round(100.0 * update.last.held.mean_error, 3),
     }
 

@@ -137,7 +137,7 @@ def document(correction: Correction) -> UpdateDocument:
         "question": update.question,
         "objective": update.objective,
         "baseline": steps[0],
-        "strut_law_refitted": rounded_errors(update.refitted.fit.residual),
+        "strut_law_refitted": rounded_errors(update.refitted.residual),
         "steps": steps,
         "support": [_support(one) for one in update.supports],
         "described": [] if update.described is None else list(update.described.names),
@@ -160,7 +160,7 @@ def document(correction: Correction) -> UpdateDocument:
         "effects": update.problem.predictor.effects_that_act,
         "machine_file": correction.machine_file,
         "data": list(correction.files),
-        "readings": len(update.data),
+        "readings": len(update.data.of_tip),
         "provenance": dict(correction.provenance),
         "seed": correction.seed,
         "next": list(correction.next),
@@ -222,8 +222,8 @@ def _unconfirmed(update: Update) -> str:
 
 def _errors(update: Update) -> str:
     """Mean error of every step; of a law that is kept also what refitting it would leave."""
-    steps = [(step.name.replace("+ ", "with ", 1), 100.0 * float(step.fit.errors.mean())) for step in update.steps]
-    law = [(f"({LAW_REFITTED} alone)", 100.0 * float(update.refitted.fit.errors.mean()))]
+    steps = [(step.name.replace("+ ", "with ", 1), 100.0 * step.error) for step in update.steps]
+    law = [(f"({LAW_REFITTED} alone)", 100.0 * update.refitted.error)]
     shown = steps[1:] if update.refitted in update.steps or update.objective != "likelihood" else [*law, *steps[1:]]
     return errors_text(steps[0][1], None, shown)
 
@@ -237,8 +237,8 @@ def _left_out(update: Update) -> str:
 def _step(update: Update, k: int) -> StepEntry:
     step = update.steps[k]
     held = step.held
-    along = directions(update.data)
-    errors = rounded_errors(step.fit.residual)
+    along = directions(update.data.of_tip)
+    errors = rounded_errors(step.residual)
     found: StepEntry = {
         "name": step.name,
         "effects": list(step.fit.names),
@@ -251,7 +251,7 @@ def _step(update: Update, k: int) -> StepEntry:
         "by_direction": {
             name: {
                 "readings": int((along == name).sum()),
-                **rounded_errors(step.fit.residual[along == name]),
+                **rounded_errors(step.residual[along == name]),
                 "held_out_error_percent": json_number(100.0 * float(held.errors[along == name].mean())),
             }
             for name in np.unique(along).tolist()
@@ -354,7 +354,8 @@ def _assumptions(update: Update) -> list[str]:
 
 def residuals_csv(update: Update) -> str:
     """One row a reading of the tip: measured, modelled as given and after, deviations, that with its point left out."""
-    data, before, after = update.data, update.steps[0].fit.residual, update.last.fit.residual
+    data, before, after = update.data.of_tip, update.steps[0].residual, update.last.residual
+    wild = np.isin(np.flatnonzero(update.data.tip), update.last.fit.scatter.wild)
     held = update.last.held.residual
     head = [
         "file", "line", "point", "setup", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx",
@@ -363,7 +364,7 @@ def residuals_csv(update: Update) -> str:
     ]  # fmt: skip
     rows = []
     along = directions(data)
-    for i in np.flatnonzero(data.tip).tolist():
+    for i in range(len(data)):
         pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
         measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
         modelled = [measured * float(np.exp(-residual[i])) for residual in (before, after)]
@@ -373,7 +374,7 @@ def residuals_csv(update: Update) -> str:
                 data.file[i], data.line[i], data.point[i], data.setup[i], along[i],
                 *(f"{value + 0.0:.6g}" for value in pose), f"{measured:.1f}", *(f"{value:.1f}" for value in modelled),
                 *("" if np.isnan(error) else f"{error + 0.0:.3f}" for error in errors),
-                int(i in update.last.fit.scatter.wild),
+                int(wild[i]),
             ]
         )  # fmt: skip
     return csv_text(head, rows)

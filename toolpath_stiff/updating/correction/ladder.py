@@ -45,6 +45,7 @@ from toolpath_stiff.updating.inference.fits import (
     base_fit,
     gain_in_standard_errors,
     held_out,
+    of_readings,
 )
 from toolpath_stiff.updating.inference.gates import Simulator, gain_threshold
 from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures, tables_of
@@ -64,11 +65,37 @@ WORSE = 0.05
 
 @dataclass(frozen=True)
 class Step:
-    """One rung of the ladder: what it is called, its fit, its errors at left-out points."""
+    """One rung of the ladder: what it is called, its fit to all readings, its errors over those of the tip.
+
+    Attributes
+    ----------
+    name, fit
+        What it is called; its fit, that of loops beside the tip included.
+    held
+        Of the m readings of the tip at left-out points.
+    tip
+        (n,) which readings these are.
+    """
 
     name: str
     fit: Fit
     held: HeldOut
+    tip: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, name: str, fit: Fit, data: Measurements) -> Step:
+        """Of a fit to these data."""
+        return cls(name, fit, held_out(fit, data.point).of_readings(data.tip), data.tip)
+
+    @property
+    def residual(self) -> FloatArray:
+        """(m,) ln measured - ln modelled of the tip."""
+        return self.fit.residual[self.tip]
+
+    @property
+    def error(self) -> float:
+        """Mean of |modelled - measured| / measured over the readings of the tip."""
+        return float(of_readings(self.fit, self.tip).errors.mean())
 
 
 @dataclass(frozen=True)
@@ -171,7 +198,7 @@ class Update:
         Counted by the mean error, which users see. The fit is by likelihood, which bounds the factor by which readings
         are off, not the difference: where nothing fits, the one can fall while the other multiplies.
         """
-        before, after = (float(step.fit.errors.mean()) for step in (self.steps[0], self.steps[-1]))
+        before, after = self.steps[0].error, self.steps[-1].error
         return not after - before <= max(WORSE * before, WORSE * self.noise.floor_percent / 100.0)
 
     @property
@@ -291,8 +318,7 @@ def _check(
 
 def _falls(before: Step, after: Step) -> bool:
     """Whether the mean error falls, in sample and at left-out points."""
-    inside = after.fit.errors.mean() < before.fit.errors.mean()
-    return bool(inside) and not after.held.mean_error >= before.held.mean_error
+    return after.error < before.error and not after.held.mean_error >= before.held.mean_error
 
 
 def dispersion(fit: Fit) -> float:
@@ -335,7 +361,7 @@ class _Work:
         self.fields: dict[tuple[str, ...], _Field] = {}
 
     def step(self, name: str, fit: Fit) -> Step:
-        return Step(name, fit, held_out(fit, self.data.point))
+        return Step.of(name, fit, self.data)
 
     def added(self, before: Step, candidates: Sequence[Candidate]) -> Step:
         """A rung higher."""
@@ -348,7 +374,7 @@ class _Work:
         while rest:
             self.say(f"fitting {', '.join(candidates[0].name for candidates in rest)}")
             trials = [self.added(steps[-1], candidates) for candidates in rest]
-            best = min(range(len(rest)), key=lambda k: trials[k].fit.errors.mean())
+            best = min(range(len(rest)), key=lambda k: trials[k].error)
             if len(asked) > 1 and not _falls(steps[-1], trials[best]):
                 return [self.together(start, asked)]
             steps.append(trials[best])
@@ -427,8 +453,7 @@ class _Work:
                 f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {threshold:.1f} by "
                 "chance once in twenty campaigns"
             )
-        error = float(fit.errors.mean())
-        return Support(name, in_se, fall, error, after.held.mean_error, gained, threshold, tuple(reasons))
+        return Support(name, in_se, fall, after.error, after.held.mean_error, gained, threshold, tuple(reasons))
 
     def next_effect(self, before: Step) -> tuple[Step | None, tuple[Support, ...]]:
         """The most likely effect that the data support on top of a step, and the supports of all that were tried."""

@@ -23,7 +23,7 @@ from toolpath_stiff.units import n_per_um_from_n_per_m
 from toolpath_stiff.updating.correction.ladder import Step, Update
 from toolpath_stiff.updating.inference import question
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
-from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, HeldOut, held_out
+from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Baseline, HeldOut
 from toolpath_stiff.updating.inference.noise import noise_models
 from toolpath_stiff.updating.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
@@ -313,10 +313,10 @@ def update_by_mean_error(
     )  # fmt: skip
     left_out = HeldOut(leave_points_out(predictor, found.law), np.zeros((0, 2)), data.point)
     steps = (
-        Step(AS_GIVEN, given, held_out(given, data.point)),
-        Step("strut law by mean error", last, left_out),
+        Step.of(AS_GIVEN, given, data),
+        Step("strut law by mean error", last, left_out, data.tip),
     )
-    refitted = Step(LAW_REFITTED, baseline.refitted, held_out(baseline.refitted, data.point))
+    refitted = Step.of(LAW_REFITTED, baseline.refitted, data)
     return Update(
         machine, data, worst, problem, steps, refitted, (), (), force, False, law_asked=True, objective="mean-error",
         question=question(predictor),

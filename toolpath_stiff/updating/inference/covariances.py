@@ -60,9 +60,24 @@ class Groups:
         """Readings of each group."""
         return np.split(self._order, self._starts[1:])
 
+    @cached_property
+    def _width(self) -> int:
+        """How many readings each group has; 0 where they have different numbers."""
+        sizes = np.diff(self._starts, append=len(self.of))
+        return int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else 0
+
+    @cached_property
+    def _in_order(self) -> bool:
+        """Whether each group's readings follow each other, the groups in the order of their numbers."""
+        return bool((np.diff(self.of) >= 0).all())
+
     def sums(self, rows: FloatArray) -> FloatArray:
         """(..., groups) of rows (..., n)."""
-        return np.asarray(np.add.reduceat(rows[..., self._order], self._starts, axis=-1))
+        ordered = rows if self._in_order else rows[..., self._order]
+        if not self._width:
+            return np.asarray(np.add.reduceat(ordered, self._starts, axis=-1))
+        # A third of the time of `reduceat`, which goes from group to group.
+        return np.asarray(np.einsum("...gk->...g", ordered.reshape(*rows.shape[:-1], self.count, self._width)))
 
 
 @dataclass(frozen=True)
@@ -184,11 +199,26 @@ class Precision:
 
     def times(self, rows: FloatArray) -> FloatArray:
         """(..., n) rows times the matrix."""
-        return self._of_blocks(rows) - (rows @ self.factors.T) @ self.factors
+        flat = rows.reshape(-1, rows.shape[-1])  # one product, not one for each leading index
+        shared = (flat @ self.factors.T) @ self.factors
+        return np.asarray(self._of_blocks(rows) - shared.reshape(rows.shape))
 
     def squares(self, rows: FloatArray) -> FloatArray:
         """(...,) of rows (..., n): each with itself."""
-        return np.asarray((self.times(rows) * rows).sum(axis=-1))
+        flat = rows.reshape(-1, rows.shape[-1])
+        over = flat / self.own
+        blocks = np.einsum("in,in->i", flat, over) - self.groups.sums(over) ** 2 @ self._pull
+        shared = flat @ self.factors.T
+        return np.asarray(blocks - np.einsum("iq,iq->i", shared, shared)).reshape(rows.shape[:-1])
+
+    def products(self, rows: FloatArray) -> FloatArray:
+        """(..., k, k) of rows (..., k, n): each with each of the same leading index. Cheaper than by `times`."""
+        over = rows / self.own
+        sums = self.groups.sums(over)
+        flat = rows.reshape(-1, rows.shape[-1]) @ self.factors.T
+        shared = flat.reshape(*rows.shape[:-1], len(self.factors))
+        found = rows @ np.swapaxes(over, -1, -2) - (sums * self._pull) @ np.swapaxes(sums, -1, -2)
+        return np.asarray(found - shared @ np.swapaxes(shared, -1, -2))
 
     @property
     def diagonal(self) -> FloatArray:

@@ -222,11 +222,12 @@ class Problem:
         for _ in range(steps):
             part, slopes = self.predictor.strut_part_and_slopes(law)
             compliance = self._held(part + delta)
-            columns = -slopes / compliance[:, None]
-            weighted = precision.times(columns)
-            information = weighted @ np.swapaxes(columns, 1, 2) + np.eye(2) / LAW_PRIOR**2
-            residual = self.observed + np.log(compliance)
-            gradient = (weighted @ residual[..., None])[..., 0] - law / LAW_PRIOR**2
+            rows = np.empty((len(compliance), 3, len(self.observed)))  # of the jacobian, then of the residual
+            np.divide(-slopes, compliance[:, None], out=rows[:, :2])
+            rows[:, 2] = self.observed + np.log(compliance)
+            products = precision.products(rows)
+            information = products[:, :2, :2] + np.eye(2) / LAW_PRIOR**2
+            gradient = products[:, :2, 2] - law / LAW_PRIOR**2
             law = law + np.clip(np.linalg.solve(information, gradient[..., None])[..., 0], -0.5, 0.5)
         return law, self.observed + np.log(self.compliance(law, delta)), information
 
@@ -254,9 +255,9 @@ class Problem:
             np.concatenate([s * np.geomspace(np.exp(k[0][0]), table.reach(s), GRID) for s, k in table.knots.items()])
         )
         prior = self.prior(table, 0)
-        scatter, law = self.scatter, start.law
+        scatter, law, delta = self.scatter, start.law, table.delta(sizes[:, None])
         for last in range(MOST_ROUNDS, -1, -1):
-            scan = self._refined(table, self._scan(table, sizes, scatter.precision, law), scatter.precision)
+            scan = self._refined(table, self._scan(delta, sizes, scatter.precision, law), scatter.precision)
             peak = int(np.argmax(scan.profile))
             residual, law = scan.residuals[peak], scan.laws[peak]
             again = self.scatter.with_wild(residual, scatter)
@@ -276,8 +277,11 @@ class Problem:
             tables=(table,), log_evidence=log_integral + constant, interval=interval,
         )  # fmt: skip
 
-    def _scan(self, table: Table, sizes: FloatArray, precision: Precision, law: FloatArray, steps: int = 3) -> _Scan:
-        laws, residuals, information = self.fit_law(table.delta(sizes[:, None]), precision, law, steps)
+    def _scan(
+        self, delta: FloatArray, sizes: FloatArray, precision: Precision, law: FloatArray, steps: int = 3
+    ) -> _Scan:
+        """At sizes (g,), which add compliances (g, n)."""
+        laws, residuals, information = self.fit_law(delta, precision, law, steps)
         return _Scan(sizes, -0.5 * precision.squares(residuals) + _law_terms(laws, information), laws, residuals)
 
     def _refined(self, table: Table, scan: _Scan, precision: Precision) -> _Scan:
@@ -288,14 +292,14 @@ class Problem:
             low, high = (max(low, 0.0), high) if scan.sizes[peak] > 0.0 else (low, min(high, 0.0))
             more = np.linspace(low, high, 8)[1:-1]
             more = more[(more != 0.0) & (more != scan.sizes[peak])]
-            scan = scan.merged(self._scan(table, more, precision, scan.laws[peak], steps=2))
+            scan = scan.merged(self._scan(table.delta(more[:, None]), more, precision, scan.laws[peak], steps=2))
         peak = int(np.argmax(scan.profile))
         size, sd = float(scan.sizes[peak]), scan.width()
         more = size + sd * np.linspace(-4.5, 4.5, 14)
-        inside = (more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))
-        return (
-            scan.merged(self._scan(table, more[inside], precision, scan.laws[peak], steps=2)) if inside.any() else scan
-        )
+        more = more[(more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))]
+        if not len(more):
+            return scan
+        return scan.merged(self._scan(table.delta(more[:, None]), more, precision, scan.laws[peak], steps=2))
 
     def _jacobian(self, tables: Sequence[Table], sizes: Sequence[FloatArray], law: FloatArray) -> FloatArray:
         """(n, 2 + p) of the modelled ln k to law and all sizes."""
@@ -399,14 +403,14 @@ class Problem:
         prior = np.zeros((2 + len(chosen), 2 + len(chosen)))
         prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
 
-        def compliance_at(law: FloatArray) -> FloatArray:
-            delta = sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
-            return self.compliance(law, delta)
+        def added() -> FloatArray:
+            return sum((t.delta(sizes[id(t)]) for t in tables), np.zeros(len(self.observed)))
 
         def equations(law: FloatArray) -> NormalEquations:
-            compliance = compliance_at(law)
+            part, by_law = self.predictor.strut_part_and_slopes(law)
+            compliance = self._held(part + added())
             jacobian = np.empty((len(self.observed), 2 + len(chosen)))
-            jacobian[:, :2] = self.law_jacobian(law, compliance)
+            jacobian[:, :2] = (-by_law / compliance).T
             slopes = {id(t): t.slope(sizes[id(t)]) for t in tables}
             for i, (table, j) in enumerate(chosen):
                 jacobian[:, 2 + i] = -slopes[id(table)][:, j] / compliance
@@ -430,7 +434,7 @@ class Problem:
             law, last = gauss_newton(law, equations, move, TABLE_STEPS, TABLE_TOLERANCE)
         except np.linalg.LinAlgError:
             return None
-        return law, self.observed + np.log(compliance_at(law)), last.information, last.jacobian
+        return law, self.observed + np.log(self.compliance(law, added())), last.information, last.jacobian
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from toolpath_stiff.updating.inference.covariances import (
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.noise import Noise, Scatter
 from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.inference.tails import surprise
 
 FloatArray = NDArray[np.float64]
 
@@ -185,10 +186,10 @@ class Structure:
 
     def loads(self, residuals: FloatArray, taken: FloatArray, known: FloatArray | None = None) -> FloatArray:
         """(s, all features) L^T P (r - taken) of residuals (s, n); `known`: L^T A r."""
-        from scipy.sparse import csr_array
-
-        whole = residuals @ self.forms.solved if known is None else known
-        whole = whole - csr_array(taken) @ self.forms.solved
+        whole = residuals @ self.forms.solved if known is None else known.copy()
+        for s in np.flatnonzero(taken.any(axis=1)).tolist():
+            some = np.flatnonzero(taken[s])  # few readings of each set
+            whole[s] -= taken[s, some] @ self.forms.solved[some]
         return np.asarray(whole - (residuals - taken) @ self.removed.T @ self.reached)
 
     def surprises(self, loads: FloatArray) -> FloatArray:
@@ -196,18 +197,7 @@ class Structure:
         if not self.forms.names:
             return np.zeros((len(loads), 1))
         value = np.stack([(loads[:, part] ** 2).sum(axis=1) for part in self.forms.slices], axis=1)
-        return _surprise(value * 2.0 * self.means / self.variances, 2.0 * self.means**2 / self.variances)
-
-
-def _surprise(value: FloatArray, freedom: FloatArray) -> FloatArray:
-    """-ln P(chi-square of `freedom` > value), with the leading term of its asymptote where that underflows."""
-    from scipy.special import gammaincc, gammaln
-
-    half, x = 0.5 * freedom, np.maximum(0.5 * value, 1e-300)
-    tail = gammaincc(half, x)
-    far = x - (half - 1.0) * np.log(x) + gammaln(half)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.where(tail > 1e-290, -np.log(tail), far))
+        return surprise(value * 2.0 * self.means / self.variances, 2.0 * self.means**2 / self.variances)
 
 
 def absolute_gate(

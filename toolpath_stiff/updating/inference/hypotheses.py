@@ -12,6 +12,7 @@ from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.inference.candidates import Table, candidates_of, table_of
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import Forms, Structure, set_wild_aside
+from toolpath_stiff.updating.inference.tails import normal_below
 
 FloatArray = NDArray[np.float64]
 
@@ -172,13 +173,13 @@ def _quantile(
     parts: list[tuple[float, float, float]], absent: float, bracket: tuple[float, float], share: float
 ) -> float:
     """Size up to which the mixture of cut-off normals (share, mean, sd) and of zero holds `share`."""
-    from scipy.special import ndtr
 
     def below(size: float) -> float:
         total = absent if size >= 0.0 else 0.0
         for part, mean, sd in parts:
             first, last, here = ((x - mean) / sd for x in (*bracket, size))
-            total += part * float((ndtr(here) - ndtr(first)) / max(ndtr(last) - ndtr(first), 1e-300))
+            start = normal_below(first)
+            total += part * (normal_below(here) - start) / max(normal_below(last) - start, 1e-300)
         return total
 
     low, high = bracket
@@ -235,6 +236,7 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
 
 CONFOUNDED = 0.95  # canonical correlation above which two effects cannot be told apart by these data
 POWER_80 = 0.8416  # normal quantile of 80 % power
+TIED = 1e-9  # share by which changes differ that are one and the same: of a factor and of its inverse
 
 
 @dataclass(frozen=True)
@@ -336,12 +338,16 @@ def detectable_sizes(problem: Problem, families: Sequence[Family], gain_threshol
                     if table.knots and sign not in table.knots:
                         continue
                     one = _smallest(problem, table, j, sign, float(wanted))
-                    # Hardest to see: not at all, else by the largest change.
-                    if worst is None or (one.seen, -one.rms) < (worst.seen, -worst.rms):
+                    # Hardest to see: not at all, else by the largest change; of two alike the first.
+                    if worst is None or _harder(one, worst):
                         worst = one
             if worst is not None:
                 found.append(worst)
     return found
+
+
+def _harder(one: Detectable, other: Detectable) -> bool:
+    return one.rms > (1.0 + TIED) * other.rms if one.seen == other.seen else not one.seen
 
 
 def _smallest(problem: Problem, table: Table, j: int, sign: float, wanted: float) -> Detectable:
