@@ -280,8 +280,7 @@ def ladder(errors: dict[frozenset[str], float], *names: str) -> list[tuple[str, 
 
     def step(held: tuple[str, ...]) -> SimpleNamespace:
         value = errors[frozenset(held)]
-        fit = SimpleNamespace(errors=np.array([value]), names=held)
-        return SimpleNamespace(fit=fit, held=SimpleNamespace(mean_error=value))
+        return SimpleNamespace(fit=SimpleNamespace(names=held), error=value, held=SimpleNamespace(mean_error=value))
 
     work = object.__new__(_Work)
     work.say = lambda text: None

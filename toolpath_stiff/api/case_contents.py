@@ -53,7 +53,16 @@ class Contents(History):
         return self._preview[1]
 
     def machine_with(self, on: Mapping[str, Mapping[str, Any]]) -> Machine:
-        """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them."""
+        """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     tps.Case.open(folder).machine_with({"weak_strut": {"strut": 4, "factor": 0.8}})
+        <Machine nist: 6 struts, weak_strut>
+        """
         if not on:
             return self.machine
         return self.preview.machine(on) if self.state.data else with_effects(self.machine, on)
