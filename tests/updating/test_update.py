@@ -102,8 +102,8 @@ def test_the_file_gives_the_fit_back(two):
     again = parse_machine(machine_toml(machine))
     modelled = Predictor(again, found.data).log_stiffness()
     fitted = np.log(found.data.stiffness) - found.last.fit.residual
-    # 14 digits in the file.
-    assert modelled == pytest.approx(fitted, rel=0, abs=1e-9)
+    # Fitted numbers stand in the file to seven digits, on which all processors agree.
+    assert modelled == pytest.approx(fitted, rel=0, abs=1e-7)
     assert [entry.name for entry in again.effects] == ["contact_nonlinearity"]
     assert [entry.name for entry in again.instruments] == ["gauge_scale"]
     assert again.effects[0].provenance["data_sha256"] == PROVENANCE["data_sha256"]
@@ -212,7 +212,7 @@ def test_a_users_own_effect(tmp_path):
     assert abs(found.last.fit.effects[0].values["x"] - 6e-9) < 3.0 * found.widening * found.last.fit.deviation(0)
     again = parse_machine(machine_toml(found.fitted(PROVENANCE)))
     modelled = Predictor(again, data, [file]).log_stiffness()
-    assert modelled == pytest.approx(np.log(data.stiffness) - found.last.fit.residual, abs=1e-9)
+    assert modelled == pytest.approx(np.log(data.stiffness) - found.last.fit.residual, rel=0, abs=1e-7)
 
 
 def test_the_papers_own_estimation():
@@ -222,7 +222,8 @@ def test_the_papers_own_estimation():
     # Fitted to the points themselves, the law does worse at points that it has not seen.
     assert found.last.held.mean_error > last
     machine = found.fitted(PROVENANCE)
-    assert machine.strut_law == search.strut_law
+    ends = [(law.stiffness_1, law.stiffness_2) for law in (machine.strut_law, search.strut_law)]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-8)
     assert machine.uncertainty.names == ("strut_law.stiffness_1_N_per_um", "strut_law.stiffness_2_N_per_um")
     # The printed constants lie well within what 14 points can tell.
     printed = np.array([46.5, 32.5])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from typing import Any
 
@@ -67,7 +68,7 @@ def fitted_machine(
     if fit.law_free:
         remark = f"fitted: {provenance['command']}; data sha256 {provenance['data_sha256']}"
         changes |= {
-            "strut_law": scaled_law(machine.strut_law, fit.law),
+            "strut_law": _law(machine, fit),
             "origins": {**machine.origins, "strut_law": "fitted"},
             "remarks": {**machine.remarks, "strut_law": remark},
         }
@@ -78,12 +79,22 @@ def fitted_machine(
 
 
 def _in_file(parameter: Any, value: Any) -> Any:
-    return value if parameter.discrete else float(value) / parameter.si
+    return value if parameter.discrete else _certain(float(value) / parameter.si)
+
+
+def _certain(value: float) -> float:
+    """A fitted number to the digits on which all processors agree: far more than any fit is certain of."""
+    return float(f"{value:.7g}")
+
+
+def _law(machine: Machine, fit: Fit) -> StrutLaw:
+    """The fitted strut law, its factors to such digits."""
+    return scaled_law(machine.strut_law, np.round(fit.law, 8))
 
 
 def _uncertainty(machine: Machine, fit: Fit, widened: float) -> Uncertainty | None:
     """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already."""
-    law = scaled_law(machine.strut_law, fit.law)
+    law = _law(machine, fit)
     names, slopes, rows = [], [], []
     if fit.law_free:
         names += list(law.parameters)
@@ -103,7 +114,11 @@ def _uncertainty(machine: Machine, fit: Fit, widened: float) -> Uncertainty | No
         return machine.uncertainty
     scale = widened * np.array(slopes)
     covariance = np.outer(scale, scale) * fit.covariance[np.ix_(rows, rows)]
-    return _beside(machine.uncertainty, Uncertainty.of(names, covariance))
+    found = Uncertainty.of(names, covariance)
+    certain = replace(
+        found, sd=np.array([_certain(float(sd)) for sd in found.sd]), correlation=np.round(found.correlation, 9)
+    )
+    return _beside(machine.uncertainty, certain)
 
 
 def _beside(old: Uncertainty | None, new: Uncertainty) -> Uncertainty:
