@@ -258,11 +258,7 @@ def _examined(
     say: Callable[[str], None],
 ) -> Diagnosis:
     """From readings to verdict under each noise model, then what stands behind the verdict that they share."""
-    if len(data.of_tip) < FEWEST or np.isnan(data.stiffness).any():
-        raise InputError(
-            f"{len(data.of_tip)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
-            expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
-        )
+    _check_number(data)
 
     def judged(data: Measurements) -> tuple[dict[str, Judgement], Judgement]:
         predictor, judgements = Predictor(machine, data, effect_files), {}
@@ -287,10 +283,7 @@ def _examined(
     effects, cannot = testable_effects(main.problem.predictor)
     say("final fits, errors held out by point")
     baseline = Baseline.of(main.problem)
-    fits = dict(main.fits)
-    for family in main.families:
-        if family.best is not None and family.name not in fits:
-            fits[family.name] = refine(main.problem, family.best)
+    fits = _all_fits(main)
     tested = {family.name for family in main.families}
     cannot |= {effect.name: () for effect in effects if effect.name not in tested}
     held = {name: held_out(fit, data.point) for name, fit in fits.items()}
@@ -306,6 +299,23 @@ def _examined(
         files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
         slips=slips_that_show(main.problem, main.likeliest) if looked_at else (), loops=_loops(main, fits),
     )  # fmt: skip
+
+
+def _check_number(data: Measurements) -> None:
+    if len(data.of_tip) < FEWEST or np.isnan(data.stiffness).any():
+        raise InputError(
+            f"{len(data.of_tip)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
+            expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
+        )
+
+
+def _all_fits(main: Judgement) -> dict[str, Fit]:
+    """The fits of a judgement, and with the model itself the best of every family that it has only on tables."""
+    fits = dict(main.fits)
+    for family in main.families:
+        if family.best is not None and family.name not in fits:
+            fits[family.name] = refine(main.problem, family.best)
+    return fits
 
 
 def _loops(main: Judgement, fits: dict[str, Fit]) -> LoopsDocument:
