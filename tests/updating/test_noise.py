@@ -50,7 +50,7 @@ def repeated(seed: int, repeat=REPEAT, clamping=CLAMPING, clamps_a_point=2, poin
 def mean_of_estimates(count=60, **how):
     """Root mean squares of the estimated repeat noise and clamping, and the degrees of freedom."""
     found = [from_repeats(repeated(seed, **how)) for seed in range(count)]
-    repeat, clamping, freedom, told, _, _ = zip(*(astuple(one) for one in found), strict=True)
+    repeat, clamping, freedom, told, _ = zip(*(astuple(one) for one in found), strict=True)
     assert all(told)
     return math.sqrt(np.mean(np.square(repeat))), math.sqrt(np.mean(np.square(clamping))), min(freedom)
 

@@ -266,9 +266,7 @@ class Case(Findings):
             f"{effect} on: {said}" if values is not None else f"{effect} off",
             change={"on": on},
             files=[name] if on else [],
-            command=self.question("compare", machine=name)
-            if self.state.data
-            else command_line("machine", "check", name),
+            command=self._of_machine(name),
             python=f"case.switch({effect!r}, {dict(values) if values is not None else None!r})",
         )
 

@@ -331,7 +331,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, fits: Fi
     evidence: dict[tuple[str, ...], float] = {(f.name,): f.log_evidence for f in families}
     tried, search = search_pairs(problem, families, base)
     pairs, tried = _standing(tried, evidence, fits, passes)
-    least = singles[0].log_evidence + _price_of_another(families, 1) if singles else -np.inf
+    least = singles[0].log_evidence + _price_of_a_second(families) if singles else -np.inf
     if not singles or any(pair.log_evidence > least for pair in pairs):
         # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
         evidence |= {pair.names: pair.log_evidence for pair in tried}
@@ -458,9 +458,9 @@ def _prior(families: Sequence[Family], count: int) -> float:
     return {1: PRIOR_SINGLES, 2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
 
 
-def _price_of_another(families: Sequence[Family], count: int) -> float:
-    """Log evidence that an effect beside `count` others must add to be considered: its prior, and odds of 3 to 1."""
-    return float(np.log(POSITIVE * _prior(families, count) / _prior(families, count + 1)))
+def _price_of_a_second(families: Sequence[Family]) -> float:
+    """Log evidence that an effect beside another must add to be considered: its prior, and odds of 3 to 1."""
+    return float(np.log(POSITIVE * _prior(families, 1) / _prior(families, 2)))
 
 
 def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:

@@ -52,8 +52,6 @@ LEAST = 1e-3
 # Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
 # states it, within a third where it is guessed; assumed.
 STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
-USED_INSTEAD = "what the repeats show is used instead"
-USED_ELSEWHERE = "what the repeats show is used for the readings that state nothing"
 CONTRADICTED = 3.3  # standard deviations of the logarithm of their ratio from which repeats overrule a stated noise
 
 
@@ -198,14 +196,14 @@ def _noise_of_tip(
     if repeats is not None:
         if rows.any():
             total = float(np.sqrt(np.mean(relative[rows] ** 2)))
-            remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file")
+            used = "instead" if rows.all() else "for the readings that state nothing"
+            remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file", used)
         origin = f"estimated from {repeats.differences} differences between repeats: "
         origin += _percent(repeats.repeat, repeats.clamping)
         origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
         repeat, freedom = np.full(n, repeats.repeat), repeats.freedom
         if rows.any() and not rows.all():  # of other readings, mostly: both count
             repeat, freedom = _both(relative, rows, repeats, trusted=not remark)
-            remark = remark.replace(USED_INSTEAD, USED_ELSEWHERE)
             origin += f", and from sd_N_per_mm of {int(rows.sum())} readings, {_percent(*_shared(total))}"
         return (model("measured", repeat, repeats.clamping, freedom, origin, repeats.wild, remark),)
     if rows.any():
@@ -252,8 +250,8 @@ def _both(relative: FloatArray, rows: NDArray[np.bool_], repeats: Repeats, trust
     return repeat, freedom
 
 
-def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -> str:
-    """That repeats contradict a stated noise, in a sentence; "" where they do not.
+def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str, used: str = "instead") -> str:
+    """That repeats contradict a stated noise, in a sentence; "" where they do not. `used`: where theirs is taken.
 
     Both are estimates: the stated one to `STATED_FREEDOM`, the repeats' to theirs (sd of a ratio's logarithm).
     """
@@ -267,7 +265,7 @@ def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -
     small = ratio > 1.0
     return (
         f"the {what} is too {'small' if small else 'large'}: {100 * told:.2g} %, where {repeats.differences} "
-        f"differences between repeats scatter {ratio:.2g} times as much; {USED_INSTEAD}"
+        f"differences between repeats scatter {ratio:.2g} times as much; what the repeats show is used {used}"
     )
 
 

@@ -66,8 +66,6 @@ class Repeats:
         Whether clamping was estimated.
     wild
         Share of wild readings.
-    freedom
-        Degrees of freedom that the estimated scatter is worth: fewer than differences, as any of them may be wild.
     """
 
     repeat: float
@@ -75,7 +73,11 @@ class Repeats:
     differences: int
     clamps: bool
     wild: float
-    freedom: float
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom that the scatter is worth: fewer than differences, as any of them may be wild."""
+        return WORTH * self.differences
 
 
 def from_repeats(data: Measurements) -> Repeats | None:
@@ -96,7 +98,7 @@ def from_repeats(data: Measurements) -> Repeats | None:
         if contrasts.count < FEWEST_CONTRASTS:
             break
         repeat, clamping, found = _maximum_likelihood(contrasts)
-        result = Repeats(repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found, OUTLIERS, 0.0)
+        result = Repeats(repeat, clamping if found else min(CLAMPING, repeat), contrasts.count, found, OUTLIERS)
         wild = contrasts.deviations(result.repeat, result.clamping) > WILD
         if not wild.any():
             break
@@ -107,8 +109,7 @@ def from_repeats(data: Measurements) -> Repeats | None:
         return None
     whole = _Contrasts.of(data.select(every), groups[every])
     factor, share = _mixture(whole.deviations(result.repeat, result.clamping), np.bincount(groups)[groups[every]])
-    freedom = WORTH * result.differences
-    return replace(result, repeat=factor * result.repeat, wild=share, freedom=freedom)
+    return replace(result, repeat=factor * result.repeat, wild=share)
 
 
 def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, float]:
