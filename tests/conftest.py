@@ -35,6 +35,51 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 
+# Where several processes share the tests, each begins with a run of neighbours, and who is done takes half of what the
+# other has left, from its end. So what is long, and what is worked out once for many tests (the site, judgements),
+# stands at the beginning of such a run; what is taken at the end are many small tests. Otherwise the two processes
+# build the same site, and the last waits for one long test.
+LONG = (
+    "tests/test_site.py",
+    "tests/studio/test_studio.py",
+    "tests/test_tutorials.py",
+    "tests/test_packaging.py",
+    "tests/test_readme.py",
+    "tests/test_hints.py",
+    "tests/nc/test_conformance.py",
+    "tests/stiffness/test_kernels.py",
+    "tests/test_cluster.py",
+    "tests/test_processes.py",
+    "tests/test_cli_batch.py",
+    "tests/test_nist_table1.py",
+    "tests/test_cli_diagnose.py",
+    "tests/test_results_folder.py",
+    "tests/test_faults.py",
+    "tests/test_programs.py",
+    "tests/placement/",
+    "tests/report/",
+)
+TOGETHER = "tests/updating/"  # half of the time of all: the run of another process
+
+
+def shared_out(names: Sequence[str], processes: int) -> list[int]:
+    """The order of tests for so many processes: `LONG` first, `TOGETHER` where the last process begins."""
+    rank = {start: number for number, start in enumerate(LONG)}
+    starts = [next((start for start in LONG if name.startswith(start)), "") for name in names]
+    long = sorted((i for i, start in enumerate(starts) if start), key=lambda i: rank[starts[i]])
+    together = [i for i, name in enumerate(names) if name.startswith(TOGETHER)]
+    small = sorted({*range(len(names))} - {*long, *together})
+    last = -(-len(names) // processes)  # tests that the last process begins with
+    before = max(0, len(names) - last - len(long))
+    return [*long, *small[:before], *together, *small[before:]]
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    processes = int(getattr(config, "workerinput", {}).get("workercount", 1))
+    if processes > 1:
+        items[:] = [items[i] for i in shared_out([item.nodeid for item in items], processes)]
+
+
 def pytest_collection_finish() -> None:
     sys.dont_write_bytecode = AS_ASKED
     gc.freeze()  # modules and thousands of tests stay to the end: the collector need not look at them again and again

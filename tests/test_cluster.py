@@ -74,7 +74,17 @@ def test_a_cluster_gives_the_same_bytes_and_the_same_words(cluster, shop, capsys
     assert "a/part/report.html" in files_of(shop / "two")
 
 
+def test_the_function_takes_the_executor_of_a_client(cluster, shop):
+    with distributed.Client(cluster, set_as_default=False) as client:
+        done = tps.analyze_many("nist", ["jobs"], "o", executor=client.get_executor(), plots=False, step_mm=20)
+        again = tps.analyze_many("nist", ["jobs"], "o", executor=client.get_executor(), plots=False, step_mm=20)
+    assert [one.status for one in done.outcomes] == ["done", "done", "failed"]
+    assert done.outcomes == again.outcomes
+    assert done.to_json() == json.dumps(done.to_dict(), indent=2) + "\n"
+
+
 def test_a_worker_that_dies_fails_its_own_program_alone(cluster, shop):
+    """The last test on the cluster: on a busy machine Dask may not bring its workers back."""
     import os
 
     (shop / "deadly.py").write_text(DEADLY)
@@ -88,15 +98,6 @@ def test_a_worker_that_dies_fails_its_own_program_alone(cluster, shop):
     assert rows["jobs/b/part.nc"]["reason"].startswith("jobs/b/part.nc: 2 workers died of it, the last at tcp://127.0")
     assert rows["jobs/bad.nc"]["reason"].startswith("jobs/bad.nc:3:1: ")
     assert not [path for path in (shop / "o").rglob(".tps-*") if path.is_dir()]
-
-
-def test_the_function_takes_the_executor_of_a_client(cluster, shop):
-    with distributed.Client(cluster, set_as_default=False) as client:
-        done = tps.analyze_many("nist", ["jobs"], "o", executor=client.get_executor(), plots=False, step_mm=20)
-        again = tps.analyze_many("nist", ["jobs"], "o", executor=client.get_executor(), plots=False, step_mm=20)
-    assert [one.status for one in done.outcomes] == ["done", "done", "failed"]
-    assert done.outcomes == again.outcomes
-    assert done.to_json() == json.dumps(done.to_dict(), indent=2) + "\n"
 
 
 def test_a_scheduler_that_does_not_answer_is_one_message(shop, capsys, monkeypatch):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from toolpath_stiff.errors import FileError, ProgramError
@@ -34,6 +34,10 @@ class ToolEntry:
     stick_out: float = math.nan
     material: str = ""
 
+    def __deepcopy__(self, memo: dict[int, object]) -> ToolEntry:
+        # Every reading copies its tables, field by field at ten times the cost.
+        return replace(self)
+
 
 @dataclass
 class WorkOffset:
@@ -42,6 +46,9 @@ class WorkOffset:
     axes: list[float] = field(default_factory=lambda: [0.0] * 6)
     rotation: float = 0.0
     given: bool = False
+
+    def __deepcopy__(self, memo: dict[int, object]) -> WorkOffset:
+        return replace(self, axes=[*self.axes])
 
 
 @dataclass
