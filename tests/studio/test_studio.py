@@ -385,17 +385,6 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     tab.close()
 
 
-# The key that leads to an element sooner, and how often it can be pressed before one has to look: each costs a drawing.
-SHORTER_WAY = """(one) => {
-  const kinds = "a[href], button, input, select, textarea, summary, [tabindex]";
-  const all = [...document.querySelectorAll(kinds)].filter((e) => e.tabIndex >= 0 && !e.disabled && e.checkVisibility());
-  const here = all.indexOf(document.activeElement), there = all.findIndex((e) => e.matches(one)), n = all.length;
-  if (there < 0) return ["Tab", 0];
-  const on = (there - here + n) % n;
-  return on <= n - on ? ["Tab", Math.max(0, on - 1)] : ["Shift+Tab", n - on - 1];
-}"""
-
-
 class Keys:
     """A tab without a mouse: everything is reached by Tab, nothing is focused by script."""
 
@@ -408,16 +397,13 @@ class Keys:
         self.choosers.append(chooser)
 
     def reach(self, selector: str) -> None:
-        """Press Tab, or Shift and Tab, until the element has the focus; it must show that it has it."""
-        key, presses = self.tab.page.evaluate(SHORTER_WAY, selector)
-        for _ in range(presses):
-            self.press(key)
+        """Press Tab until the element has the focus; it must show that it has it."""
         for _ in range(150):
             if self.tab.page.evaluate("(one) => document.activeElement.matches(one)", selector):
                 ring = "getComputedStyle(document.activeElement).outlineStyle"
                 assert self.tab.page.evaluate(ring) != "none", selector
                 return
-            self.press(key)
+            self.press("Tab")
         raise AssertionError(f"not reached: {selector}")
 
     def on(self, selector: str, key: str) -> None:
