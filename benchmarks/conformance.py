@@ -16,7 +16,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ PACKAGE = "linuxcnc-uspace"
 TOLERANCE = 0.01  # mm and degrees
 PRINTED = 0.005  # two digits of 0.0001 inch: a move shorter than that may be lost in print
 LINUXCNC = Controller(DIALECTS["linuxcnc"])
+AT_ONCE = 100_000  # pairs of a point and a segment: what stays in a processor's cache
 SUFFIXES = (".ngc", ".nc")
 SAME, NONE, REFUSED, UNCHECKED, OTHER = "same path", "no feed path", "refused", "not checked", "OTHER PATH"
 # The programs name tools without saying how long they are: any length will do, and both readers get the same.
@@ -105,12 +106,17 @@ def polyline(moves: Moves) -> np.ndarray:
 
 def farthest(one: np.ndarray, two: np.ndarray) -> float:
     """How far the ends of the segments of one path are from the other, at most."""
-    start, along = two[:, 0], two[:, 1] - two[:, 0]
-    squared = np.maximum((along**2).sum(axis=1), 1e-30)
+    start, along = two[:, 0].T, (two[:, 1] - two[:, 0]).T
+    squared = np.maximum((along**2).sum(axis=0), 1e-30)
+    points = one.reshape(-1, 6)[:: max(1, len(one) // 5000)]
     worst = 0.0
-    for point in one.reshape(-1, 6)[:: max(1, len(one) // 5000)]:
-        share = np.clip(((point - start) * along).sum(axis=1) / squared, 0.0, 1.0)
-        worst = max(worst, float(np.abs(start + share[:, None] * along - point).max(axis=1).min()))
+    for some in np.array_split(points, -(-len(points) * len(two) // AT_ONCE)):
+        offsets = [some[:, [k]] - start[k] for k in range(6)]
+        share = np.clip(sum(offset * along[k] for k, offset in enumerate(offsets)) / squared, 0.0, 1.0)
+        apart = np.zeros_like(share)
+        for k, offset in enumerate(offsets):
+            np.maximum(apart, np.abs(share * along[k] - offset), out=apart)
+        worst = max(worst, float(apart.min(axis=1).max()))
     return worst
 
 
@@ -126,11 +132,11 @@ def difference(one: Program, two: Program) -> float:
     return max(farthest(there, back), farthest(back, there))
 
 
-def held_against(file: Path, table: Path, rs274: str | None = None) -> Row:
+def held_against(file: Path, control: Controller, rs274: str | None = None) -> Row:
     """Read one program by both."""
     name = f"{file.parent.name}/{file.name}"
-    theirs, said = read(file, table, "linuxcnc", rs274)
-    ours, answer = read(file, table, "builtin", rs274)
+    theirs, said = read(file, control, "linuxcnc", rs274)
+    ours, answer = read(file, control, "builtin", rs274)
     verdict = _without_a_path(file, theirs, said, ours, answer)
     if verdict or ours is None or theirs is None:
         return Row(name, verdict, said.removeprefix(f"{file.name}:"), answer.removeprefix(f"{file.name}:"))
@@ -152,10 +158,10 @@ def _without_a_path(file: Path, theirs: Program | None, said: str, ours: Program
     return OTHER if theirs is not None or said == NONE else UNCHECKED
 
 
-def read(file: Path, table: Path, interpreter: str, rs274: str | None) -> tuple[Program | None, str]:
+def read(file: Path, control: Controller, interpreter: str, rs274: str | None) -> tuple[Program | None, str]:
     """The program, or why not; no cutting move is told apart, since it is an answer of its own."""
     try:
-        program = read_program(file, tool_table=table, interpreter=interpreter, rs274=rs274, controller=LINUXCNC)
+        program = read_program(file, interpreter=interpreter, rs274=rs274, controller=control)
         return (program, "read") if len(feed_path(program)) else (None, NONE)
     except InputError as error:
         return None, NONE if error.found == "no cutting move" else str(error)
@@ -196,8 +202,8 @@ def measure(files: Iterable[Path], folder: Path, rs274: str | None = None) -> li
     """Hold every file against LinuxCNC's interpreter; the tool table is written into `folder`."""
     tools = folder / "tools.csv"
     tools.write_text(TOOL_TABLE, encoding="utf-8")
-    read_tool_table(tools)
-    return [held_against(file, tools, rs274) for file in files]
+    control = replace(LINUXCNC, tools=read_tool_table(tools))
+    return [held_against(file, control, rs274) for file in files]
 
 
 def main() -> int:
