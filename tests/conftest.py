@@ -42,24 +42,27 @@ sys.dont_write_bytecode = False
 LONG = (
     "tests/test_site.py",
     "tests/studio/test_studio.py",
-    "tests/test_tutorials.py",
     "tests/test_packaging.py",
-    "tests/test_readme.py",
-    "tests/test_hints.py",
     "tests/nc/test_conformance.py",
     "tests/stiffness/test_kernels.py",
     "tests/test_cluster.py",
     "tests/test_processes.py",
     "tests/test_cli_batch.py",
-    "tests/test_nist_table1.py",
-    "tests/test_cli_diagnose.py",
     "tests/test_results_folder.py",
     "tests/test_faults.py",
     "tests/test_programs.py",
     "tests/placement/",
     "tests/report/",
 )
-TOGETHER = "tests/updating/"  # half of the time of all: the run of another process
+# They share judgements, and take half of the time of all: the run of another process.
+TOGETHER = (
+    "tests/test_cli_diagnose.py",
+    "tests/test_hints.py",
+    "tests/test_nist_table1.py",
+    "tests/test_readme.py",
+    "tests/test_tutorials.py",
+    "tests/updating/",
+)
 
 
 def shared_out(names: Sequence[str], processes: int) -> list[int]:

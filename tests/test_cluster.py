@@ -36,11 +36,21 @@ class Deadly(Effect):
 
 @pytest.fixture(scope="module")
 def cluster():
+    import multiprocessing
+
     import dask
 
+    # Workers begin with the libraries loaded, as two start and three more are started where others died.
+    multiprocessing.set_forkserver_preload(
+        ["distributed", "pandas", "toolpath_stiff.api.many", "toolpath_stiff.report"]
+    )
+    settings = {
+        "distributed.scheduler.allowed-failures": 1,  # one try more: each death costs the start of a new worker
+        "distributed.comm.timeouts.connect": "60s",
+        "distributed.worker.multiprocessing-method": "forkserver",
+    }
     with (
-        # One try more: each death costs the start of a new worker.
-        dask.config.set({"distributed.scheduler.allowed-failures": 1, "distributed.comm.timeouts.connect": "60s"}),
+        dask.config.set(settings),
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None, silence_logs=50
         ) as found,
