@@ -13,8 +13,10 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
+    from toolpath_stiff.arrays import FloatArray
     from toolpath_stiff.machine import Machine
     from toolpath_stiff.stiffness.effects import Effect
+    from toolpath_stiff.stiffness.model import StiffnessModel
     from toolpath_stiff.updating.inference import Judgement
     from toolpath_stiff.updating.inference.evidence import Problem
     from toolpath_stiff.updating.inference.noise import Noise
@@ -116,6 +118,32 @@ def predictors_are_shared() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for module in (comparison, diagnosis, ladder):
             patch.setattr(module, "Predictor", shared)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def joint_columns_are_shared() -> Iterator[None]:
+    """What displaced joints do to readings hangs on the machine and on how they are taken: once a process for each."""
+    from tests.updating.cases import joint_columns_once
+    from toolpath_stiff.stiffness.effects.guard import is_foreign
+    from toolpath_stiff.updating.inference.prediction import Predictor
+    from toolpath_stiff.updating.planning import rivals
+
+    of_readings, of_plan = Predictor.joint_columns, rivals.joint_columns
+
+    def for_readings(own: Predictor) -> FloatArray:
+        """`Predictor.joint_columns`."""
+        return joint_columns_once("readings", own.machine, own.data, lambda: of_readings(own), own.effect_files)
+
+    def for_plan(model: StiffnessModel, readings: Measurements) -> FloatArray:
+        """`rivals.joint_columns`."""
+        if model.given is None or any(is_foreign(one.effect) for one in (*model.effects, *model.instruments)):
+            return of_plan(model, readings)
+        return joint_columns_once("plan", model.given, readings, lambda: of_plan(model, readings))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Predictor, "joint_columns", for_readings)
+        patch.setattr(rivals, "joint_columns", for_plan)
         yield
 
 

@@ -53,13 +53,9 @@ def spring_matrix(axis, arms, length):
     """(6, 6) twice the energy of unit springs at both ends of all struts, from the motions of twelve hinges."""
     matrix = np.zeros((6, 6))
     for u, arm, reach in zip(axis, arms, length, strict=True):
-        for twist in np.eye(6):
-            swing = np.cross(u, twist[:3] + np.cross(twist[3:], arm)) / reach
-            for other in np.eye(6):
-                beside = np.cross(u, other[:3] + np.cross(other[3:], arm)) / reach
-                across = [t[3:] - (u @ t[3:]) * u for t in (twist, other)]
-                energy = swing @ beside + (swing - across[0]) @ (beside - across[1])
-                matrix += energy * np.outer(twist, other)
+        swing = np.array([np.cross(u, twist[:3] + np.cross(twist[3:], arm)) / reach for twist in np.eye(6)])
+        across = np.array([twist[3:] - (u @ twist[3:]) * u for twist in np.eye(6)])
+        matrix += swing @ swing.T + (swing - across) @ (swing - across).T
     return matrix
 
 

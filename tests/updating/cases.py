@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+import hashlib
+import pickle
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -164,6 +166,30 @@ def predictor_for(data: Measurements) -> Predictor:
     idle = idle_on(found.base, data).values()
     found.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle))))
     return found
+
+
+JOINT_COLUMNS: dict[bytes, FloatArray] = {}
+READ_OFF = ("stiffness", "sd", "file", "line", "notes", "warnings")  # what readings show, and where that stands
+
+
+def joint_columns_once(
+    which: str,
+    machine: Machine,
+    data: Measurements,
+    columns: Callable[[], FloatArray],
+    files: Sequence[str | Path] = (),
+) -> FloatArray:
+    """`columns()`, what 36 coordinates of joints do to readings; of one machine and design worked out once a process.
+
+    `which`: of the two ways there are, a predictor's and a plan's.
+    """
+    design = [_content(getattr(data, each.name)) for each in fields(data) if each.name not in READ_OFF]
+    parts = (which, machine_toml(machine), [Path(file).read_bytes() for file in files], design)
+    key = hashlib.sha256(pickle.dumps(parts)).digest()
+    if key not in JOINT_COLUMNS:
+        JOINT_COLUMNS[key] = columns()
+        JOINT_COLUMNS[key].flags.writeable = False
+    return JOINT_COLUMNS[key]
 
 
 JUDGEMENTS: dict[tuple[Any, ...], Judgement] = {}

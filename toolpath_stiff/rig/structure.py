@@ -125,7 +125,8 @@ def solved(place: Geometry, links: Links, direction: FloatArray, force: FloatArr
     load = _load_vector(place, links, direction, platform_dofs)
     give = _give(place, links)
     n, size = load.shape
-    fixed = platform_springs + np.einsum("nai,nab,nbj->nij", stretch, links.struts, stretch)
+    per_stretch = links.struts @ stretch  # (n, 6, N) N/m
+    fixed = platform_springs + np.swapaxes(stretch, 1, 2) @ per_stretch
     first = platform_dofs
     forces = np.zeros((n, 6))
     compliance = np.zeros(n)
@@ -139,14 +140,17 @@ def solved(place: Geometry, links: Links, direction: FloatArray, force: FloatArr
         springs = np.zeros((n, size))
         np.divide(1.0, give, out=springs[:, first:], where=give > 0.0)
         springs[:, first:][give <= 0.0] = 1.0  # any number: the unknown is held
-        stiffness = fixed * held[:, :, None] * held[:, None, :]
-        stiffness[:, range(size), range(size)] += springs
-        pull = load * held
-        moved = np.linalg.solve(stiffness, pull[:, :, None])[:, :, 0]
-        before, compliance = compliance, np.einsum("ni,ni->n", pull, moved)
-        forces = force[:, None] * np.einsum("nab,nbj,nj->na", links.struts, stretch * held[:, None, :], moved)
+        free = np.flatnonzero(held.any(axis=0))  # what is held in every row does not move
+        stiffness = fixed[:, free[:, None], free] * held[:, free, None] * held[:, None, free]
+        stiffness[:, range(len(free)), range(len(free))] += springs[:, free]
+        pull = (load * held)[:, free]
+        moved = np.zeros((n, size))
+        moved[:, free] = np.linalg.solve(stiffness, pull[:, :, None])[:, :, 0]
+        moved *= held
+        before, compliance = compliance, np.einsum("ni,ni->n", load, moved)
+        forces = force[:, None] * (per_stretch @ moved[:, :, None])[:, :, 0]
         if np.abs(compliance - before).max() <= SECANT_TOLERANCE * compliance.max():
-            return Solved(compliance, moved * held, stretch, platform_dofs)
+            return Solved(compliance, moved, stretch, platform_dofs)
     raise RuntimeError("the secant stiffnesses of the joints did not settle")
 
 

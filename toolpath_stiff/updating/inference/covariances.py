@@ -26,6 +26,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
+MOST_RANKS = 64  # by which an inverse is changed before it is worked out anew
+
 
 @dataclass(frozen=True)
 class Groups:
@@ -183,7 +185,7 @@ class Precision:
         return self.groups.sums(1.0 / self.own)
 
     @cached_property
-    def _pull(self) -> FloatArray:
+    def pull(self) -> FloatArray:
         """(groups,) by how much of its weighted sum a group moves each of its readings.
 
         (diag(d) + c 1 1^T)^-1 x = (x - 1 c sum(x / d) / (1 + c sum(1 / d))) / d   (Sherman and Morrison 1950).
@@ -194,7 +196,7 @@ class Precision:
         """C^-1 x of rows (..., n)."""
         if self.groups.alone:
             return rows / (self.own + self.common)
-        moved = self._pull * self.groups.sums(rows / self.own)
+        moved = self.pull * self.groups.sums(rows / self.own)
         return np.asarray((rows - moved[..., self.groups.of]) / self.own)
 
     def times(self, rows: FloatArray) -> FloatArray:
@@ -207,7 +209,7 @@ class Precision:
         """(...,) of rows (..., n): each with itself."""
         flat = rows.reshape(-1, rows.shape[-1])
         over = flat / self.own
-        blocks = np.einsum("in,in->i", flat, over) - self.groups.sums(over) ** 2 @ self._pull
+        blocks = np.einsum("in,in->i", flat, over) - self.groups.sums(over) ** 2 @ self.pull
         shared = flat @ self.factors.T
         return np.asarray(blocks - np.einsum("iq,iq->i", shared, shared)).reshape(rows.shape[:-1])
 
@@ -217,20 +219,20 @@ class Precision:
         sums = self.groups.sums(over)
         flat = rows.reshape(-1, rows.shape[-1]) @ self.factors.T
         shared = flat.reshape(*rows.shape[:-1], len(self.factors))
-        found = rows @ np.swapaxes(over, -1, -2) - (sums * self._pull) @ np.swapaxes(sums, -1, -2)
+        found = rows @ np.swapaxes(over, -1, -2) - (sums * self.pull) @ np.swapaxes(sums, -1, -2)
         return np.asarray(found - shared @ np.swapaxes(shared, -1, -2))
 
-    @property
+    @cached_property
     def diagonal(self) -> FloatArray:
         """(n,)."""
-        blocks = (1.0 - self._pull[self.groups.of] / self.own) / self.own
+        blocks = (1.0 - self.pull[self.groups.of] / self.own) / self.own
         return np.asarray(blocks - (self.factors**2).sum(axis=0))
 
     def block(self, at: Rows) -> FloatArray:
         """(..., k, k) some of its columns, of the same rows, for rows (..., k)."""
         own, of, factors = self.own[at], self.groups.of[at], np.moveaxis(self.factors[:, at], 0, -2)
         same = of[..., :, None] == of[..., None, :]
-        blocks = -(same * (self._pull[of] / own)[..., None, :]) / own[..., :, None]
+        blocks = -(same * (self.pull[of] / own)[..., None, :]) / own[..., :, None]
         diagonal = np.arange(at.shape[-1])
         blocks[..., diagonal, diagonal] += 1.0 / own
         return np.asarray(blocks - np.swapaxes(factors, -1, -2) @ factors)
@@ -275,43 +277,45 @@ class Precision:
 class Widening:
     """The inverse covariance of n readings while some get more scatter of their own, one after the other.
 
-    With blocks C and q shared nuisances S (q, n) the inverse is C^-1 - G^T M^-1 G, where G = S C^-1 and M = 1 + G S^T
-    (Woodbury 1950); more scatter of one reading changes C^-1 within its group by one rank, and with it G there and M
-    (Sherman and Morrison 1950). A column costs q n, however many readings were widened before.
+    More scatter v of a reading takes one rank off the inverse, its column c there times c^T v / (1 + v c_row) (Sherman
+    and Morrison 1950): another row of `Precision.factors`. After `MOST_RANKS` of them the inverse is worked out anew
+    from the covariance, so that a column costs n times their number at most, however many readings were widened before.
     """
 
     def __init__(self, covariance: Covariance) -> None:
-        blocks = covariance.precision
-        self._of, self._members = covariance.groups.of, covariance.groups.members()
-        self._own, self._common, self._weights = covariance.own.copy(), covariance.common, blocks.weights.copy()
-        self._reached = replace(blocks, factors=blocks.factors[:0]).times(covariance.shared)
-        self._inverse = np.linalg.inv(np.eye(len(covariance.shared)) + self._reached @ covariance.shared.T)
+        self._groups, self._members = covariance.groups, covariance.groups.members()
+        self._begin(covariance)
 
-    def _block(self, row: int) -> tuple[Rows, FloatArray]:
-        """The readings of a reading's group, and its column of C^-1 there."""
-        members = self._members[self._of[row]]
-        pull = self._common / (1.0 + self._common * self._weights[self._of[row]])
-        column = -pull / self._own[members] / self._own[row]
-        column[members == row] += 1.0 / self._own[row]
-        return members, column
+    def _begin(self, covariance: Covariance) -> None:
+        self._covariance, self._precision = covariance, covariance.precision
+        factors = self._precision.factors
+        self._factors = np.concatenate([factors, np.empty((MOST_RANKS, len(covariance)))])
+        self._ranks, self._first = len(factors), len(factors)
+        self._more = np.zeros(len(covariance))
 
     def column(self, row: int) -> FloatArray:
         """(n,) a column of the inverse as it stands."""
-        members, block = self._block(row)
-        found = -((self._inverse @ self._reached[:, row]) @ self._reached)
-        found[members] += block
+        factors, own, group = self._factors[: self._ranks], self._precision.own, self._groups.of[row]
+        members = self._members[group]
+        found = -(factors[:, row] @ factors)
+        found[members] -= self._precision.pull[group] / own[row] / own[members]
+        found[row] += 1.0 / own[row]
         return np.asarray(found)
 
-    def widen(self, row: int, variance: float) -> None:
-        """Add to a reading's own variance."""
-        members, block = self._block(row)
-        share = variance / (1.0 + variance * float(block[members == row][0]))
-        reached = self._reached[:, row].copy()
-        moved = self._inverse @ reached
-        self._inverse += np.outer(moved, moved) * (share / (1.0 - share * float(reached @ moved)))
-        self._reached[:, members] -= share * np.outer(reached, block)
-        self._weights[self._of[row]] += 1.0 / (self._own[row] + variance) - 1.0 / self._own[row]
-        self._own[row] += variance
+    def widen(self, row: int, variance: float) -> tuple[FloatArray, float]:
+        """Add to a reading's own variance: takes column x column^T share off the inverse; (n,) that column, the share.
+
+        Both are of the inverse as it was before.
+        """
+        column = self.column(row)
+        share = variance / (1.0 + variance * float(column[row]))
+        if self._ranks == self._first + MOST_RANKS:
+            rows = np.flatnonzero(self._more)
+            self._begin(self._covariance.widened(rows, self._more[rows]))
+        self._factors[self._ranks] = column * np.sqrt(share)
+        self._ranks += 1
+        self._more[row] += variance
+        return column, share
 
 
 def inverse_root(information: FloatArray) -> FloatArray:

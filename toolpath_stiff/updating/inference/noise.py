@@ -344,22 +344,22 @@ class Scatter:
         most wild first, each beside those before it.
         """
         diagonal, wild = self.precision.diagonal, list(self.wild)
-        pull = self.precision.times(residual)
+        pull, taken = self.precision.times(residual), np.zeros(len(residual))
+        taken[wild] = -np.inf
         widening: Widening | None = None
         for _ in range(int(self.most * len(residual)) + 1):
             own = 1.0 + self.widening * diagonal
             gain = self.widening * pull**2 / own - np.log(own) - 2.0 * self.price
-            gain[wild] = -np.inf
+            gain += taken
             row = int(np.argmax(gain))
             if gain[row] <= 0.0:
                 break
             widening = widening or Widening(self.covariance)
-            column = widening.column(row)
-            share = self.widening[row] / own[row]
+            column, share = widening.widen(row, float(self.widening[row]))
             pull = pull - column * (share * pull[row])
             diagonal = diagonal - column**2 * share
-            widening.widen(row, float(self.widening[row]))
             wild.append(row)
+            taken[row] = -np.inf
         if known is not None and set(known.wild) == set(wild):
             return known
         rows = np.array(wild[len(self.wild) :], dtype=np.int64)

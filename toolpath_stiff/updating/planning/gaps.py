@@ -82,13 +82,14 @@ def _squared_gap(a: FloatArray, h: FloatArray, M: FloatArray, repeats: float) ->
     return np.asarray(repeats * a - repeats**2 * (h * solved).sum(axis=-1))
 
 
-def _summed_products(columns: FloatArray, starts: IntArray) -> FloatArray:
-    """(v, q, q) sums over each visit's rows of the products of columns (n, q); one column at a time to save memory."""
-    q = columns.shape[1]
-    products = np.empty((len(starts), q, q))
-    for k in range(q):
-        products[:, k, k:] = np.add.reduceat(columns[:, k : k + 1] * columns[:, k:], starts, axis=0)
-        products[:, k:, k] = products[:, k, k:]
+def _summed_products(columns: FloatArray, counts: IntArray) -> FloatArray:
+    """(v, q, q) sums over each visit's rows of the products of columns (n, q); all visits with so many rows at once."""
+    starts, q = np.cumsum(counts) - counts, columns.shape[1]
+    products = np.empty((len(counts), q, q))
+    for count in np.unique(counts).tolist():
+        alike = np.flatnonzero(counts == count)
+        rows = columns[starts[alike, None] + np.arange(count)]
+        products[alike] = np.swapaxes(rows, 1, 2) @ rows
     return products
 
 
@@ -98,7 +99,7 @@ def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: Readin
     F = np.concatenate([first.factor, second.factor, np.sqrt(2.0) * noise.machine], axis=1)
     columns = np.concatenate([difference[:, None], F], axis=1)[visits.members]
     starts, counts = visits.starts, visits.counts
-    products = _summed_products(columns, starts)
+    products = _summed_products(columns, counts)
     sums = np.add.reduceat(columns, starts, axis=0)
     # Inverse of 2 (r^2 1 + c^2 11^T) by Sherman and Morrison.
     common = noise.clamping**2 / (noise.repeat**2 + counts * noise.clamping**2)
