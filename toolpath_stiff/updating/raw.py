@@ -28,6 +28,7 @@ from toolpath_stiff.tables import read_table
 from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.dates import day_of
 from toolpath_stiff.updating.history import HistoryDocument, Readings, history
+from toolpath_stiff.updating.raw_cycles import closed_cycle, closed_cycles, ends_without_drift, turns_of
 from toolpath_stiff.updating.raw_records import COLUMNS, CONDITIONS, PLACE, SAME_JOG, Loop, read_raw
 from toolpath_stiff.updating.raw_shape import Shape, shape_of, sides_of
 from toolpath_stiff.updating.rows import (
@@ -38,6 +39,7 @@ from toolpath_stiff.updating.rows import (
 
 FloatArray = NDArray[np.float64]
 ONE_SIDE = 0.05  # of the range: a force set on a bench that goes less far to the other side is of one side
+CLOSED = 3  # turns of the drive, from which the records hold a closed cycle
 FIGURES = ("lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
 
 
@@ -90,7 +92,7 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
         The loop does not reach both sides, or gives no stiffness that could be.
     """
     where = {"file": file or None, "line": loop.line}
-    drive, same = loop.drive, loop.same
+    drive = loop.drive
     high, low = float(drive.max()), float(drive.min())
     if loop.jog is not None and not (low < -SAME_JOG and high > SAME_JOG):
         raise MeasurementError(
@@ -98,9 +100,14 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
             expected="extremes on both sides of zero, as 0, +200, -200, 0 um",
             **where,  # type: ignore[arg-type]
         )
-    at_high, at_low = drive >= high - same, drive <= low + same
-    force = float(loop.force[at_high].mean() - loop.force[at_low].mean())
-    deflection = float(loop.deflection[at_high].mean() - loop.deflection[at_low].mean())
+    turns = turns_of(drive)
+    if len(turns) >= CLOSED:
+        ends = ends_without_drift(drive, loop.force, loop.deflection, turns, loop.same)
+        force, deflection = ends.force, ends.deflection
+    else:
+        at_high, at_low = drive >= high - loop.same, drive <= low + loop.same
+        force = float(loop.force[at_high].mean() - loop.force[at_low].mean())
+        deflection = float(loop.deflection[at_high].mean() - loop.deflection[at_low].mean())
     stiffness = force / deflection if deflection else math.inf
     if not SOFTEST <= n_per_mm_from_n_per_m(stiffness) <= STIFFEST:
         raise MeasurementError(
@@ -111,16 +118,18 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
             else "force, jog and displacement count positive the same way; displacement is what the indicator read",
             **where,  # type: ignore[arg-type]
         )
-    sides = (math.nan, math.nan) if loop.jog is not None else sides_of(loop.force, loop.deflection)
+    cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
+    width = _loop_width(cycle)
+    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width)
     return LoopFigures(
         stiffness=stiffness,
         force=one_side * force if (one_side := side_of(loop)) else force / 2.0,
         deflection=deflection,
-        lost_motion=_lost_motion(loop, high, low),
-        loop_width=_loop_width(loop),
-        linearity=_linearity(loop, deflection),
+        lost_motion=_lost_motion(cycle, high, low),
+        loop_width=width,
+        linearity=_linearity(cycle, deflection),
         closure=float(loop.deflection[-1] - loop.deflection[0]),
-        shape=shape_of(loop.force, loop.deflection, _main_pass(loop)),
+        shape=shape_of(cycle.force, cycle.deflection, _ways(cycle), width),
         tension=sides[0],
         compression=sides[1],
     )
@@ -149,15 +158,25 @@ def _lost_motion(loop: Loop, high: float, low: float) -> float:
     return at_zero[0] - at_zero[1]
 
 
-def _main_pass(loop: Loop) -> slice:
-    """The records from one extreme to the other, whichever comes first."""
-    ends = sorted((int(np.argmax(loop.drive)), int(np.argmin(loop.drive))))
-    return slice(ends[0], ends[1] + 1)
+def _ways(loop: Loop) -> list[slice]:
+    """The records from one extreme to the other, whichever comes first, and of a closed cycle those back."""
+    turns = turns_of(loop.drive)[:CLOSED]
+    return [slice(one, other + 1) for one, other in zip(turns[:-1], turns[1:], strict=True)]
+
+
+def _sides(loop: Loop, turns: list[int], width: float) -> tuple[float, float]:
+    """Slopes of the two sides in N/m; nan where they cannot be told from the width of a loop that does not close."""
+    if len(turns) >= CLOSED:
+        cycles = loop.part(closed_cycles(turns))
+        return sides_of(cycles.force, cycles.deflection, drift=True)
+    sides = sides_of(loop.force, loop.deflection)
+    farthest = min(float(loop.force.max()), -float(loop.force.min()))
+    return (math.nan, math.nan) if abs(1.0 / sides[0] - 1.0 / sides[1]) * farthest < width else sides
 
 
 def _loop_width(loop: Loop) -> float:
     """The way from extreme to extreme against the way there and the way back, at the forces of the latter."""
-    main = _main_pass(loop)
+    main = _ways(loop)[0]
     order = np.argsort(loop.force[main], kind="stable")
     force, deflection = loop.force[main][order], loop.deflection[main][order]
     other = np.r_[0 : main.start, main.stop : len(loop.force)].astype(int)
@@ -168,7 +187,7 @@ def _loop_width(loop: Loop) -> float:
 
 
 def _linearity(loop: Loop, deflection: float) -> float:
-    main = _main_pass(loop)
+    main = _ways(loop)[0]
     force, read = loop.force[main], loop.deflection[main]
     secant = read[0] + (read[-1] - read[0]) * (force - force[0]) / (force[-1] - force[0])
     return float(np.abs(read - secant).max() / deflection)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,11 @@ class Loop:
     def same(self) -> float:
         """How close two records' `drive` is at one step."""
         return NEAR_END * float(np.ptp(self.force)) if self.jog is None else SAME_JOG
+
+    def part(self, records: slice) -> Loop:
+        """The same test, of some of its records."""
+        jog = None if self.jog is None else self.jog[records]
+        return replace(self, jog=jog, force=self.force[records], displacement=self.displacement[records])
 
     @property
     def title(self) -> str:
