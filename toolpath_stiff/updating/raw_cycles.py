@@ -1,14 +1,15 @@
 """Cycles of a loop of raw records: where the drive turns, the last closed cycle, a secant free of drift.
 
 A test rig goes up and down several times. The first way is that of a strut that was never loaded (a virgin curve), and
-seating, creep and a warm sensor carry the deflection away slowly; neither is stiffness. So with three turns or more, high,
-low, high, the secant is taken from second differences of the turns, in which a steady drift cancels, as a weighing
-A B A does (OIML R 111-1:2004, C.4), and the shape of the loop is that of its last closed cycle.
+seating, creep and a warm sensor carry the deflection away slowly; neither is stiffness. So with three turns or more
+(high, low, high) the secant is taken from second differences of the turns, in which a steady drift cancels, as in a
+weighing A B A (OIML R 111-1:2004, C.4), and the shape of the loop is that of its last closed cycle.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ def ends_without_drift(
     same
         Records whose drive is this close to that of their turn are averaged.
     """
-    middles = [(one + other) // 2 for one, other in zip(turns[:-1], turns[1:], strict=True)]
+    middles = [(one + other) // 2 for one, other in pairwise(turns)]
     bounds = [0, *(at + 1 for at in middles), len(drive)]
     means = []
     for turn, start, stop in zip(turns, bounds[:-1], bounds[1:], strict=True):
