@@ -123,7 +123,38 @@ class InputErrors(TpsError):
 
     def __init__(self, errors: Iterable[InputError]) -> None:
         self.errors = tuple(errors)
-        super().__init__("\n".join(str(error) for error in self.errors))
+        super().__init__("\n".join(_told_once(self.errors)))
+
+
+SAME = 3  # errors that say the same of further lines than these are told of together
+
+
+def _told_once(errors: Iterable[InputError]) -> list[str]:
+    """The messages; of many that differ in nothing but the line the first, and the lines of the others."""
+    groups: dict[tuple[str | None, str, str, str], list[InputError]] = {}
+    for error in errors:
+        groups.setdefault((error.file, error.found, error.expected, error.hint), []).append(error)
+    told = []
+    for error in errors:
+        group = groups[error.file, error.found, error.expected, error.hint]
+        lines = [one.line for one in group if one.line is not None]
+        if len(group) <= SAME or len(lines) < len(group):
+            told.append(str(error))
+        elif error is group[0]:
+            where = f"{error.file}: " if error.file else ""
+            told += [str(error), f"{where}the same in {len(group) - 1} further lines: {_ranges(lines[1:])}"]
+    return told
+
+
+def _ranges(lines: list[int]) -> str:
+    """Rising line numbers, runs of them as 3-17."""
+    runs: list[list[int]] = []
+    for line in lines:
+        if runs and line == runs[-1][1] + 1:
+            runs[-1][1] = line
+        else:
+            runs.append([line, line])
+    return ", ".join(f"{one}" if one == other else f"{one}-{other}" for one, other in runs)
 
 
 class FileError(InputError):

@@ -13,6 +13,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
 from functools import cache
 
 from toolpath_stiff.errors import InputError, InputErrors, TableError
@@ -20,12 +21,20 @@ from toolpath_stiff.files import decoded, read_bytes
 from toolpath_stiff.workbook import SPREADSHEET_ERROR, Grid, counts, is_workbook, sheet_grid, split_name, typed
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
-LOOKED_AT = 20  # rows among which the heading is searched
+LOOKED_AT = 60  # rows among which the heading is searched
 HEADING_FROM = 3  # known columns in a row make it the heading, so that titles may stand above it
+FEWEST = 2  # known columns of a heading, where no row has so many
 # Tokens of units, as `_key` makes them: those of the columns and those that stand there by mistake.
 LENGTHS, FORCES = ("nm", "um", "mm", "cm", "m", "in", "inch"), ("n", "kn")
 OTHERS = ("n_per_um", "n_per_mm", "n_per_m", "kn_per_mm", "deg", "rad", "mrad", "s", "min", "h", "c", "k", "f", "%")
 UNITS = frozenset((*LENGTHS, *FORCES, *OTHERS))
+# Units of one quantity by their size, as ratios of whole numbers (BIPM: The International System of Units, 9th ed.).
+SCALES: tuple[Mapping[str, tuple[int, int]], ...] = (
+    {"nm": (1, 10**9), "um": (1, 10**6), "mm": (1, 1000), "cm": (1, 100), "m": (1, 1)},
+    {"n": (1, 1), "kn": (1000, 1)},
+    {"s": (1, 1), "min": (60, 1), "h": (3600, 1)},
+    {"n_per_m": (1, 1), "n_per_mm": (1000, 1), "n_per_um": (10**6, 1), "kn_per_mm": (10**6, 1)},
+)
 SAME_TOKEN = {"degc": "c", "degrees": "deg", "minutes": "min", "micron": "um", "microns": "um"}
 
 PLAIN = re.compile(r"[+-]?\d+(?:e[+-]?\d+)?", re.IGNORECASE)
@@ -42,10 +51,15 @@ __all__ = ["Columns", "Table", "parse_table", "read_table", "split_name"]
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns that a kind of table may have: those of numbers, named with their units, and those of text."""
+    """Columns that a kind of table may have: those of numbers, named with their units, and those of text.
+
+    With `converted`, another unit of the same quantity that a heading states is converted, as a logger's file is not
+    written by hand; else it is refused.
+    """
 
     numbers: tuple[str, ...]
     texts: tuple[str, ...] = ()
+    converted: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,6 +78,8 @@ class Table:
         Between the cells of a text file; "" for a sheet.
     notes
         What was read differently from how it is written, in words.
+    above
+        Line and cells of what stands above the heading.
     """
 
     file: str
@@ -72,6 +88,7 @@ class Table:
     rows: tuple[tuple[int, tuple[str, ...]], ...]
     separator: str
     notes: tuple[str, ...] = ()
+    above: tuple[tuple[int, tuple[str, ...]], ...] = ()
 
     def record(self, cells: Sequence[str]) -> dict[str, str]:
         """Column -> cell of one row. Raises `InputError` where a row has too few or too many."""
@@ -163,7 +180,11 @@ def _table(grid: Grid, file: str, columns: Columns) -> Table:
         body = body[1:]
     written = _as_wide(grid, written, [written, *(cells for _, cells in body)])
     _refuse_merged(grid, written, file, line)
-    heading = [_name(cell, unit, known, file, line) for cell, unit in _paired(written, units)]
+    factors = [_factor(cell, unit, known) if columns.converted else None for cell, unit in _paired(written, units)]
+    heading = [
+        factor[0] if factor else _name(cell, unit, known, file, line)
+        for factor, (cell, unit) in zip(factors, _paired(written, units), strict=True)
+    ]
     renamed = [f"{old!r} as {new}" for old, new in zip(written, heading, strict=True) if old != new]
     if renamed:
         notes.append(f"{file}: headings are read by their known names: {', '.join(renamed)}")
@@ -173,14 +194,22 @@ def _table(grid: Grid, file: str, columns: Columns) -> Table:
     rows, commas = with_points(heading, rows, numbers, grid.separator, file)
     if commas:
         notes.append(f"{file}: numbers are read with decimal commas")
-    return Table(file, tuple(heading), line, tuple((n, tuple(c)) for n, c in rows), grid.separator, tuple(notes))
+    scales = {i: factor[1:] for i, factor in enumerate(factors) if factor}
+    if scales:
+        rows = [(n, [_scaled(c, *scales[i]) if i in scales else c for i, c in enumerate(row)]) for n, row in rows]
+        told = ", ".join(f"{written[i]!r} to {heading[i]}" for i in scales)
+        notes.append(f"{file}: units are converted: {told}")
+    above = tuple((n, tuple(cells)) for n, cells in grid.rows[:at])
+    body_rows = tuple((n, tuple(c)) for n, c in rows)
+    return Table(file, tuple(heading), line, body_rows, grid.separator, tuple(notes), above)
 
 
 def _heading_row(grid: Grid, known: Mapping[str, str]) -> int:
-    """Row of the heading: the first with enough known columns, else the first."""
+    """Row of the heading: the first with enough known columns, else that with most of them, else the first."""
     top = min(len(grid.rows), LOOKED_AT)
     scores = [_score(cells, known) for _, cells in grid.rows[:top]]
-    return next((i for i, score in enumerate(scores) if score >= HEADING_FROM), 0)
+    most = scores.index(max(scores)) if max(scores) >= FEWEST else 0
+    return next((i for i, score in enumerate(scores) if score >= HEADING_FROM), most)
 
 
 def _as_wide(grid: Grid, heading: list[str], rows: list[list[str]]) -> list[str]:
@@ -267,6 +296,29 @@ def _name(written: str, unit: str, known: Mapping[str, str], file: str, line: in
     raise TableError(
         found, expected=name, hint=f"did you mean {name}? Otherwise give it another name", file=file, line=line
     )
+
+
+def _factor(written: str, unit: str, known: Mapping[str, str]) -> tuple[str, int, int] | None:
+    """The known name, and the ratio by which numbers in the unit that the heading states become those of its own."""
+    key = "_".join(filter(None, (_key(written), _key(unit))))
+    name = None if _key(written) in known or key in known else _meant(key, known)
+    base = _without_unit(_key(name)) if name else None
+    if name is None or not base or not key.startswith(f"{base}_"):
+        return None
+    stated, own = key[len(base) + 1 :], _key(name)[len(base) + 1 :]
+    for scale in SCALES:
+        if stated in scale and own in scale:
+            (up, down), (own_up, own_down) = scale[stated], scale[own]
+            return name, up * own_down, down * own_up
+    return None
+
+
+def _scaled(cell: str, up: int, down: int) -> str:
+    """A number in another unit, without a rounding where the ratio is decimal; other cells as they are."""
+    try:
+        return str(Decimal(cell) * up / down)
+    except InvalidOperation:
+        return cell
 
 
 def _refuse_merged(grid: Grid, heading: Sequence[str], file: str, line: int) -> None:

@@ -9,7 +9,7 @@ from toolpath_stiff.updating.raw_shape import shape_of
 
 UP = np.linspace(0.0, 1000.0, 9)
 FORCE = np.concatenate([UP, np.linspace(1000.0, -1000.0, 17)[1:], -UP[::-1][1:]])
-MAIN = slice(8, 25)
+MAIN = [slice(8, 25)]
 C = 20e-9  # m/N
 
 
@@ -62,4 +62,4 @@ def test_softer_in_tension():
 def test_work_lost_is_the_area():
     """A parallelogram of 2 x 1000 N by 3 um."""
     force = np.array([1000.0, -1000.0, -1000.0, 1000.0])
-    assert shape_of(force, C * force + np.array([0.0, 0.0, 3e-6, 3e-6]), slice(0, 2)).lost == pytest.approx(6e-3)
+    assert shape_of(force, C * force + np.array([0.0, 0.0, 3e-6, 3e-6]), [slice(0, 2)]).lost == pytest.approx(6e-3)

@@ -38,7 +38,7 @@ def records(stiffness: float, gauge: float, gap: float = 0.0, friction: float = 
 
 
 def reduced(text: str):
-    (loop,) = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS))
+    (loop,) = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS)).loops
     return reduce_loop(loop)
 
 
@@ -90,7 +90,7 @@ def test_drift_opens_the_loop():
 
 def test_loops_are_told_apart_and_come_in_order():
     text = records(40.0, 30.0, where="0,0,800,Z,B") + records(30.0, 30.0) + records(35.0, 30.0, where="0,0,800,Y,B")
-    loops = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS))
+    loops = read_raw(parse_table(HEADING + text, "raw.csv", COLUMNS)).loops
     assert [loop.place["direction"] + loop.place["point"] for loop in loops] == ["ZB", "XA", "YB"]
     assert [round(reduce_loop(loop).stiffness / 1e6, 6) for loop in loops] == [40.0, 30.0, 35.0]
 
@@ -141,7 +141,7 @@ def test_json_without_plots(raw, capsys):
     [
         ("", "the file is empty"),
         (HEADING, "no records"),
-        (HEADING.replace("jog_um", "jog_mm") + "0,0,800,X,A,1,1,1\n", "unknown column 'jog_mm'"),
+        (HEADING.replace("jog_um", "jog_inch") + "0,0,800,X,A,1,1,1\n", "unknown column 'jog_inch'"),
         (HEADING.replace(",jog_um", "") + "0,0,800,X,A,1,1\n", "column jog_um is missing"),
         (HEADING.replace(",direction", "") + "0,0,800,A,1,1,1\n", "no direction"),
         (HEADING + "0,0,800,X,A,0,0\n", "raw.csv:2: row with 7 cells; expected 8"),

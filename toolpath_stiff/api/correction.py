@@ -51,8 +51,8 @@ class Reduction(Result):
 
     command: ClassVar[str] = "reduce"
 
-    def __init__(self, reduced: Reduced, raw: str) -> None:
-        self.reduced, self.raw = reduced, raw
+    def __init__(self, reduced: Reduced, raw: Sequence[str]) -> None:
+        self.reduced, self.raw = reduced, tuple(raw)
 
     @property
     def notes(self) -> list[str]:
@@ -75,7 +75,7 @@ class Reduction(Result):
         """Force against deflection of each loop."""
         from toolpath_stiff.report.measuring import loops_png
 
-        return loops_png.figure(self.reduced.loops, self.reduced.figures, Path(self.raw).name)
+        return loops_png.figure(self.reduced.loops, self.reduced.figures, self._title)
 
     def __str__(self) -> str:
         from toolpath_stiff.report.history import history_text
@@ -83,14 +83,20 @@ class Reduction(Result):
 
         return "\n".join([loops_text(self.to_dict()["loops"]), *history_text(self.reduced.history)])
 
+    @property
+    def _title(self) -> str:
+        """The first file, and how many others there are."""
+        name, others = Path(self.raw[0]).name, len(self.raw) - 1
+        return f"{name} and {others} more" if others else name
+
     def _short(self) -> str:
-        return f"{Path(self.raw).name}, {len(self.reduced.loops)} loops"
+        return f"{self._title}, {len(self.reduced.loops)} loops"
 
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
         """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
         from toolpath_stiff.report.measuring import loop_files
 
-        return loop_files(self.reduced, Path(file), Path(self.raw).name, plots=plots)
+        return loop_files(self.reduced, Path(file), self._title, plots=plots)
 
     def save(self, file: str | Path, *, plots: bool = True) -> list[Path]:
         """Write the measurement file and, beside it, the picture of the loops."""
@@ -99,18 +105,18 @@ class Reduction(Result):
         return [write_atomically(name, content) for name, content in self.files(file, plots=plots).items()]
 
 
-def reduce(raw: str | Path) -> Reduction:
+def reduce(*raw: str | Path) -> Reduction:
     """Raw records of force and displacement to measured stiffnesses: the secant of each loop (the paper's equation 12).
 
     Parameters
     ----------
     raw
-        CSV, or FILE.xlsx[#SHEET].
+        One file or several: CSV, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their stiffnesses.
 
     Raises
     ------
     InputError, InputErrors
-        The file cannot be read, lacks columns; every record and every loop that gives no stiffness.
+        No file, or one that cannot be read or lacks columns; every record and every loop that gives no stiffness.
 
     Examples
     --------
@@ -127,7 +133,9 @@ def reduce(raw: str | Path) -> Reduction:
     """
     from toolpath_stiff.updating.raw import reduce as reduce_records
 
-    return Reduction(reduce_records(raw), str(raw))
+    if not raw:
+        raise InputError("no raw records", expected="a file or several")
+    return Reduction(reduce_records(*raw), [str(one) for one in raw])
 
 
 class Update(FolderResult):

@@ -118,7 +118,10 @@ columns of RAW:
   force_N,displacement_um      gauge and indicator, positive the way the jog counts
   date                         ISO 8601, as 2024-03-31; each date is a loop of its own
   point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
-of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um, length_mm if known; no pose and no jog
+of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um, length_mm if known; no pose and no jog;
+                               or strut, date, stiffness_N_per_mm of struts that were reduced elsewhere
+Another unit in a heading (force_kN, Displacement [mm]) is converted; further columns are not used. In a file of one
+strut, strut and date may stand above the heading (strut: 3) or in the file's name (strut3_2021-09-16.csv).
 
 Records in the order taken, jogging 0, +200, -200, 0 um as ASME B5.54 and the paper do; those of one point, direction,
 set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's equation 12);
@@ -131,9 +134,11 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = REDUCE_EPILOG
-    parser.add_argument("raw", metavar="RAW", help="raw records: CSV, or FILE.xlsx[#SHEET]")
+    parser.add_argument("raw", nargs="+", metavar="RAW", help="raw records: CSV, or FILE.xlsx[#SHEET]")
     parser.add_argument(
-        "--out", metavar="FILE", help="measurement file to write (default: <name>_measurements.csv); loops go beside it"
+        "--out",
+        metavar="FILE",
+        help="measurement file to write (default: <first RAW>_measurements.csv); loops go beside it",
     )
     add_replace_option(parser)
     parser.add_argument("--no-plots", action="store_true", help="do not draw the loops")
@@ -147,8 +152,8 @@ def reduce(args: argparse.Namespace) -> int:
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.tables import split_name
 
-    found = reduce(args.raw)
-    out = Path(args.out or f"{Path(split_name(args.raw)[0]).stem}_measurements.csv")
+    found = reduce(*args.raw)
+    out = Path(args.out or f"{Path(split_name(args.raw[0])[0]).stem}_measurements.csv")
     files = found.files(out, plots=not args.no_plots)
     keep(check_written(args, files), quiet=args.json)
     written = [str(write_atomically(name, content)) for name, content in files.items()]

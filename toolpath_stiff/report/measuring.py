@@ -309,8 +309,11 @@ def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str)
 def loop_files(reduction: Reduction, out: Path, title: str, *, plots: bool = True) -> dict[Path, Content]:
     """The measurement file, and with `plots` the loops drawn under `title`; dated struts over their dates."""
     contents: dict[Path, Content] = {out: measurement_csv(reduction.loops, reduction.figures)}
+    recorded = [i for i, loop in enumerate(reduction.loops) if len(loop.force)]
     if plots:
-        contents[out.with_name(f"{out.stem}_loops.png")] = loops_png(reduction.loops, reduction.figures, title)
+        if recorded:
+            loops, figures = [reduction.loops[i] for i in recorded], [reduction.figures[i] for i in recorded]
+            contents[out.with_name(f"{out.stem}_loops.png")] = loops_png(loops, figures, title)
         if dated(reduction.history):
             contents[out.with_name(f"{out.stem}_history.png")] = history_png(reduction.history)
     return contents
@@ -321,7 +324,8 @@ def loops_text(entries: Sequence[Mapping[str, Any]]) -> str:
     heading = ("loop", "N/mm", "force N", "deflection um", "lost motion um", "width um", "linearity %", "closure um")
     rows: list[tuple[str, ...]] = [heading]
     for one in entries:
-        cells = [one["loop"], f"{one['stiffness_N_per_mm']:.0f}", f"{one['force_N']:.0f}"]
+        force = "-" if one["force_N"] is None else f"{one['force_N']:.0f}"
+        cells = [one["loop"], f"{one['stiffness_N_per_mm']:.0f}", force]
         for name in ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um"):
             cells.append("-" if one[name] is None else f"{one[name] + 0.0:.1f}")
         rows.append(tuple(cells))

@@ -34,6 +34,9 @@ DRAWS = 2000  # simulated sets of series
 FEWEST_DIFFERENCES = 6  # that are left of all struts, from which the scatter is estimated
 TRIMMED = 0.2  # of a strut's differences, at least one
 MOUNTING = 0.02  # relative sd from date to date where the data cannot say; assumed: mounting, load cell, indicator
+# Relative sd, the same on all dates, of a difference of tension and compression; assumed: load cell, indicator and
+# friction are not alike on both sides of zero.
+BOTH_SIDES = 0.01
 RESOLUTION = 1e-4  # relative; no scatter is believed to be less: rounding of the readings; assumed
 SIZE = 0.1  # prior sd of a change of ln stiffness; assumed, for step and drift alike
 DECISIVE = 20.0  # ratio of marginal likelihoods, Kass and Raftery's "strong"
@@ -463,7 +466,7 @@ def _sides(readings: Readings) -> dict[str, SidesEntry]:
         one, freedom = MOUNTING * 2.0**0.5, 10**6
     entries = {}
     for name, (apart, pull, push) in found.items():
-        error = one / len(apart) ** 0.5
+        error = float(np.hypot(one / len(apart) ** 0.5, BOTH_SIDES))
         p = min(1.0, len(found) * 2.0 * float(student.sf(abs(apart.mean()) / error, freedom)))
         entries[name] = _side_entry(name.replace(" alone", ""), float(apart.mean()), 0.5 * (pull + push), error, p)
     return entries

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TypedDict, cast
 
@@ -28,7 +29,23 @@ from toolpath_stiff.tables import read_table
 from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.dates import day_of
 from toolpath_stiff.updating.history import HistoryDocument, Readings, history
-from toolpath_stiff.updating.raw_records import COLUMNS, CONDITIONS, PLACE, SAME_JOG, Loop, read_raw
+from toolpath_stiff.updating.raw_cycles import (
+    closed_cycle,
+    closed_cycles,
+    ends_without_drift,
+    stands_still,
+    turns_of,
+)
+from toolpath_stiff.updating.raw_records import (
+    COLUMNS,
+    CONDITIONS,
+    PLACE,
+    SAME_JOG,
+    Loop,
+    is_table,
+    read_raw,
+    read_stiffnesses,
+)
 from toolpath_stiff.updating.raw_shape import Shape, shape_of, sides_of
 from toolpath_stiff.updating.rows import (
     DATE,
@@ -37,7 +54,9 @@ from toolpath_stiff.updating.rows import (
 )
 
 FloatArray = NDArray[np.float64]
+USUAL = 5e3, 1e6  # N/mm, of machine tools' struts and spindles; assumed, to tell what a wrong unit may be
 ONE_SIDE = 0.05  # of the range: a force set on a bench that goes less far to the other side is of one side
+CLOSED = 3  # turns of the drive, from which the records hold a closed cycle
 FIGURES = ("lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
 
 
@@ -80,8 +99,17 @@ class LoopFigures:
     tension: float = math.nan
     compression: float = math.nan
 
+    @property
+    def side(self) -> float:
+        """1 of a tension that is stated, -1 of a compression, 0 where neither is."""
+        return 0.0 if math.isnan(self.force) else math.copysign(1.0, self.force)
 
-def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
+
+NO_FIGURES = LoopFigures(*(math.nan,) * 7, Shape())
+STEPS = 3.0  # of the indicator, that it misses while it stands still, from which that is told of
+
+
+def reduce_loop(loop: Loop) -> LoopFigures:
     """Stiffness by the paper's equation 12, and what the loop says about play, friction and linearity.
 
     Raises
@@ -89,8 +117,8 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
     InputError
         The loop does not reach both sides, or gives no stiffness that could be.
     """
-    where = {"file": file or None, "line": loop.line}
-    drive, same = loop.drive, loop.same
+    where = {"file": loop.file or None, "line": loop.line}
+    drive = loop.drive
     high, low = float(drive.max()), float(drive.min())
     if loop.jog is not None and not (low < -SAME_JOG and high > SAME_JOG):
         raise MeasurementError(
@@ -98,37 +126,55 @@ def reduce_loop(loop: Loop, file: str = "") -> LoopFigures:
             expected="extremes on both sides of zero, as 0, +200, -200, 0 um",
             **where,  # type: ignore[arg-type]
         )
-    at_high, at_low = drive >= high - same, drive <= low + same
-    force = float(loop.force[at_high].mean() - loop.force[at_low].mean())
-    deflection = float(loop.deflection[at_high].mean() - loop.deflection[at_low].mean())
+    turns = turns_of(drive)
+    if len(turns) >= CLOSED:
+        ends = ends_without_drift(drive, loop.force, loop.deflection, turns, loop.same)
+        force, deflection = ends.force, ends.deflection
+    else:
+        at_high, at_low = drive >= high - loop.same, drive <= low + loop.same
+        force = float(loop.force[at_high].mean() - loop.force[at_low].mean())
+        deflection = float(loop.deflection[at_high].mean() - loop.deflection[at_low].mean())
     stiffness = force / deflection if deflection else math.inf
     if not SOFTEST <= n_per_mm_from_n_per_m(stiffness) <= STIFFEST:
         raise MeasurementError(
             f"{loop.title}: {force:g} N over a deflection of {um_from_m(deflection):g} um",
             expected=f"{SOFTEST:g} to {STIFFEST:g} N/mm",
-            hint="tension and stretch are positive; a slope needs two forces"
-            if loop.jog is None
-            else "force, jog and displacement count positive the same way; displacement is what the indicator read",
+            hint=_hint(loop, stiffness),
             **where,  # type: ignore[arg-type]
         )
-    sides = (math.nan, math.nan) if loop.jog is not None else sides_of(loop.force, loop.deflection)
+    cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
+    width = _loop_width(cycle)
+    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width)
     return LoopFigures(
         stiffness=stiffness,
         force=one_side * force if (one_side := side_of(loop)) else force / 2.0,
         deflection=deflection,
-        lost_motion=_lost_motion(loop, high, low),
-        loop_width=_loop_width(loop),
-        linearity=_linearity(loop, deflection),
+        lost_motion=_lost_motion(cycle, float(cycle.drive.max()), float(cycle.drive.min())),
+        loop_width=width,
+        linearity=_linearity(cycle, deflection),
         closure=float(loop.deflection[-1] - loop.deflection[0]),
-        shape=shape_of(loop.force, loop.deflection, _main_pass(loop)),
+        shape=shape_of(cycle.force, cycle.deflection, _ways(cycle), width),
         tension=sides[0],
         compression=sides[1],
     )
 
 
+def _hint(loop: Loop, stiffness: float) -> str:
+    """What may be wrong with a loop that gives no stiffness that could be."""
+    if loop.jog is not None:
+        return "force, jog and displacement count positive the same way; displacement is what the indicator read"
+    if stiffness < 0.0:
+        return "tension and stretch are positive: one of the two columns counts the other way; turn its sign"
+    rules = "Tension and stretch are positive; a slope needs two forces"
+    for factor, words in ((1e3, "the force in kN"), (1e-3, "the displacement in mm"), (1e6, "both in kN and mm")):
+        if USUAL[0] <= factor * n_per_mm_from_n_per_m(stiffness) <= USUAL[1]:
+            return f"is {words}? Name the unit in the heading (force_kN, displacement_mm): it is converted. {rules}"
+    return rules
+
+
 def side_of(loop: Loop) -> float:
     """1 of a bench record under tension alone, -1 under compression alone, 0 of any other loop."""
-    if loop.jog is not None:
+    if loop.jog is not None or not len(loop.force):
         return 0.0
     least = ONE_SIDE * float(np.ptp(loop.force))
     return 1.0 if loop.force.min() >= -least else -1.0 if loop.force.max() <= least else 0.0
@@ -137,7 +183,7 @@ def side_of(loop: Loop) -> float:
 def _lost_motion(loop: Loop, high: float, low: float) -> float:
     """Straight lines through the outer half of each side, both passes; their distance at zero force."""
     drive, same, at_zero = loop.drive, loop.same, []
-    if not low < 0.0 < high:
+    if not low < 0.0 < high or side_of(loop):
         return math.nan
     for outer in (drive >= 0.5 * high - SAME_JOG, drive <= 0.5 * low + SAME_JOG):
         force, deflection = loop.force[outer], loop.deflection[outer]
@@ -149,15 +195,25 @@ def _lost_motion(loop: Loop, high: float, low: float) -> float:
     return at_zero[0] - at_zero[1]
 
 
-def _main_pass(loop: Loop) -> slice:
-    """The records from one extreme to the other, whichever comes first."""
-    ends = sorted((int(np.argmax(loop.drive)), int(np.argmin(loop.drive))))
-    return slice(ends[0], ends[1] + 1)
+def _ways(loop: Loop) -> list[slice]:
+    """The records from one extreme to the other, whichever comes first, and of a closed cycle those back."""
+    turns = turns_of(loop.drive)[:CLOSED]
+    return [slice(one, other + 1) for one, other in pairwise(turns)]
+
+
+def _sides(loop: Loop, turns: list[int], width: float) -> tuple[float, float]:
+    """Slopes of the two sides in N/m; nan where they cannot be told from the width of a loop that does not close."""
+    if len(turns) >= CLOSED:
+        cycles = loop.part(closed_cycles(turns))
+        return sides_of(cycles.force, cycles.deflection, drift=True)
+    sides = sides_of(loop.force, loop.deflection)
+    farthest = min(float(loop.force.max()), -float(loop.force.min()))
+    return (math.nan, math.nan) if abs(1.0 / sides[0] - 1.0 / sides[1]) * farthest < width else sides
 
 
 def _loop_width(loop: Loop) -> float:
     """The way from extreme to extreme against the way there and the way back, at the forces of the latter."""
-    main = _main_pass(loop)
+    main = _ways(loop)[0]
     order = np.argsort(loop.force[main], kind="stable")
     force, deflection = loop.force[main][order], loop.deflection[main][order]
     other = np.r_[0 : main.start, main.stop : len(loop.force)].astype(int)
@@ -168,7 +224,7 @@ def _loop_width(loop: Loop) -> float:
 
 
 def _linearity(loop: Loop, deflection: float) -> float:
-    main = _main_pass(loop)
+    main = _ways(loop)[0]
     force, read = loop.force[main], loop.deflection[main]
     secant = read[0] + (read[-1] - read[0]) * (force - force[0]) / (force[-1] - force[0])
     return float(np.abs(read - secant).max() / deflection)
@@ -187,18 +243,18 @@ class Reduction:
     history: HistoryDocument
 
 
-def reduce(raw: str | Path) -> Reduction:
+def reduce(*raw: str | Path) -> Reduction:
     """Raw records of force and displacement to measured stiffnesses.
 
     Parameters
     ----------
     raw
-        A file: CSV, or FILE.xlsx[#SHEET].
+        Files: CSV, or FILE.xlsx[#SHEET]; or tables of struts' stiffnesses, whose history is looked at.
 
     Raises
     ------
     InputError
-        The file cannot be read, has not the right columns, or no records.
+        A file cannot be read, has not the right columns, or no records.
     InputErrors
         Bad records, or loops that give no stiffness, all of them.
 
@@ -213,10 +269,39 @@ def reduce(raw: str | Path) -> Reduction:
     >>> document(found)[0]["stiffness_N_per_mm"]
     50000.0
     """
-    table = read_table(str(raw), "raw records", COLUMNS)
-    loops = read_raw(table)
-    figures = reduce_loops(loops, str(raw))
-    return Reduction(tuple(loops), tuple(figures), tuple(table.notes), _history(loops, figures))
+    loops: list[Loop] = []
+    figures: list[LoopFigures] = []
+    notes: list[str] = []
+    for file in raw:
+        table = read_table(str(file), "raw records", COLUMNS)
+        if is_table(table):
+            records, known = read_stiffnesses(table)
+            own = [replace(NO_FIGURES, stiffness=stiffness, force=force) for stiffness, force in known]
+        else:
+            records = read_raw(table)
+            own = reduce_loops(records.loops)
+        loops += records.loops
+        figures += own
+        notes += [*table.notes, *records.notes]
+    notes += _stuck(loops, figures)
+    return Reduction(tuple(loops), tuple(figures), tuple(notes), _history(loops, figures))
+
+
+def _stuck(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> list[str]:
+    """A note where indicators stood still while the force went on."""
+    found = []
+    for loop, one in zip(loops, figures, strict=True):
+        still = None if not len(loop.force) else stands_still(loop.force, loop.displacement, turns_of(loop.drive))
+        if loop.jog is None and still and abs(still[2] - still[1]) / one.stiffness > STEPS * loop.resolution:
+            found.append((loop.title, still))
+    if not found:
+        return []
+    title, (displacement, start, end) = found[0]
+    others = f"; so in {len(found) - 1} further loops" if len(found) > 1 else ""
+    return [
+        f"{title}: the indicator stands still at {um_from_m(displacement):g} um while the force goes on from "
+        f"{start:.4g} to {end:.4g} N: at the end of its range? The stiffness is too high then{others}"
+    ]
 
 
 def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDocument:
@@ -237,7 +322,7 @@ def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDo
             np.array([side for _, _, side in chosen]),
         )
 
-    secants = [(loop, one.stiffness, side_of(loop)) for loop, one in rows]
+    secants = [(loop, one.stiffness, one.side if not len(loop.force) else side_of(loop)) for loop, one in rows]
     slopes = [(loop, k, s) for loop, one in rows for k, s in ((one.tension, 1.0), (one.compression, -1.0))]
     slopes = [one for one in slopes if math.isfinite(one[1])]
     return history(readings(secants), readings(slopes or secants))
@@ -286,8 +371,8 @@ class LoopEntry(TypedDict):
     loop: str
     line: int
     stiffness_N_per_mm: float
-    force_N: float
-    deflection_um: float
+    force_N: float | None
+    deflection_um: float | None
     lost_motion_um: float | None
     loop_width_um: float | None
     linearity_percent: float | None
@@ -295,12 +380,12 @@ class LoopEntry(TypedDict):
     shape: ShapeEntry
 
 
-def reduce_loops(loops: Iterable[Loop], file: str = "") -> list[LoopFigures]:
+def reduce_loops(loops: Iterable[Loop]) -> list[LoopFigures]:
     """Figures of every loop. Raises `InputErrors` that name all loops that give none."""
     figures, errors = [], []
     for loop in loops:
         try:
-            figures.append(reduce_loop(loop, file))
+            figures.append(reduce_loop(loop))
         except InputError as error:
             errors.append(error)
     if errors:
@@ -323,12 +408,13 @@ def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> st
     shown = [shop_figures(one) for one in figures]
     there = [name for name in FIGURES if all(math.isfinite(one[name]) for one in shown)]
     alone = [loop.jog is None for loop in loops]
-    place = [n for n in PLACE if n in loops[0].place and not (all(alone) and not any(x.place[n] for x in loops))]
+    place = [n for n in PLACE if any(n in x.place for x in loops)]
+    place = [n for n in place if not all(alone) or any(x.place.get(n) for x in loops)]
     conditions = [name for name in CONDITIONS if all(name in loop.conditions for loop in loops)]
     rows = []
     for loop, one, own in zip(loops, figures, shown, strict=True):
-        cells = [loop.place[name] for name in place]
-        force = f"{one.force:.2f}"
+        cells = [loop.place.get(name, "") for name in place]
+        force = f"{one.force:.2f}" if math.isfinite(one.force) else ""
         cells += [f"{n_per_mm_from_n_per_m(one.stiffness):.1f}"]
         cells += ([""] if loop.jog is None else [force]) * (not all(alone))
         cells += ([force] if loop.jog is None else [""]) * any(alone)

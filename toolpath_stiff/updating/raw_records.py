@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import math
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +15,10 @@ from numpy.typing import NDArray
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.stiffness.effects.measuring_loop import TIP, MeasuringLoop, measuring_loop
 from toolpath_stiff.tables import Columns, Table
-from toolpath_stiff.units import m_from_um
+from toolpath_stiff.units import m_from_um, n_per_m_from_n_per_mm
 from toolpath_stiff.updating.dates import day_of
 from toolpath_stiff.updating.loops import loop_of
+from toolpath_stiff.updating.raw_labels import STRUT, told_of_all
 from toolpath_stiff.updating.rows import (
     ANGLES,
     DATE,
@@ -41,15 +45,21 @@ PLACE = (
     DATE,
 )  # what one loop has in common
 CONDITIONS = ("time_min", "temperature_C")
+STIFFNESS = ("stiffness_N_per_mm", "strut_force_N")  # of a table of struts that were reduced elsewhere
 COLUMNS = Columns(
-    numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", "length_mm", *READINGS, *CONDITIONS),
+    numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", "length_mm", *READINGS, *CONDITIONS, *STIFFNESS),
     texts=("direction", *LABELS, DATE, "strut"),
+    converted=True,
 )
+BENCH = "strut,date,force_N,displacement_um of a strut on a bench"
+WHICH = "name the strut in a column, above the heading (`strut: 3`) or in the file's name (strut3_2021-09-16.csv)"
+MISSING = ("", "nan")  # what a logger writes for a reading that it lost
 SIGNED = {"force_N": 1e7, "displacement_um": 1e6, "jog_um": 1e6}  # largest magnitude, either sign
 NEAR_END = 0.02  # of the range of a force set on a bench: records this close are at its extreme, and averaged
 SHARED = 3  # records that a date-time needs to stand for a loop of its own
 SAME_JOG = 1e-9  # m: jogs this close are the same step
 DAY = len("2024-03-31")
+LIKE_DATE = re.compile(r"\d{4}[-/.]\d{2}[-/.]\d{2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}")
 
 
 @dataclass(frozen=True)
@@ -64,8 +74,8 @@ class Loop:
         Column -> mean of time and temperature, in the file's unit.
     jog, force, displacement
         (m,) m, N, m, along the direction. `jog` is None of a strut on a bench.
-    line
-        Line of the first record.
+    line, file
+        Line of the first record, and of which file.
     """
 
     place: Mapping[str, str]
@@ -74,6 +84,7 @@ class Loop:
     force: FloatArray
     displacement: FloatArray
     line: int
+    file: str = ""
 
     @property
     def deflection(self) -> FloatArray:
@@ -91,6 +102,17 @@ class Loop:
         return NEAR_END * float(np.ptp(self.force)) if self.jog is None else SAME_JOG
 
     @property
+    def resolution(self) -> float:
+        """m, the smallest step between two different readings of the indicator."""
+        steps = np.diff(np.unique(self.displacement))
+        return float(steps.min()) if len(steps) else 0.0
+
+    def part(self, records: slice) -> Loop:
+        """The same test, of some of its records."""
+        jog = None if self.jog is None else self.jog[records]
+        return replace(self, jog=jog, force=self.force[records], displacement=self.displacement[records])
+
+    @property
     def title(self) -> str:
         """Point or position, direction, set-up, repeat: whatever is there."""
         rest = [f"{name} {self.place[name]}" for name in ("setup", "clamp", "repeat") if self.place.get(name)]
@@ -102,8 +124,15 @@ class Loop:
         return ", ".join([where, way, *rest])
 
 
-def read_raw(table: Table) -> list[Loop]:
-    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`), in the order of their first record.
+class RawRecords(NamedTuple):
+    """Loops in the order of their first record, and what reading them left to be said."""
+
+    loops: list[Loop]
+    notes: list[str]
+
+
+def read_raw(table: Table) -> RawRecords:
+    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`).
 
     Raises
     ------
@@ -113,14 +142,21 @@ def read_raw(table: Table) -> list[Loop]:
         Bad records, all of them.
     """
     file = table.file
-    _check_heading(list(table.heading), file, table.heading_line)
+    same, notes = told_of_all(table)
+    unused = _check_heading([*table.heading, *same], file, table.heading_line)
+    if DATE not in (*table.heading, *same):
+        _refuse_unnamed_dates(table, unused)
+    notes += [f"{file}: column {name} is not used" for name in unused]
     if not table.rows:
         raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
     groups: dict[tuple[str, ...], list[Record]] = {}
-    errors = []
+    errors, lost = [], []
     for line, cells in table.rows:
         try:
-            record = table.record(cells)
+            record = {**table.record(cells), **same}
+            if _is_lost(record):
+                lost.append(line)
+                continue
             values = _values(record)
         except InputError as error:
             errors.append(MeasurementError(error.found, expected=error.expected, hint=error.hint, file=file, line=line))
@@ -131,8 +167,79 @@ def read_raw(table: Table) -> list[Loop]:
         groups.setdefault(key, []).append((line, record, values))
     if errors:
         raise InputErrors(errors)
-    found = [_loop(one) for records in groups.values() for one in _by_time(records)]
-    return sorted(found, key=lambda loop: loop.line)
+    if lost:
+        notes.append(f"{file}: {len(lost)} records without force or displacement are passed over, from line {lost[0]}")
+    found = [_loop(one, file) for records in groups.values() for one in _by_time(records)]
+    return RawRecords(sorted(found, key=lambda loop: loop.line), notes)
+
+
+def _refuse_unnamed_dates(table: Table, unused: list[str]) -> None:
+    """A column of dates by another name: without it the records of all dates would be one loop."""
+    for name in unused:
+        cells = {row[table.heading.index(name)][:DAY] for _, row in table.rows if len(row) == len(table.heading)}
+        if len(cells) > 1 and all(LIKE_DATE.match(cell) for cell in cells):
+            raise MeasurementError(
+                f"column {name!r} holds several dates, and there is no column date",
+                expected="date, so that the records of each are a loop of their own",
+                hint=f"rename {name} to date",
+                file=table.file,
+                line=table.heading_line,
+            )
+
+
+def is_table(table: Table) -> bool:
+    """Whether the rows are stiffnesses of struts that were reduced elsewhere."""
+    return STIFFNESS[0] in table.heading and "displacement_um" not in table.heading
+
+
+def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]]]:
+    """Struts alone of a table of stiffnesses: loops without records, and of each N/m and N (nan where not given).
+
+    Raises
+    ------
+    InputError, InputErrors
+        Rows that are not of a strut alone, have no stiffness or none that could be; all of them.
+    """
+    same, notes = told_of_all(table)
+    heading, errors = [*table.heading, *same], []
+    if "strut" not in heading and "loop" not in heading:
+        raise MeasurementError(
+            "stiffnesses without a column strut",
+            expected="strut,date,stiffness_N_per_mm of struts alone, or raw records",
+            hint="readings of the tip need no reduction: `tps compare` takes them",
+            file=table.file,
+            line=table.heading_line,
+        )
+    known = ("strut", *LABELS, DATE, "length_mm", *STIFFNESS)
+    notes += [f"{table.file}: column {name} is not used" for name in heading if name not in known]
+    loops, figures = [], []
+    for line, cells in table.rows:
+        try:
+            record = {**table.record(cells), **same}
+            if _loop_named(record).kind != "alone":
+                raise MeasurementError("a row of no strut", expected="strut 1 to 6")
+            day_of(record.get(DATE, ""))
+            optional_number(record, "length_mm")
+            own = n_per_m_from_n_per_mm(number(record, STIFFNESS[0])), optional_number(record, STIFFNESS[1])
+        except InputError as error:
+            errors.append(
+                MeasurementError(error.found, expected=error.expected, hint=error.hint, file=table.file, line=line)
+            )
+            continue
+        none = np.empty(0)
+        place = {name: record[name] for name in PLACE if record.get(name)}
+        loops.append(Loop(place, {}, None, none, none, line, table.file))
+        figures.append(own)
+    if errors:
+        raise InputErrors(errors)
+    if not loops:
+        raise MeasurementError("no rows below the heading", file=table.file, line=table.heading_line)
+    return RawRecords(loops, notes), figures
+
+
+def _is_lost(record: Mapping[str, str]) -> bool:
+    """Whether a record of a bench has lost its force or displacement."""
+    return not record.get("jog_um") and any(record.get(name, "").lower() in MISSING for name in READINGS[1:])
 
 
 def _values(record: dict[str, str]) -> list[float]:
@@ -175,30 +282,44 @@ def _by_time(records: list[Record]) -> list[list[Record]]:
     return list(times.values()) if min(map(len, times.values())) >= SHARED else [records]
 
 
-def _check_heading(heading: list[str], file: str, line: int) -> None:
-    for name in heading:
-        if name not in (*PLACE, *READINGS, *CONDITIONS, "strut"):
-            raise MeasurementError(
-                f"unknown column {name!r}",
-                expected=f"some of {', '.join((*PLACE, *READINGS, *CONDITIONS))}",
-                file=file,
-                line=line,
-            )
-        if heading.count(name) > 1:
-            raise MeasurementError(f"column {name} stands twice", file=file, line=line)
+def _check_heading(heading: list[str], file: str, line: int) -> list[str]:
+    """Columns that are not used. Raises `InputError` at the first thing that is wrong."""
+    known = (*PLACE, *READINGS, *CONDITIONS, "strut")
+    unused = [name for name in heading if name and name not in known]
     vector = "direction" not in heading
     angles = ANGLES if any(name in heading for name in ANGLES) else ()
     asked = (*POSITION, *angles, *(VECTOR if vector else ("direction",)), *READINGS)
-    if "strut" in heading or "loop" in heading:  # a strut on a bench has neither pose nor jog; others say so by record
-        asked = READINGS[1:]
+    bench = "strut" in heading or "loop" in heading  # has neither pose nor jog; others say so by record
+    if bench or not any(name in heading for name in (*POSITION, "jog_um")):
+        asked = (*(() if bench else ("strut",)), *READINGS[1:])
+    expected = f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}"
     for name in asked:
         if name not in heading:
+            near = next(iter(difflib.get_close_matches(name, unused, n=1, cutoff=0.85)), None)
             found = "no direction" if vector and name in VECTOR else f"column {name} is missing"
-            raise MeasurementError(
-                found, expected=f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}", file=file, line=line
-            )
+            hint = f"is it {near!r}?" if near else _to_do(name, unused)
+            raise MeasurementError(found, expected=expected, hint=hint, file=file, line=line)
+    for name in heading:
+        if heading.count(name) > 1:
+            raise MeasurementError(f"column {name} stands twice", file=file, line=line)
+    for name in unused:
+        near = next(iter(difflib.get_close_matches(name, known, n=1, cutoff=0.75)), None)
+        if near and near not in heading:
+            hint = f"did you mean {near}? Otherwise give it another name"
+            raise MeasurementError(f"unknown column {name!r}", hint=hint, file=file, line=line)
     if not vector and any(name in heading for name in VECTOR):
         raise MeasurementError("two directions", expected="direction, or dx,dy,dz", file=file, line=line)
+    return unused
+
+
+def _to_do(missing: str, unused: list[str]) -> str:
+    """What to do about a missing column."""
+    if missing == "strut" and sum(bool(STRUT.fullmatch(name)) for name in unused) > 1:
+        return "write one row a strut and date: columns of struts side by side are not read"
+    parts = [WHICH] if missing == "strut" else []
+    if unused:
+        parts.append(f"{', '.join(repr(name) for name in unused)} are not known: rename what is meant")
+    return "; ".join(parts)
 
 
 def _signed(record: Mapping[str, str], name: str) -> float:
@@ -213,7 +334,7 @@ def _signed(record: Mapping[str, str], name: str) -> float:
     return value
 
 
-def _loop(records: list[Record]) -> Loop:
+def _loop(records: list[Record], file: str) -> Loop:
     line, record, _ = records[0]
     jog, force, displacement, *conditions = np.array([values for _, _, values in records]).T
     return Loop(
@@ -223,4 +344,5 @@ def _loop(records: list[Record]) -> Loop:
         force=force,
         displacement=m_from_um(displacement),
         line=line,
+        file=file,
     )

@@ -1,6 +1,7 @@
 """The shape of a loop of raw records: kinks with their force and two slopes, tension against compression, work lost.
 
-Looked at is the way from extreme to extreme, deflection y over force F from F_0 on. Three shapes are tried beside the
+Looked at is the way from extreme to extreme, deflection y over force F from F_0 on, and of a closed cycle the way back
+as well, with a constant a of its own. Three shapes are tried beside the
 straight line, each with two compliances c and c':
 
     sticking      y = a + c d + (c' - c) max(d - 2 F_b, 0), d = |F - F_0|: joints stick after the load has turned,
@@ -15,6 +16,7 @@ Analysis, 4.2), its probability multiplied by the number of shapes and forces tr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,67 +71,92 @@ class Shape:
         return ""
 
 
-def shape_of(force: FloatArray, deflection: FloatArray, main: slice) -> Shape:
+def shape_of(force: FloatArray, deflection: FloatArray, ways: Sequence[slice], width: float = 0.0) -> Shape:
     """The shape of a loop.
 
     Parameters
     ----------
     force, deflection
         (m,) N and m, the records in their order; tension is positive.
-    main
-        The way from extreme to extreme.
+    ways
+        The way from extreme to extreme; of a closed cycle the way back as well, which tells friction, where both ways
+        curve apart, from two sides or a kink, where they go together.
+    width
+        m, of the loop. Of one way alone, sides that differ by less are not told of.
     """
     lost = _work_lost(force, deflection)
-    f, y = (_averaged(one[main]) for one in (force, deflection))
+    f, y, which = _averaged(force, deflection, ways)
     if len(f) < FEWEST or f.max() <= 0.0 or f.min() >= 0.0:
         return Shape(lost=lost)
-    tried = [("sides", np.nan, np.maximum(f, 0.0), np.minimum(f, 0.0)), *_sticking(f), *_kinks(f)]
+    constants = [(which == i).astype(float) for i in range(len(ways))]
+    tried = [("sides", np.nan, np.maximum(f, 0.0), np.minimum(f, 0.0)), *_sticking(f, which), *_kinks(f)]
     of_sides: Shape | None = None
-    straight = _left([f], y)[0]
+    straight = _left([f], y, constants)[0]
     best, chance, squares = Shape(lost=lost), SURE, {"": straight}
+    least: dict[str, float] = {}
     for kind, at, one, other in tried:
-        left, (_, first, second) = _left([one, other], y)
+        left, found_slopes = _left([one, other], y, constants)
+        first, second = found_slopes[-2:]
+        slopes = (abs(1.0 / first), abs(1.0 / second)) if first * second > 0.0 else (0.0, 0.0)
+        if left >= least.get(kind, np.inf) or not max(slopes) >= TELLING * min(slopes) > 0.0:
+            continue  # of one kind, what leaves more is the likelier chance
+        apart = abs(first - second) * min(float(f.max()), -float(f.min()))
+        if kind == "sides" and len(ways) == 1 and apart < width:
+            continue
+        least[kind] = left
         # A kink's force is fitted, too: one more figure than its two slopes.
         more = 1 if kind == "sides" else 2
-        found = _chance(straight, left, more, len(f) - 2 - more) * len(tried)
-        slopes = (abs(1.0 / first), abs(1.0 / second)) if first * second > 0.0 else (0.0, 0.0)
-        if found < chance and max(slopes) >= TELLING * min(slopes) > 0.0:
+        found = _chance(straight, left, more, len(f) - len(ways) - 1 - more) * len(tried)
+        if found < chance:
             best, chance, squares[kind] = Shape(kind, at, slopes[0], slopes[1], lost), found, left
             of_sides = best if kind == "sides" else of_sides
-    # On this way alone, sticking that breaks away near zero force looks like two sides, which has no force to fit.
+    # On one way alone, sticking that breaks away near zero force looks like two sides, which has no force to fit.
     if of_sides is not None and best is not of_sides:
-        gain = _chance(squares["sides"], squares[best.kind], 1, len(f) - 4) * len(tried)
+        gain = _chance(squares["sides"], squares[best.kind], 1, len(f) - len(ways) - 3) * len(tried)
         best = best if gain < SURE else of_sides
     return best
 
 
-def sides_of(force: FloatArray, deflection: FloatArray) -> tuple[float, float]:
+def sides_of(force: FloatArray, deflection: FloatArray, drift: bool = False) -> tuple[float, float]:
     """Stiffness in N/m under tension (positive force) and under compression; nan without `A_SIDE` records of both.
 
-    Slopes of two straight lines that meet at zero force, by least squares over all records.
+    Slopes of two straight lines that meet at zero force, by least squares over all records; with `drift`, of closed
+    cycles, beside a deflection that goes on steadily from record to record.
     """
     if min(len(np.unique(force[force > 0.0])), len(np.unique(force[force < 0.0]))) < A_SIDE:
         return np.nan, np.nan
-    pulled, pushed = _left([np.maximum(force, 0.0), np.minimum(force, 0.0)], deflection)[1][1:]
+    others = [np.ones_like(force)] + [np.arange(len(force), dtype=float)] * drift
+    pulled, pushed = _left([np.maximum(force, 0.0), np.minimum(force, 0.0)], deflection, others)[1][-2:]
     return (1.0 / float(pulled), 1.0 / float(pushed)) if min(pulled, pushed) > 0.0 else (np.nan, np.nan)
 
 
-def _averaged(values: FloatArray) -> FloatArray:
-    """At most `MOST` values, means of runs."""
-    if len(values) <= MOST:
-        return values
-    return np.array([run.mean() for run in np.array_split(values, MOST)])
+def _averaged(
+    force: FloatArray, deflection: FloatArray, ways: Sequence[slice]
+) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+    """Force, deflection and number of its way, at most `MOST` values of all ways, means of runs."""
+    most = MOST // len(ways)
+    found: list[list[FloatArray]] = []
+    for way in ways:
+        both = [force[way], deflection[way]]
+        if len(both[0]) > most:
+            both = [np.array([run.mean() for run in np.array_split(one, most)]) for one in both]
+        found.append(both)
+    which = np.repeat(np.arange(len(ways)), [len(one) for one, _ in found])
+    return np.concatenate([one for one, _ in found]), np.concatenate([other for _, other in found]), which
 
 
 Tried = tuple[str, float, FloatArray, FloatArray]
 
 
-def _sticking(force: FloatArray) -> list[Tried]:
-    """Kinks on the way back from the first extreme: what lies before them, and after them."""
-    way = np.abs(force - force[0])
+def _sticking(force: FloatArray, which: NDArray[np.int64]) -> list[Tried]:
+    """Kinks on the ways back from an extreme: what lies before them, and after them."""
+    starts = np.array([force[which == i][0] for i in range(which[-1] + 1)])
+    ends = np.array([force[which == i][-1] for i in range(which[-1] + 1)])
+    sign = np.sign(ends - starts)[which]
+    way = np.abs(force - starts[which])
     steps = np.sort(way)
-    forces = _between(steps[A_SIDE - 1 : 1 - A_SIDE])
-    return [("sticking", 0.5 * at, np.minimum(way, at), np.maximum(way - at, 0.0)) for at in forces]
+    forces = _between(np.unique(steps[A_SIDE - 1 : 1 - A_SIDE]))
+    return [("sticking", 0.5 * at, sign * np.minimum(way, at), sign * np.maximum(way - at, 0.0)) for at in forces]
 
 
 def _kinks(force: FloatArray) -> list[Tried]:
@@ -148,9 +175,9 @@ def _between(steps: FloatArray) -> list[float]:
     return sorted({float(at) for at in (steps[:-1, None] + np.diff(steps)[:, None] * shares).ravel()})
 
 
-def _left(columns: list[FloatArray], y: FloatArray) -> tuple[float, FloatArray]:
-    """Squares that least squares leave beside a constant, and the coefficients."""
-    design = np.stack([np.ones_like(y), *columns], axis=1)
+def _left(columns: list[FloatArray], y: FloatArray, others: list[FloatArray]) -> tuple[float, FloatArray]:
+    """Squares that least squares leave beside the others, and the coefficients, theirs first."""
+    design = np.stack([*others, *columns], axis=1)
     scale = np.abs(design).max(axis=0)
     found = np.linalg.lstsq(design / scale, y, rcond=None)[0] / scale
     return float(((y - design @ found) ** 2).sum()), found
@@ -158,12 +185,12 @@ def _left(columns: list[FloatArray], y: FloatArray) -> tuple[float, FloatArray]:
 
 def _chance(before: float, after: float, more: int, freedom: int) -> float:
     """Probability that so large a fall of the squares is chance."""
-    from scipy.stats import f as distribution
+    from scipy.special import fdtrc
 
     if freedom < 1 or before <= after:
         return 1.0
     after = max(after, freedom * RESOLUTION**2)
-    return float(distribution.sf(max(before - after, 0.0) / more / (after / freedom), more, freedom))
+    return float(fdtrc(more, freedom, max(before - after, 0.0) / more / (after / freedom)))
 
 
 def _work_lost(force: FloatArray, deflection: FloatArray) -> float:

@@ -148,7 +148,7 @@ def compare(
         raise InputError(
             "no reading of the tip",
             expected="readings of tool against work beside those of other loops",
-            hint="`tps reduce` shows struts measured alone over their dates, from their raw records",
+            hint="`tps reduce` shows struts measured alone over their dates, raw records or stiffnesses",
         )
     predictor = Predictor(machine, data, effect_files)
     log_model = predictor.log_stiffness()

@@ -1,0 +1,187 @@
+"""Records as test rigs write them: several cycles, hysteresis, drift, one file a strut, other units, lost readings."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import toolpath_stiff as tps
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.updating.raw_cycles import turns_of
+
+K = 40e6  # N/m
+PEAK = 1000.0  # N
+
+
+def ramps(cycles: int, n: int = 20):
+    """0, +1000, -1000, +1000 ... 0 N."""
+    ends = [0.0, *[PEAK, -PEAK] * cycles, 0.0]
+    ways = [np.linspace(a, b, n if 0.0 in (a, b) else 2 * n)[1:] for a, b in pairwise(ends)]
+    return np.concatenate([[0.0], *ways])
+
+
+def slips(force, share: float = 0.2):
+    """Masing's hysteresis: play operators of the force at three thresholds beside a spring; their secant is K."""
+    thresholds = PEAK * np.array([0.1, 0.25, 0.45])
+    played = np.zeros((len(force), 3))
+    for i in range(1, len(force)):
+        played[i] = np.clip(played[i - 1], force[i] - thresholds, force[i] + thresholds)
+    lag = played.mean(axis=1)
+    return ((1.0 - share) * force + share * lag * PEAK / (PEAK - thresholds.mean())) / K
+
+
+def written(force, deflection, date: str = "2021-03-04") -> str:
+    rows = [f"3,{date},{f:.3f},{1e6 * y:.4f}" for f, y in zip(force, deflection, strict=True)]
+    return "strut,date,force_N,displacement_um\n" + "\n".join(rows) + "\n"
+
+
+@pytest.fixture
+def reduced(tmp_path):
+    def reduce(text: str, name: str = "raw.csv"):
+        file = tmp_path / name
+        file.write_text(text, encoding="utf-8")
+        return tps.reduce(file)
+
+    return reduce
+
+
+def test_turns_alternate_and_noise_adds_none():
+    force = ramps(3) + 5.0 * np.random.default_rng(1).standard_normal(len(ramps(3)))
+    turns = turns_of(force)
+    assert len(turns) == 6 and np.sign(force[turns]).tolist() == [1, -1, 1, -1, 1, -1]
+    assert turns_of(np.array([0.0, 1.0, 2.0, 1.0, 0.0, -2.0, 0.0])) == [2, 5]
+
+
+def test_a_steady_drift_is_no_stiffness(reduced):
+    """15 um over three cycles on 50 um between the extremes: the mean of the extremes would be 5 % off."""
+    force = ramps(3)
+    drift = np.linspace(0.0, 15e-6, len(force))
+    (loop,) = reduced(written(force, force / K + drift)).to_dict()["loops"]
+    assert loop["stiffness_N_per_mm"] == pytest.approx(40_000.0, rel=1e-4)
+    assert loop["closure_um"] == pytest.approx(15.0, abs=1e-3) and not loop["shape"]["kind"]
+
+
+def test_hysteresis_is_neither_two_sides_nor_counted_thrice(reduced):
+    """The virgin curve and one way alone curve; the closed cycle does so alike on both sides of zero."""
+    found = [reduced(written(ramps(n), slips(ramps(n)))).to_dict() for n in (2, 3)]
+    for one in found:
+        (loop,) = one["loops"]
+        assert loop["shape"]["kind"] == "sticking"
+        assert loop["stiffness_N_per_mm"] == pytest.approx(40_000.0, rel=1e-2)
+        assert abs(one["history"]["struts"][0]["sides"]["difference_percent"]) < 1.0
+    two, three = (one["loops"][0]["shape"]["work_lost_mJ"] for one in found)
+    assert two == pytest.approx(three, rel=1e-6)  # of one cycle, however many there are
+
+
+def test_two_sides_are_found_beside_hysteresis(reduced):
+    force = ramps(2)
+    found = reduced(written(force, slips(force, 0.02) + np.maximum(force, 0.0) * 0.25 / K)).to_dict()
+    assert found["loops"][0]["shape"]["kind"] == "sides"
+    assert found["history"]["struts"][0]["sides"]["difference_percent"] == pytest.approx(-20.0, abs=1.0)
+
+
+def test_sides_of_an_open_loop_are_not_read_off_its_hysteresis(reduced):
+    found = reduced(written(ramps(1), slips(ramps(1)))).to_dict()
+    assert found["loops"][0]["shape"]["kind"] != "sides" and found["history"]["struts"][0]["sides"] is None
+
+
+def test_noise_about_zero_of_a_strut_that_is_only_pushed_is_no_lost_motion(reduced):
+    force = -np.abs(ramps(2)) + 3.0 * np.random.default_rng(2).standard_normal(len(ramps(2)))
+    (loop,) = reduced(written(force, force / K)).to_dict()["loops"]
+    assert loop["lost_motion_um"] is None and loop["stiffness_N_per_mm"] == pytest.approx(40_000.0, rel=1e-3)
+
+
+def test_an_indicator_at_its_end_is_told(reduced):
+    force = ramps(2)
+    found = reduced(written(force, np.clip(force / K, -20e-6, 20e-6)))
+    assert any("stands still at 20 um while the force goes on" in note for note in found.notes)
+    assert not reduced(written(force, np.round(force / K, 6))).notes  # an indicator that reads whole um
+
+
+# -- files -------------------------------------------------------------------------------------------------------------
+
+RECORDS = "0;0\n1;0,025\n-1;-0,025\n1;0,0250\n0;0\n0,5;0,0125\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "told"),
+    [
+        ("strut3_2021-03-04.csv", "", "the file's name"),
+        ("raw.csv", "Specimen: Strut 3\nDate: 2021-03-04\nLoad cell: calibrated 2019-01-02\n", "line 1"),
+        ("raw.csv", "strut;3\ndate;2021-03-04\n", "line 2"),
+    ],
+)
+def test_a_file_of_one_strut_in_kn_and_mm(reduced, name, head, told):
+    found = reduced(f"{head}Force [kN];Displacement [mm]\n{RECORDS}", name)
+    (loop,) = found.to_dict()["loops"]
+    assert loop["loop"] == "strut 3 alone, 2021-03-04" and loop["force_N"] == 1000.0
+    assert loop["stiffness_N_per_mm"] == pytest.approx(40_000.0)
+    assert any(told in note for note in found.notes) and any("units are converted" in note for note in found.notes)
+
+
+def test_a_name_and_a_head_that_differ_are_refused(reduced):
+    with pytest.raises(InputError, match=r"strut: '4' .line 1. and '3' .the file's name"):
+        reduced(f"Strut 4\nForce [kN];Displacement [mm]\n{RECORDS}", "strut3.csv")
+
+
+def test_many_files_are_one_history(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = []
+    for year in range(2016, 2024):
+        names.append(f"strut3_{year}-05-01.csv")
+        stiffness = K * (0.85 if year > 2019 else 1.0) * (1.0 + 1e-3 * (year % 3))
+        rows = [f"{f:.2f},{1e6 * f / stiffness:.4f},ok" for f in ramps(1, 5)]
+        Path(names[-1]).write_text("\n".join(["force_N,displacement_um,remark", *rows]), encoding="utf-8")
+    assert main(["reduce", *names, "--no-plots", "--out", "all.csv"]) == 0
+    told = capsys.readouterr()
+    assert "strut 3 became 15 % softer between 2019-05-01 and 2020-05-01" in told.out
+    assert "column remark is not used" in told.err and len(Path("all.csv").read_text().splitlines()) == 9
+
+
+def test_a_table_of_stiffnesses_is_a_history(reduced, tmp_path):
+    rows = [
+        f"{strut};{year}-05-01;{40.0 - 4.0 * (strut == 4 and year > 2019) + 0.01 * (year % 3):.2f}"
+        for strut in (3, 4)
+        for year in range(2016, 2024)
+    ]
+    found = reduced("\n".join(["strut;date;Stiffness [N/um]", *rows]))
+    texts = [one["text"] for one in found.to_dict()["history"]["struts"]]
+    assert "no change" in texts[0] and "became 10 % softer between 2019-05-01 and 2020-05-01" in texts[1]
+    names = [path.name for path in found.save(tmp_path / "m.csv")]
+    assert names == ["m.csv", "m_history.png"] and "40000" in str(found)
+    again = tps.reduce(tmp_path / "m.csv").to_dict()["history"]
+    assert [one["text"] for one in again["struts"]] == texts
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("timestamp,strut,force_N,displacement_um\n2020-01-01T10:00,1,0,0\n2021-01-01T10:00,1,9,9\n",
+         "rename timestamp"),
+        ("strut,date,force_N,displacement_um\n1,2020-01-01,1,25\n1,2020-01-01,-1,-25\n", "is the force in kN?"),
+        ("strut,date,force_N,displacement_um\n1,2020-01-01,9e2,-25\n1,2020-01-01,-9e2,25\n", "turn its sign"),
+        ("date,strut 1,strut 2\n2020-01-01,40000,40000\n", "side by side are not read"),
+        ("Strebe,Kraft,Weg\n1,0,0\n", "'Strebe', 'Kraft', 'Weg' are not known"),
+        ("strut,stiffness_N_per_mm\n1,40\n", "is the unit right"),
+    ],
+)  # fmt: skip
+def test_what_to_do_is_said(reduced, text, message):
+    with pytest.raises((InputError, InputErrors), match=f"(?i){message}"):
+        reduced(text)
+
+
+def test_many_equal_errors_are_told_together(reduced):
+    with pytest.raises(InputErrors) as caught:
+        reduced("strut,date,force_N,displacement_um\n" + "1,04.03.2021,0,0\n" * 500)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 2 and lines[1].endswith("raw.csv: the same in 499 further lines: 3-501")
+
+
+def test_lost_readings_are_passed_over(reduced):
+    found = reduced(written(ramps(2), ramps(2) / K) + "3,2021-03-04,,0\n3,2021-03-04,0,NaN\n")
+    assert found.to_dict()["loops"][0]["stiffness_N_per_mm"] == pytest.approx(40_000.0, rel=1e-4)
+    assert any("2 records without force or displacement" in note for note in found.notes)
