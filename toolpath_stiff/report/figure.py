@@ -21,14 +21,11 @@ from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.report.words import headline_text, plain, shortened
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
-
-    from toolpath_stiff.analysis import Analysis
 
 FloatArray = NDArray[np.float64]
 
@@ -154,29 +151,6 @@ def picture(draw: Callable[P, Figure]) -> Picture[P, bytes]:
 def drawn(draw: Callable[P, Figure]) -> Picture[P, Drawing]:
     """Decorate a function that draws a figure: it makes a PNG and, for pages, an SVG."""
     return Picture(draw, drawing)
-
-
-def add_heading(figure: Figure, analysis: Analysis) -> None:
-    """Program, machine, load, mean and range, and those of the plunges, above everything."""
-    from toolpath_stiff.analysis.statistics import class_figures
-
-    width, height = figure.get_size_inches()
-    figures = class_figures(analysis, np.arange(len(analysis.samples)))
-    figure.text(
-        0.35 / width,
-        1.0 - 0.42 / height,
-        shortened(plain(analysis.program.name), 70),
-        fontsize=15,
-        fontweight="bold",
-    )
-    figure.text(
-        0.35 / width,
-        1.0 - 0.70 / height,
-        f"machine {shortened(plain(analysis.machine.name), 40)}   ·   load {analysis.load}   ·   "
-        f"{headline_text(figures, '   ·   ')}",
-        fontsize=10.5,
-        color=MUTED,
-    )
 
 
 CLASSES = 32  # colours; more cannot be told apart along a line, and each costs a drawing call

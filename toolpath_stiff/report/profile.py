@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
+from toolpath_stiff.report.captions import add_heading, add_legend
 from toolpath_stiff.report.figure import (
     DPI,
     INK,
@@ -18,7 +19,6 @@ from toolpath_stiff.report.figure import (
     PLUNGE_SLATE,
     SECOND_ORANGE,
     UNREACHABLE_RED,
-    add_heading,
     new_figure,
     picture,
 )
@@ -97,7 +97,7 @@ def profile_picture(
     places = weakest_places(analysis)
     spots = [(float(s[row]), float(k[row])) for row in places]
     label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
-    _legend(axes)
+    _legend(figure, axes)
     add_heading(figure, analysis)
     return figure
 
@@ -332,17 +332,7 @@ def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
     paint(axes, shown, zorder=2.0)
 
 
-def _legend(axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    axes.figure.legend(
-        handles,
-        labels,
-        loc="upper right",
-        bbox_to_anchor=(1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT),
-        ncols=len(labels),
-        frameon=False,
-        fontsize=9.5,
-        borderaxespad=0.0,
-        columnspacing=1.4,
-        handlelength=1.8,
-    )
+def _legend(figure: Figure, axes: Axes) -> None:
+    keys = list(zip(*axes.get_legend_handles_labels(), strict=True))
+    corner = 1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT
+    add_legend(figure, keys, corner, right=True, size=9.5, between=1.4, wide=1.8)

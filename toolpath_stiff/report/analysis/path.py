@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.statistics import weakest_places
+from toolpath_stiff.report.captions import add_heading, add_legend
 from toolpath_stiff.report.figure import (
     CLASSES,
     COLOUR_MAP,
+    INK,
     MUTED,
     PLUNGE_SLATE,
     RAPID_GREY,
     UNREACHABLE_RED,
-    add_heading,
     new_figure,
     picture,
 )
@@ -23,6 +24,7 @@ from toolpath_stiff.report.painting import add_scales, add_strokes, label_places
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -211,25 +213,16 @@ def _legend(
     bar.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)))
     bar.grid(False)
     add_scales(bar)
-    entries = []
+    keys: list[tuple[Artist, str]] = []
     if not analysis.samples.cutting.all():
-        entries.append(Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), label="rapid"))
+        keys.append((Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4))), "rapid"))
     if analysis.set_aside.any() and not show_plunges:
-        entries.append(Line2D([], [], color=PLUNGE_SLATE, linewidth=1.5, marker=".", markersize=6, label="plunge"))
+        keys.append((Line2D([], [], color=PLUNGE_SLATE, linewidth=1.5, marker=".", markersize=6), "plunge"))
     if analysis.out_of_reach.any():
-        entries.append(Line2D([], [], color=UNREACHABLE_RED, linewidth=2.2, label="out of reach"))
-    entries.append(
-        Line2D([], [], color="none", marker="o", markersize=8, markeredgecolor="#1f2933", label="weakest places")
-    )
-    figure.legend(
-        handles=entries,
-        loc="upper left",
-        bbox_to_anchor=((x - 0.1) / width, (middle - 0.45) / height),
-        ncols=len(entries) if across > 4.0 else 1,
-        frameon=False,
-        labelcolor=MUTED,
-        borderaxespad=0.0,
-    )
+        keys.append((Line2D([], [], color=UNREACHABLE_RED, linewidth=2.2), "out of reach"))
+    ring = Line2D([], [], color="none", linestyle="none", marker="o", markersize=8, markeredgecolor=INK)
+    keys.append((ring, "weakest places"))
+    add_legend(figure, keys, ((x - 0.1) / width, (middle - 0.45) / height), rows=across <= 4.0, colour=MUTED)
 
 
 def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:
