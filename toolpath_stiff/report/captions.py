@@ -1,4 +1,4 @@
-"""Headings, words and legends of figures, painted: what matplotlib lays out for each picture costs more than its lines."""
+"""Headings, words and legends, painted: matplotlib's own cost a small picture more than all its lines."""
 
 from __future__ import annotations
 

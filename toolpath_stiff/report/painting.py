@@ -232,11 +232,12 @@ def _paint_strokes(renderer: Any, axes: Axes, strokes: Sequence[tuple[FloatArray
             renderer.draw_path(pen, Path(points), at)
 
 
-def add_scales(axes: Axes) -> None:
-    """Ticks, figures, grids and names of both axes, painted; locators, formatters and names stay the axes' own."""
+def add_scales(axes: Axes, sides: Sequence[str] = ("bottom", "left")) -> None:
+    """Ticks, figures, grids and names of the axes, painted; locators, formatters and names stay the axes' own."""
     for side, axis in (("bottom", axes.xaxis), ("left", axes.yaxis)):
         axis.set_visible(False)
-        paint(axes, partial(_paint_axis, side=side), zorder=0.5)
+        if side in sides:
+            paint(axes, partial(_paint_axis, side=side), zorder=0.5)
 
 
 def _paint_axis(renderer: Any, axes: Axes, side: str) -> None:

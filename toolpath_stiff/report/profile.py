@@ -17,12 +17,22 @@ from toolpath_stiff.report.figure import (
     INK,
     MUTED,
     PLUNGE_SLATE,
+    POINTS,
     SECOND_ORANGE,
     UNREACHABLE_RED,
     new_figure,
     picture,
 )
-from toolpath_stiff.report.painting import add_scales, label_places, paint, paint_scale, painted_axes
+from toolpath_stiff.report.painting import (
+    add_scales,
+    label_places,
+    new_pen,
+    paint,
+    paint_scale,
+    painted_axes,
+    word_extent,
+    write_word,
+)
 from toolpath_stiff.report.words import number, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
@@ -41,7 +51,7 @@ WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
 STRIP = 0.22  # height of the operations above the frame
 OPERATION_COLOURS = ("#ebeff4", "#d9e0e8")  # in turn
-NAME_SIZE, DIGIT = 8.5, 5.0  # points; pixels that the narrowest number needs
+NAME_SIZE, DIGIT, INSET = 8.5, 5.0, 4.0  # points; pixels that the narrowest number needs; pixels before a name
 CURVE_BLUE = "#2b59c3"
 BAND_LABEL = "95 % of the fitted parameters"
 MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
@@ -285,13 +295,24 @@ def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
             zorder=2,
         )
     pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
-    for row, (start, length) in zip(rows, spans, strict=True):
-        name = _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 8.0)
-        if name:
-            axes.text(
-                start + 4.0 / pixels, 1.0 + height / 2.0, name,
-                transform=across, fontsize=NAME_SIZE, va="center_baseline", zorder=6,
-            )  # fmt: skip
+    names = [
+        (start, _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 2.0 * INSET))
+        for row, (start, length) in zip(rows, spans, strict=True)
+    ]
+    paint(axes, partial(_paint_names, names=[one for one in names if one[1]], middle=1.0 + height / 2.0), zorder=6)
+
+
+def _paint_names(renderer: Any, axes: Axes, names: list[tuple[float, str]], middle: float) -> None:
+    """Words that begin beside places along the path, in mm; `middle` in heights of the axes."""
+    from matplotlib.font_manager import FontProperties
+
+    font = FontProperties(size=NAME_SIZE)
+    _, tall, below = word_extent(renderer, "lp", font)
+    base = axes.bbox.y0 + middle * axes.bbox.height - (tall - below) / 2.0
+    inset = INSET * renderer.points_to_pixels(POINTS / DPI)
+    with new_pen(renderer, None, INK, 0.0) as pen:
+        for place, text in names:
+            write_word(renderer, pen, axes.transData.transform((place, 0.0))[0] + inset, base, text, font)
 
 
 def _fitting(text: str, least: str, room: float) -> str:
