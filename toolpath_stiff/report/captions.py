@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff.report.figure import INK, MUTED
-from toolpath_stiff.report.painting import new_pen, paint, word_extent, write_word
+from toolpath_stiff.report.painting import new_pen, paint, word_extent, word_font, write_word
 from toolpath_stiff.report.words import headline_text, plain, shortened
 
 if TYPE_CHECKING:
@@ -32,10 +32,8 @@ def add_words(
 def _paint_words(
     renderer: Any, figure: Figure, x: float, y: float, text: str, size: float, weight: str, colour: str
 ) -> None:
-    from matplotlib.font_manager import FontProperties
-
     with new_pen(renderer, None, colour, 0.0) as pen:
-        font = FontProperties(size=size, weight=weight)
+        font = word_font(size, weight)
         write_word(renderer, pen, x * figure.bbox.width, y * figure.bbox.height, text, font)
 
 
@@ -100,9 +98,7 @@ def _paint_legend(
     renderer: Any, figure: Figure, keys: Sequence[tuple[Artist, str]], corner: tuple[float, float], right: bool,
     rows: bool, size: float, colour: str, between: float, wide: float,
 ) -> None:  # fmt: skip
-    from matplotlib.font_manager import FontProperties
-
-    em, font = renderer.points_to_pixels(size), FontProperties(size=size)
+    em, font = renderer.points_to_pixels(size), word_font(size)
     _, tall, below = word_extent(renderer, "lp", font)
     widths = [(wide + HANDLE_PAD) * em + word_extent(renderer, text, font)[0] for _, text in keys]
     total = max(widths, default=0.0) if rows else sum(widths) + between * em * max(len(keys) - 1, 0)

@@ -104,11 +104,10 @@ def _label_place(
 
 def _paint_label(renderer: Any, axes: Axes, at: tuple[float, float], middle: tuple[float, float], text: str) -> None:
     """A ring at `at` (data), a line to the words, their middle `middle` points away, on a pale box."""
-    from matplotlib.font_manager import FontProperties
     from matplotlib.path import Path
     from matplotlib.transforms import Affine2D
 
-    pt, font = renderer.points_to_pixels(1.0), FontProperties(size=LABEL_SIZE)
+    pt, font = renderer.points_to_pixels(1.0), word_font(LABEL_SIZE)
     here = axes.transData.transform(at)
     width, height, descent = word_extent(renderer, text, font)
     there, half = here + pt * np.array(middle), np.array([width, height]) / 2.0 + 2.0 * pt
@@ -208,6 +207,14 @@ def _word(renderer: Any, pen: Any, text: str, font: Any, angle: float) -> tuple[
     return _WORDS[about]
 
 
+@cache
+def word_font(size: float, weight: str = "normal") -> Any:
+    """The house's font, `size` in points; made once, in the house style."""
+    from matplotlib.font_manager import FontProperties
+
+    return FontProperties(size=size, weight=weight)
+
+
 def word_extent(renderer: Any, text: str, font: Any) -> tuple[float, float, float]:
     """Width, height and descent of a word in pixels; the figures of a tick come again and again."""
     about = type(renderer), renderer.points_to_pixels(1.0), font.get_size_in_points(), font.get_weight(), text
@@ -258,11 +265,10 @@ def paint_scale(
 
     `side` is "bottom", "left" or "top"; of "top" `edge` says where, in heights of the axes.
     """
-    from matplotlib.font_manager import FontProperties
     from matplotlib.path import Path
     from matplotlib.transforms import IdentityTransform
 
-    pt, font, box = renderer.points_to_pixels(1.0), FontProperties(size=size), axes.bbox
+    pt, font, box = renderer.points_to_pixels(1.0), word_font(size), axes.bbox
     upright, along = side != "left", np.zeros((len(values), 2))
     along[:, 0 if upright else 1] = values
     at = axes.transData.transform(along)[:, 0 if upright else 1]

@@ -31,6 +31,7 @@ from toolpath_stiff.report.painting import (
     paint_scale,
     painted_axes,
     word_extent,
+    word_font,
     write_word,
 )
 from toolpath_stiff.report.words import number, plain, shortened
@@ -304,9 +305,7 @@ def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
 
 def _paint_names(renderer: Any, axes: Axes, names: list[tuple[float, str]], middle: float) -> None:
     """Words that begin beside places along the path, in mm; `middle` in heights of the axes."""
-    from matplotlib.font_manager import FontProperties
-
-    font = FontProperties(size=NAME_SIZE)
+    font = word_font(NAME_SIZE)
     _, tall, below = word_extent(renderer, "lp", font)
     base = axes.bbox.y0 + middle * axes.bbox.height - (tall - below) / 2.0
     inset = INSET * renderer.points_to_pixels(POINTS / DPI)
