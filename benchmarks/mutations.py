@@ -185,6 +185,7 @@ WORDS = (
     b"check\npart.nc\n--dialect\nfanuc\n--block-delete\n2,3", b"path\npart.nc\n--step\n5\n--origin\n1,2,3",
     b"effects\nshow\nweak_strut", b"machine\nlist\n--json", b"machine\nshow\nnist\n--json",
 )  # fmt: skip
+DRAWS = b"machine\nshow\nnist"
 
 
 def _workbook() -> bytes:
@@ -311,6 +312,8 @@ def main() -> int:
         for kind in chosen:  # whatever is imported or drawn for the first time
             for original in kind.originals:
                 outcome(kind, original, 0)
+        if any(kind.originals is WORDS for kind in chosen):
+            _command(DRAWS, 0)  # what draws is loaded once, whenever a word that kept a command from it is lost
         for number in range(args.n):
             kind = chosen[number % len(chosen)]
             content = mutated(chance.choice(kind.originals), chance)

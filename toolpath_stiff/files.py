@@ -243,7 +243,7 @@ def locked(lock: Path, what: str, wait: float | None = None) -> Iterator[None]:
     InputError
         Another run holds it; the message names that run.
     """
-    import socket
+    import platform  # numpy has it already; `socket` would be loaded for one name
 
     end = time.monotonic() + (WAIT_SECONDS if wait is None else wait)
     while True:
@@ -257,7 +257,7 @@ def locked(lock: Path, what: str, wait: float | None = None) -> Iterator[None]:
         time.sleep(0.02)
     try:
         command = shlex.join([Path(sys.argv[0] or "python").name, *sys.argv[1:]])[:500]
-        told = {"process": os.getpid(), "host": socket.gethostname(), "command": command}
+        told = {"process": os.getpid(), "host": platform.node(), "command": command}
         os.ftruncate(handle, 0)
         os.write(handle, (json.dumps(told) + "\n").encode())
         yield

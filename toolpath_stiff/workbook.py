@@ -7,7 +7,6 @@ import math
 import os
 import re
 import warnings
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -113,6 +112,8 @@ def _chosen_sheet(workbook: Any, file: str, sheet: str) -> tuple[Any, list[str]]
 
 
 def _refuse_large(content: bytes, file: str) -> None:
+    import zipfile
+
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = archive.namelist()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import EffectFault, InputError
 from toolpath_stiff.stiffness.core import tip_compliance
-from toolpath_stiff.stiffness.effects import effects_from_file, known_effects
+from toolpath_stiff.stiffness.effects import MOST_FILES, _loaded, effects_from_file, known_effects
 from toolpath_stiff.stiffness.effects.trial import try_effect, unit_in_si
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
 
@@ -252,3 +253,13 @@ def test_a_file_is_run_again_only_if_it_changed(tmp_path):
     first = effects_from_file(file)["mine"]
     own(tmp_path, ('title = "mine"', 'title = "another title"'))
     assert effects_from_file(file)["mine"].title == "another title" != first.title
+
+
+def test_no_more_than_so_many_files_are_kept(tmp_path):
+    file = own(tmp_path)
+    kept = [effects_from_file(file)]
+    for version in range(MOST_FILES):
+        os.utime(file, ns=(version, version))  # an editor's save
+        kept.append(effects_from_file(file))
+    assert effects_from_file(file) is kept[-1]
+    assert _loaded.cache_info().currsize == MOST_FILES

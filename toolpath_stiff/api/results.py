@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -53,6 +52,8 @@ class Result(ABC):
 
     def _repr_html_(self) -> str:
         """For notebooks."""
+        import html
+
         return f"<pre>{html.escape(str(self))}</pre>"
 
     def to_json(self) -> str:

@@ -11,7 +11,6 @@ import math
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +141,7 @@ def describe(rule: Key) -> str:
 
 def packaged_machines() -> dict[str, Path]:
     """Name -> file of the machines that ship with the package."""
-    folder = Path(str(resources.files("toolpath_stiff"))) / "data" / "machines"
+    folder = Path(__file__).parent.parent / "data" / "machines"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,13 +43,18 @@ _SPEED = r"(?:S((?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)))?"
 _WORDS = "".join(f"(?:{letter}({_NUMBER}))?" for letter in LETTERS)
 _COMMENT = r"(?:\([^()\n]*+\))*+"
 _LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_SPEED}{_COMMENT}%s$|^(.+)$"
-_PATTERNS = {True: re.compile(_LINE % r"(?:;.*)?", re.MULTILINE), False: re.compile(_LINE % ";?", re.MULTILINE)}
 _BARE_NUMBER = re.compile(r"^[+-]?0*[1-9][0-9]*$")
 
 _DIGIT, _POINT, _SIGN, _LETTER, _END, _OTHER = range(6)
 MOST_DIGITS = 15
 _TENS = 10.0 ** np.arange(MOST_DIGITS + 1)  # exact
 _FEED_RANK = KEYS.index(FIRST_F)
+
+
+@cache
+def _pattern(semicolon: bool) -> re.Pattern[str]:
+    """A line, plain or any other; `semicolon`: whether it begins a comment. Each takes milliseconds to compile."""
+    return re.compile(_LINE % (r"(?:;.*)?" if semicolon else ";?"), re.MULTILINE)
 
 
 def _tables() -> tuple[ByteArray, NDArray[np.int8]]:
@@ -111,7 +117,7 @@ class PlainLines:
 
     def __init__(self, lines: Sequence[str], semicolon: bool) -> None:
         self.lines = lines
-        self._pattern = _PATTERNS[semicolon]
+        self._pattern = _pattern(semicolon)
         self._start, self._words = -1, _in_columns(1, *_tokens("")[:4])
         self._others: list[int] = []  # lines of the chunk that are not plain, and its end, in falling order
 

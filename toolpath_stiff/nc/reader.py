@@ -9,7 +9,7 @@ import copy
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -45,7 +45,13 @@ _SIGNS = (
     (_SIEMENS, r"A?(?:TRANS|ROT|SCALE|MIRROR)(?:\s|;|$)|TRAORI\b|TRAFOOF\b|SUPA\b|D?R\d+\s*="),
     (_SIEMENS, r"(?:[A-Z]++[\d.+-]*+\s++)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
 )
-_PATTERNS = tuple((what, re.compile(r"\s*(?:N\d+\s+|\d+\s+)?(?:" + sign + ")", re.IGNORECASE)) for what, sign in _SIGNS)
+
+
+@cache
+def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
+    """Language and pattern of each sign: most programs need none of them."""
+    number = r"\s*(?:N\d+\s+|\d+\s+)?"
+    return tuple((what, re.compile(f"{number}(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS)
 
 
 def language_of(line: str) -> str | None:
@@ -58,7 +64,7 @@ def language_of(line: str) -> str | None:
     >>> language_of("G1 X10 Y20")
     """
     head = line.lstrip()[:LONGEST_SIGN]
-    return next((what for what, pattern in _PATTERNS if pattern.match(head)), None)
+    return next((what for what, pattern in _patterns() if pattern.match(head)), None)
 
 
 def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:

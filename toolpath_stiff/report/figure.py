@@ -8,7 +8,9 @@ are. Letters are outlines, so that nothing moves with the fonts of whoever reads
 
 from __future__ import annotations
 
+import importlib
 import io
+import os
 import re
 import struct
 import warnings
@@ -21,14 +23,12 @@ from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.report.words import headline_text, plain, shortened
+from toolpath_stiff.defaults import IN_COMMAND
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
-
-    from toolpath_stiff.analysis import Analysis
 
 FloatArray = NDArray[np.float64]
 
@@ -70,6 +70,7 @@ def house_style() -> Iterator[None]:
     """Defaults of matplotlib with our style, whatever the user's own settings are; undone at the end."""
     import matplotlib as mpl
 
+    _load()
     settings = _settings()
     held: Any = mpl.rcParams  # a dict that checks each value: these have been
     before = {name: value for name, value in dict.items(held) if name in settings}
@@ -80,6 +81,20 @@ def house_style() -> Iterator[None]:
             yield
     finally:
         dict.update(held, before)
+
+
+@cache
+def _load() -> None:
+    """Load what draws; in a command without the help texts that matplotlib writes for its classes: a sixth of it."""
+    artist: Any = importlib.import_module("matplotlib.artist")
+    written = artist.kwdoc
+    if IN_COMMAND in os.environ:
+        artist.kwdoc = lambda _: ""
+    try:
+        for name in ("figure", "backends.backend_agg"):
+            importlib.import_module(f"matplotlib.{name}")
+    finally:
+        artist.kwdoc = written
 
 
 @cache
@@ -154,29 +169,6 @@ def picture(draw: Callable[P, Figure]) -> Picture[P, bytes]:
 def drawn(draw: Callable[P, Figure]) -> Picture[P, Drawing]:
     """Decorate a function that draws a figure: it makes a PNG and, for pages, an SVG."""
     return Picture(draw, drawing)
-
-
-def add_heading(figure: Figure, analysis: Analysis) -> None:
-    """Program, machine, load, mean and range, and those of the plunges, above everything."""
-    from toolpath_stiff.analysis.statistics import class_figures
-
-    width, height = figure.get_size_inches()
-    figures = class_figures(analysis, np.arange(len(analysis.samples)))
-    figure.text(
-        0.35 / width,
-        1.0 - 0.42 / height,
-        shortened(plain(analysis.program.name), 70),
-        fontsize=15,
-        fontweight="bold",
-    )
-    figure.text(
-        0.35 / width,
-        1.0 - 0.70 / height,
-        f"machine {shortened(plain(analysis.machine.name), 40)}   ·   load {analysis.load}   ·   "
-        f"{headline_text(figures, '   ·   ')}",
-        fontsize=10.5,
-        color=MUTED,
-    )
 
 
 CLASSES = 32  # colours; more cannot be told apart along a line, and each costs a drawing call

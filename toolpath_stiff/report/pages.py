@@ -12,7 +12,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
@@ -74,7 +74,7 @@ def _shown(value: object) -> object:
 
 def asset(name: str) -> str:
     """Text of a file in `assets/`."""
-    return resources.files("toolpath_stiff.report").joinpath("assets", name).read_text(encoding="utf-8")
+    return Path(__file__).with_name("assets").joinpath(name).read_text(encoding="utf-8")
 
 
 def script_hash(script: str) -> str:

@@ -104,37 +104,36 @@ def _label_place(
 
 def _paint_label(renderer: Any, axes: Axes, at: tuple[float, float], middle: tuple[float, float], text: str) -> None:
     """A ring at `at` (data), a line to the words, their middle `middle` points away, on a pale box."""
-    from matplotlib.font_manager import FontProperties
     from matplotlib.path import Path
     from matplotlib.transforms import Affine2D
 
-    pt, font = renderer.points_to_pixels(1.0), FontProperties(size=LABEL_SIZE)
+    pt, font = renderer.points_to_pixels(1.0), word_font(LABEL_SIZE)
     here = axes.transData.transform(at)
-    width, height, descent = _extent(renderer, text, font)
+    width, height, descent = word_extent(renderer, text, font)
     there, half = here + pt * np.array(middle), np.array([width, height]) / 2.0 + 2.0 * pt
     way = there - here
     length = float(np.hypot(*way)) or 1.0
     stop = min([float(h / abs(w)) for h, w in zip(half, way, strict=True) if w] or [1.0])  # where it meets the box
     ends = [here + way * 5.0 * pt / length, there - way * min(stop, 1.0)]
     if length * (1.0 - stop) > 5.0 * pt:
-        with _pen(renderer, axes, INK, 0.8) as pen:
+        with new_pen(renderer, axes, INK, 0.8) as pen:
             renderer.draw_path(pen, Path(ends), Affine2D())
     for colour, wide in (("white", 3.5), (INK, 1.6)):
-        with _pen(renderer, axes, colour, wide) as pen:
+        with new_pen(renderer, axes, colour, wide) as pen:
             renderer.draw_path(pen, Path.unit_circle(), Affine2D().scale(4.5 * pt).translate(*here))
-    with _pen(renderer, axes, "white", 0.0) as pen:
+    with new_pen(renderer, axes, "white", 0.0) as pen:
         pen.set_alpha(0.85)
         box = Path.unit_rectangle(), Affine2D().scale(*(2.0 * half)).translate(*(there - half))
         renderer.draw_path(pen, *box, (1.0, 1.0, 1.0, 0.85))
-    with _pen(renderer, None, INK, 0.0) as pen:
-        _write(renderer, pen, there[0] - width / 2.0, there[1] - height / 2.0 + descent, text, font)
+    with new_pen(renderer, None, INK, 0.0) as pen:
+        write_word(renderer, pen, there[0] - width / 2.0, there[1] - height / 2.0 + descent, text, font)
 
 
-def paint(axes: Axes, how: Callable[[Any, Axes], None], zorder: float) -> None:
-    """Add to the axes what `how(renderer, axes)` paints."""
+def paint(home: Axes | Figure, how: Callable[[Any, Any], None], zorder: float) -> None:
+    """Add to axes or a figure what `how(renderer, home)` paints."""
     artist = _painting()(how)
     artist.set_zorder(zorder)
-    axes.add_artist(artist)
+    home.add_artist(artist)
 
 
 @cache
@@ -144,22 +143,23 @@ def _painting() -> Any:
     class Painting(Artist):
         """An artist that is one function."""
 
-        def __init__(self, how: Callable[[Any, Axes], None]) -> None:
+        def __init__(self, how: Callable[[Any, Any], None]) -> None:
             super().__init__()
             self.how = how
 
         def draw(self, renderer: Any) -> None:
-            if self.get_visible() and self.axes is not None:
-                self.how(renderer, cast("Axes", self.axes))
+            if self.get_visible():
+                self.how(renderer, self.axes or self.get_figure())
 
         def get_window_extent(self, renderer: Any = None) -> Any:
-            return self.axes.bbox if self.axes is not None else None
+            home = self.axes or self.get_figure()
+            return None if home is None else home.bbox
 
     return Painting
 
 
 @contextmanager
-def _pen(renderer: Any, clip: Axes | None, colour: Any, width: float, cap: str = "butt") -> Iterator[Any]:
+def new_pen(renderer: Any, clip: Axes | None, colour: Any, width: float, cap: str = "butt") -> Iterator[Any]:
     """A graphics context for lines of some points; clipped to the axes, if given."""
     pen = renderer.new_gc()
     pen.set_foreground(colour)
@@ -173,7 +173,7 @@ def _pen(renderer: Any, clip: Axes | None, colour: Any, width: float, cap: str =
     pen.restore()
 
 
-def _write(renderer: Any, pen: Any, x: float, y: float, text: str, font: Any, angle: float = 0.0) -> None:
+def write_word(renderer: Any, pen: Any, x: float, y: float, text: str, font: Any, angle: float = 0.0) -> None:
     """Words whose baseline begins at x, y, in pixels from below."""
     from matplotlib.backends.backend_agg import RendererAgg
 
@@ -193,9 +193,9 @@ def _word(renderer: Any, pen: Any, text: str, font: Any, angle: float) -> tuple[
 
     The figures of ticks come again and again, in one picture and in those of many programs.
     """
-    about = renderer.dpi, text, font.get_size_in_points(), pen.get_rgb(), angle
+    about = renderer.dpi, text, font.get_size_in_points(), font.get_weight(), pen.get_rgb(), angle
     if about not in _WORDS:
-        wide, high, deep = (int(np.ceil(size)) for size in _extent(renderer, text, font))
+        wide, high, deep = (int(np.ceil(size)) for size in word_extent(renderer, text, font))
         upright, rise, edge = angle == 0.0, high - deep, 2
         width, height = (wide, high) if upright else (high, wide)
         left, below = edge + (0 if upright else rise), edge + (deep if upright else 0)
@@ -207,9 +207,17 @@ def _word(renderer: Any, pen: Any, text: str, font: Any, angle: float) -> tuple[
     return _WORDS[about]
 
 
-def _extent(renderer: Any, text: str, font: Any) -> tuple[float, float, float]:
+@cache
+def word_font(size: float, weight: str = "normal") -> Any:
+    """The house's font, `size` in points; made once, in the house style."""
+    from matplotlib.font_manager import FontProperties
+
+    return FontProperties(size=size, weight=weight)
+
+
+def word_extent(renderer: Any, text: str, font: Any) -> tuple[float, float, float]:
     """Width, height and descent of a word in pixels; the figures of a tick come again and again."""
-    about = type(renderer), renderer.points_to_pixels(1.0), font.get_size_in_points(), text
+    about = type(renderer), renderer.points_to_pixels(1.0), font.get_size_in_points(), font.get_weight(), text
     if about not in _EXTENTS:
         if len(_EXTENTS) >= MOST_EXTENTS:
             _EXTENTS.clear()
@@ -227,15 +235,16 @@ def _paint_strokes(renderer: Any, axes: Axes, strokes: Sequence[tuple[FloatArray
 
     at = axes.transData.frozen()
     for points, colour in strokes:
-        with _pen(renderer, axes, colour, width, "round") as pen:
+        with new_pen(renderer, axes, colour, width, "round") as pen:
             renderer.draw_path(pen, Path(points), at)
 
 
-def add_scales(axes: Axes) -> None:
-    """Ticks, figures, grids and names of both axes, painted; locators, formatters and names stay the axes' own."""
+def add_scales(axes: Axes, sides: Sequence[str] = ("bottom", "left")) -> None:
+    """Ticks, figures, grids and names of the axes, painted; locators, formatters and names stay the axes' own."""
     for side, axis in (("bottom", axes.xaxis), ("left", axes.yaxis)):
         axis.set_visible(False)
-        paint(axes, partial(_paint_axis, side=side), zorder=0.5)
+        if side in sides:
+            paint(axes, partial(_paint_axis, side=side), zorder=0.5)
 
 
 def _paint_axis(renderer: Any, axes: Axes, side: str) -> None:
@@ -256,11 +265,10 @@ def paint_scale(
 
     `side` is "bottom", "left" or "top"; of "top" `edge` says where, in heights of the axes.
     """
-    from matplotlib.font_manager import FontProperties
     from matplotlib.path import Path
     from matplotlib.transforms import IdentityTransform
 
-    pt, font, box = renderer.points_to_pixels(1.0), FontProperties(size=size), axes.bbox
+    pt, font, box = renderer.points_to_pixels(1.0), word_font(size), axes.bbox
     upright, along = side != "left", np.zeros((len(values), 2))
     along[:, 0 if upright else 1] = values
     at = axes.transData.transform(along)[:, 0 if upright else 1]
@@ -278,29 +286,29 @@ def paint_scale(
         renderer.draw_path(pen, Path(np.column_stack(both), codes), IdentityTransform())
 
     if grid and len(at):
-        with _pen(renderer, axes, GRID, 0.8, "projecting") as pen:
+        with new_pen(renderer, axes, GRID, 0.8, "projecting") as pen:
             lines(start, stop, pen)
     if len(at):
-        with _pen(renderer, None, MUTED, 0.8) as pen:
+        with new_pen(renderer, None, MUTED, 0.8) as pen:
             lines(start, start + out * TICK * pt, pen)
-    _, tall, below = _extent(renderer, "lp", font)
+    _, tall, below = word_extent(renderer, "lp", font)
     room, widest = (TICK + GAP) * pt, 0.0
-    with _pen(renderer, None, MUTED, 0.0) as pen:
+    with new_pen(renderer, None, MUTED, 0.0) as pen:
         for where, text in zip(at.tolist(), words, strict=True):
-            wide, high, deep = _extent(renderer, text, font)
+            wide, high, deep = word_extent(renderer, text, font)
             widest = max(widest, wide)
             if not upright:
-                _write(renderer, pen, start - room - wide, where - (high - deep) / 2.0, text, font)
+                write_word(renderer, pen, start - room - wide, where - (high - deep) / 2.0, text, font)
             else:
                 base = start + room + below if out > 0.0 else start - room - (tall - below)
-                _write(renderer, pen, where - wide / 2.0, base, text, font)
-    wide, *_ = _extent(renderer, name, font) if name else (0.0,)
-    with _pen(renderer, None, colour, 0.0) as pen:
+                write_word(renderer, pen, where - wide / 2.0, base, text, font)
+    wide, *_ = word_extent(renderer, name, font) if name else (0.0,)
+    with new_pen(renderer, None, colour, 0.0) as pen:
         if name and upright:
             base = start + out * (room + tall + NAME_GAP * pt) + (below if out > 0.0 else -(tall - below))
-            _write(renderer, pen, box.x0 + (box.width - wide) / 2.0, base, name, font)
+            write_word(renderer, pen, box.x0 + (box.width - wide) / 2.0, base, name, font)
         elif name:
-            _write(
+            write_word(
                 renderer,
                 pen,
                 start - room - widest - NAME_GAP * pt - below,

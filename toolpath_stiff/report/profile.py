@@ -11,18 +11,29 @@ from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
+from toolpath_stiff.report.captions import add_heading, add_legend
 from toolpath_stiff.report.figure import (
     DPI,
     INK,
     MUTED,
     PLUNGE_SLATE,
+    POINTS,
     SECOND_ORANGE,
     UNREACHABLE_RED,
-    add_heading,
     new_figure,
     picture,
 )
-from toolpath_stiff.report.painting import add_scales, label_places, paint, paint_scale, painted_axes
+from toolpath_stiff.report.painting import (
+    add_scales,
+    label_places,
+    new_pen,
+    paint,
+    paint_scale,
+    painted_axes,
+    word_extent,
+    word_font,
+    write_word,
+)
 from toolpath_stiff.report.words import number, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
@@ -41,7 +52,7 @@ WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
 STRIP = 0.22  # height of the operations above the frame
 OPERATION_COLOURS = ("#ebeff4", "#d9e0e8")  # in turn
-NAME_SIZE, DIGIT = 8.5, 5.0  # points; pixels that the narrowest number needs
+NAME_SIZE, DIGIT, INSET = 8.5, 5.0, 4.0  # points; pixels that the narrowest number needs; pixels before a name
 CURVE_BLUE = "#2b59c3"
 BAND_LABEL = "95 % of the fitted parameters"
 MOST_TOOL_LABELS, MOST_TOOL_LINES = 14, 60
@@ -97,7 +108,7 @@ def profile_picture(
     places = weakest_places(analysis)
     spots = [(float(s[row]), float(k[row])) for row in places]
     label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
-    _legend(axes)
+    _legend(figure, axes)
     add_heading(figure, analysis)
     return figure
 
@@ -285,13 +296,22 @@ def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
             zorder=2,
         )
     pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
-    for row, (start, length) in zip(rows, spans, strict=True):
-        name = _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 8.0)
-        if name:
-            axes.text(
-                start + 4.0 / pixels, 1.0 + height / 2.0, name,
-                transform=across, fontsize=NAME_SIZE, va="center_baseline", zorder=6,
-            )  # fmt: skip
+    names = [
+        (start, _fitting(f"{row.number} {plain(row.name)}", str(row.number), length * pixels - 2.0 * INSET))
+        for row, (start, length) in zip(rows, spans, strict=True)
+    ]
+    paint(axes, partial(_paint_names, names=[one for one in names if one[1]], middle=1.0 + height / 2.0), zorder=6)
+
+
+def _paint_names(renderer: Any, axes: Axes, names: list[tuple[float, str]], middle: float) -> None:
+    """Words that begin beside places along the path, in mm; `middle` in heights of the axes."""
+    font = word_font(NAME_SIZE)
+    _, tall, below = word_extent(renderer, "lp", font)
+    base = axes.bbox.y0 + middle * axes.bbox.height - (tall - below) / 2.0
+    inset = INSET * renderer.points_to_pixels(POINTS / DPI)
+    with new_pen(renderer, None, INK, 0.0) as pen:
+        for place, text in names:
+            write_word(renderer, pen, axes.transData.transform((place, 0.0))[0] + inset, base, text, font)
 
 
 def _fitting(text: str, least: str, room: float) -> str:
@@ -332,17 +352,7 @@ def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
     paint(axes, shown, zorder=2.0)
 
 
-def _legend(axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    axes.figure.legend(
-        handles,
-        labels,
-        loc="upper right",
-        bbox_to_anchor=(1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT),
-        ncols=len(labels),
-        frameon=False,
-        fontsize=9.5,
-        borderaxespad=0.0,
-        columnspacing=1.4,
-        handlelength=1.8,
-    )
+def _legend(figure: Figure, axes: Axes) -> None:
+    keys = list(zip(*axes.get_legend_handles_labels(), strict=True))
+    corner = 1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT
+    add_legend(figure, keys, corner, right=True, size=9.5, between=1.4, wide=1.8)

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.statistics import weakest_places
+from toolpath_stiff.report.captions import add_heading, add_legend, add_words
 from toolpath_stiff.report.figure import (
     CLASSES,
     COLOUR_MAP,
+    INK,
     MUTED,
     PLUNGE_SLATE,
+    POINTS,
     RAPID_GREY,
     UNREACHABLE_RED,
-    add_heading,
     new_figure,
     picture,
 )
-from toolpath_stiff.report.painting import add_scales, add_strokes, label_places, painted_axes
+from toolpath_stiff.report.painting import add_scales, add_strokes, label_places, new_pen, paint, painted_axes
+from toolpath_stiff.report.words import number
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -38,6 +43,8 @@ MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
 FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
 UNREACHABLE, PLUNGE = -1, CLASSES  # without a colour of the scale; a lower class wins where segments are joined
 STROKE = 1.5  # points
+TITLE = 6.0  # points above a view
+POINT = 0.05  # of the colour scale's length: the end beyond which there are values
 THINNEST = 0.38  # a view's shorter side, of the longest: a flat part still gets a readable side view
 
 
@@ -62,7 +69,9 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     for axes, (across, up, title) in zip(
         views, ((0, 1, "XY  top"), (0, 2, "XZ  front"), (1, 2, "YZ  side, from +X")), strict=True
     ):
-        _set_up(axes, across, up, title, middle, span)
+        box = axes.get_position()
+        add_words(figure, box.x0, box.y1 + TITLE / POINTS / figure.get_figheight(), title, size=11.0, weight="bold")
+        _set_up(axes, across, up, middle, span)
         add_strokes(axes, [(xyz[:, [across, up]], colour) for xyz, colour in strokes], STROKE, zorder=3)
         for xyz, style in lines:
             axes.plot(xyz[:, across], xyz[:, up], **style)
@@ -167,11 +176,10 @@ def _lay_out(span: FloatArray) -> tuple[Figure, list[Axes], tuple[float, float, 
     return figure, views, (second, upper, y * scale, y * scale)
 
 
-def _set_up(axes: Axes, across: int, up: int, title: str, middle: FloatArray, span: FloatArray) -> None:
+def _set_up(axes: Axes, across: int, up: int, middle: FloatArray, span: FloatArray) -> None:
     from matplotlib.ticker import MaxNLocator
 
     names = "XYZ"
-    axes.set_title(title, y=1.0)  # given: it need not be looked for
     axes.set_xlabel(f"{names[across]} mm")
     axes.set_ylabel(f"{names[up]} mm")
     axes.set_xlim(middle[across] - span[across] / 2, middle[across] + span[across] / 2)
@@ -190,46 +198,67 @@ def _legend(
     show_plunges: bool,
 ) -> None:
     """Colour bar, and what the other lines mean, in the free corner."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
     from matplotlib.lines import Line2D
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
-
-    from toolpath_stiff.report.words import number
 
     width, height = figure.get_size_inches()
     x, y, wide, tall = corner
     across, middle = min(wide, 5.0), y + tall / 2.0
-    bar = painted_axes(figure, (x / width, (middle + 0.25) / height, across / width, 0.22 / height))
-    mappable = ScalarMappable(Normalize(*limits), colormaps[COLOUR_MAP].resampled(CLASSES))
-    extend = legend_extend(analysis, limits)
-    colour_bar = figure.colorbar(mappable, cax=bar, orientation="horizontal", extend=extend)
-    colour_bar.set_label("stiffness along the load, N/mm")
-    colour_bar.outline.set_visible(False)
-    bar.xaxis.set_major_locator(MaxNLocator(max(2, int(across / 0.75)), steps=[1, 2, 2.5, 5, 10]))
-    bar.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)))
-    bar.grid(False)
-    add_scales(bar)
-    entries = []
+    _colour_scale(figure, (x, middle + 0.25, across, 0.22), limits, legend_extend(analysis, limits))
+    keys: list[tuple[Artist, str]] = []
     if not analysis.samples.cutting.all():
-        entries.append(Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4)), label="rapid"))
+        keys.append((Line2D([], [], color=RAPID_GREY, linewidth=0.8, linestyle=(0, (5, 4))), "rapid"))
     if analysis.set_aside.any() and not show_plunges:
-        entries.append(Line2D([], [], color=PLUNGE_SLATE, linewidth=1.5, marker=".", markersize=6, label="plunge"))
+        keys.append((Line2D([], [], color=PLUNGE_SLATE, linewidth=1.5, marker=".", markersize=6), "plunge"))
     if analysis.out_of_reach.any():
-        entries.append(Line2D([], [], color=UNREACHABLE_RED, linewidth=2.2, label="out of reach"))
-    entries.append(
-        Line2D([], [], color="none", marker="o", markersize=8, markeredgecolor="#1f2933", label="weakest places")
-    )
-    figure.legend(
-        handles=entries,
-        loc="upper left",
-        bbox_to_anchor=((x - 0.1) / width, (middle - 0.45) / height),
-        ncols=len(entries) if across > 4.0 else 1,
-        frameon=False,
-        labelcolor=MUTED,
-        borderaxespad=0.0,
-    )
+        keys.append((Line2D([], [], color=UNREACHABLE_RED, linewidth=2.2), "out of reach"))
+    ring = Line2D([], [], color="none", linestyle="none", marker="o", markersize=8, markeredgecolor=INK)
+    keys.append((ring, "weakest places"))
+    add_legend(figure, keys, ((x - 0.1) / width, (middle - 0.45) / height), rows=across <= 4.0, colour=MUTED)
+
+
+def _colour_scale(
+    figure: Figure, box: tuple[float, float, float, float], limits: tuple[float, float], extend: str
+) -> None:
+    """The colours and what they stand for; `box` (x, y, width, height in inches) holds the points at its ends too."""
+    from matplotlib import colormaps
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    (width, height), (x, y, wide, tall) = figure.get_size_inches(), box
+    left, right = extend in ("min", "both"), extend in ("max", "both")
+    inside = wide / (1.0 + POINT * (left + right))
+    start = x + POINT * inside * left
+    axes = painted_axes(figure, (start / width, y / height, inside / width, tall / height))
+    axes.set_xlim(*limits)
+    axes.set_xlabel("stiffness along the load, N/mm")
+    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(wide / 0.75)), steps=[1, 2, 2.5, 5, 10]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if limits[1] - limits[0] > 5 else 2)))
+    axes.grid(visible=False)
+    axes.patch.set_visible(False)
+    axes.spines[:].set_visible(False)
+    colours = colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES))
+    paint(axes, partial(_paint_colours, colours=colours, left=left, right=right), zorder=1.0)
+    add_scales(axes, ("bottom",))
+
+
+def _paint_colours(renderer: Any, axes: Axes, colours: FloatArray, left: bool, right: bool) -> None:
+    """Fields beside each other, on whole pixels, so that no line shows between them; points at ends beyond."""
+    from matplotlib.path import Path
+    from matplotlib.transforms import IdentityTransform
+
+    low, high = round(axes.bbox.y0), round(axes.bbox.y1)
+    edges = np.round(np.linspace(axes.bbox.x0, axes.bbox.x1, len(colours) + 1)).tolist()
+    reach, middle = POINT * (edges[-1] - edges[0]), (low + high) / 2.0
+    fields = [
+        (colour, [(a, low), (b, low), (b, high), (a, high)])
+        for colour, a, b in zip(colours, edges[:-1], edges[1:], strict=True)
+    ]
+    if left:
+        fields.append((colours[0], [(edges[0], low), (edges[0], high), (edges[0] - reach, middle)]))
+    if right:
+        fields.append((colours[-1], [(edges[-1], low), (edges[-1] + reach, middle), (edges[-1], high)]))
+    for colour, corners in fields:
+        with new_pen(renderer, None, colour, 0.0) as pen:
+            renderer.draw_path(pen, Path(corners), IdentityTransform(), tuple(colour))
 
 
 def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import importlib.util
 import pkgutil
 import sys
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 
@@ -33,6 +33,7 @@ __all__ = [
 ]
 
 ENTRY_POINTS = "toolpath_stiff.effects"
+MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
 NOT_EFFECTS = ("contract", "guard", "trial", "measuring_loop")
 
 
@@ -125,7 +126,7 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
     return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
 
 
-@cache
+@lru_cache(maxsize=MOST_FILES)
 def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]:
     """`path`, `changed` and `size` tell files and their versions apart."""
     name = f"toolpath_stiff_user_effects_{path.stem}"
