@@ -49,7 +49,8 @@ _POINT, _SIGN, _LETTER, _END, _OTHER = range(1, 6)
 MOST_DIGITS = 15
 _TENS = 10.0 ** np.arange(MOST_DIGITS + 1)  # exact
 _BEFORE = b"0" * 16  # so that 16 characters stand before any place in the text
-_DIGIT_MASKS = np.array([0x0F0F0F0F0F0F0F0F & ~((1 << 8 * (8 - n)) - 1) for n in range(9)], dtype=np.uint64)
+_MASKS = np.array([0x0F0F0F0F0F0F0F0F & ~((1 << 8 * (8 - n)) - 1) for n in range(9)], dtype=np.uint64)  # n digits
+_SHIFTS = np.arange(0, 72, 8, dtype=np.uint64)  # past n digits
 _PAIRS, _EVEN, _ODD = np.uint64(0x000000FF000000FF), np.uint64(100 + (1000000 << 32)), np.uint64(1 + (10000 << 32))
 _FEED_RANK = KEYS.index(FIRST_F)
 
@@ -179,23 +180,24 @@ def _tokens(text: str) -> tuple[IntArray, IntArray, FloatArray, ByteArray, IntAr
     marks = np.flatnonzero(codes - np.uint8(ord("0")) > 9)  # all characters but digits
     kinds = np.append(_KINDS[codes[marks]], np.array([_END, _END], dtype=np.uint8))
     first = np.flatnonzero(kinds[:-2] >= _LETTER)  # what begins a word, ends a line, or is none of it
+    following = np.append(first[1:], len(marks))
     at, kind = marks[first], kinds[first]
     end = np.append(at[1:], len(codes))
     is_end = kind == _END
     line = np.cumsum(is_end) - 1
     signed = kinds[first + 1] == _SIGN
-    sign = marks.take(first + 1, mode="clip")
     pointed = kinds[first + 1 + signed] == _POINT
-    marked = signed.astype(np.int64) + pointed
-    point = np.where(pointed, marks.take(first + marked, mode="clip"), end)
-    digits, decimals = end - at - 1 - marked, end - point - pointed
+    last = first + signed + pointed
+    sign, point = marks.take(first + 1, mode="clip"), np.where(pointed, marks.take(last, mode="clip"), end)
+    digits, decimals = end - at - 1 - (last - first), end - point - pointed
     rank = _ranks(codes[at], kind)
     unsigned = (rank < _FEED_RANK + 1) | (rank >= len(KEYS) - 2)
     bad = (digits < 1) | (digits > MOST_DIGITS) | (unsigned & signed) | ((rank < _FEED_RANK) & pointed)
-    bad |= (signed & (sign != at + 1)) | (np.diff(first, append=len(marks)) > marked + 1)  # misplaced, or too many
-    bad |= (rank <= np.concatenate([[-1], rank[:-1]])) | (kind == _OTHER)
-    bad[is_end] = (end - at)[is_end] > 1  # numbers without a letter
-    value = _values(buffer, point, end, np.clip(digits - decimals, 0, MOST_DIGITS), np.minimum(decimals, MOST_DIGITS))
+    bad |= (signed & (sign > at + 1)) | (following > last + 1)  # misplaced, or too many
+    bad[1:] |= rank[1:] <= rank[:-1]
+    bad |= kind == _OTHER
+    bad[is_end] = (end > at + 1)[is_end]  # numbers without a letter
+    value = _values(buffer, point, end, digits, decimals)
     value[codes[sign] == ord("-")] *= -1.0
     bad |= (rank == KEYS.index("G")) & ((digits > 2) | (value > 3.0))
     odd = np.zeros(int(line[-1]) + 1, dtype=bool)
@@ -213,27 +215,33 @@ def _ranks(begins: ByteArray, kind: ByteArray) -> IntArray:
     return rank
 
 
-def _values(buffer: bytes, point: IntArray, end: IntArray, whole: IntArray, decimals: IntArray) -> FloatArray:
-    """The numbers, without their signs: `whole` digits before `point`, `decimals` before `end`."""
-    scale = _TENS[decimals]
-    return np.asarray((_whole_number(buffer, point, whole) * scale + _whole_number(buffer, end, decimals)) / scale)
-
-
-def _whole_number(buffer: bytes, end: IntArray, digits: IntArray) -> FloatArray:
-    """The numbers that up to 15 digits before the places `end` make.
+def _values(buffer: bytes, point: IntArray, end: IntArray, digits: IntArray, decimals: IntArray) -> FloatArray:
+    """The numbers, without their signs, of words of up to `MOST_DIGITS` digits: `decimals` of them before `end`.
 
     Eight characters are one word of 64 bits, whose digits add up by pairs, fours and eights: three multiplications.
     Lemire, "Number parsing at a gigabyte per second", Software: Practice and Experience 51 (2021) 1700.
     """
-    eights = np.ndarray(len(buffer) - 7, dtype="<u8", buffer=buffer, strides=(1,))
-    bits = eights[end - 8] & _DIGIT_MASKS[np.minimum(digits, 8)]
-    bits = bits * 10 + (bits >> 8)
-    bits = ((bits & _PAIRS) * _EVEN + ((bits >> 16) & _PAIRS) * _ODD) >> 32
-    found = bits.astype(np.float64)
-    longer = np.flatnonzero(digits > 8)
+    eights = np.ndarray(len(buffer) - 7, dtype="<u8", buffer=buffer, strides=(1,))  # the eight from each place on
+    bits = eights[end - 8] & _MASKS.take(decimals, mode="clip")
+    bits |= (eights[point - 8] & _MASKS.take(digits - decimals, mode="clip")) >> _SHIFTS.take(decimals, mode="clip")
+    found = _sum_of_digits(bits)
+    longer = np.flatnonzero((digits > 8) & (digits <= MOST_DIGITS))
     if len(longer):
-        found[longer] += 1e8 * _whole_number(buffer, end[longer] - 8, digits[longer] - 8)
-    return np.asarray(found)
+        after = decimals[longer]
+        places = ((point[longer], digits[longer] - after), (end[longer], after))
+        before, behind = (
+            1e8 * _sum_of_digits(eights[at - 16] & _MASKS.take(count - 8, mode="clip"))
+            + _sum_of_digits(eights[at - 8] & _MASKS.take(count, mode="clip"))
+            for at, count in places
+        )
+        found[longer] = before * _TENS[after] + behind
+    return np.asarray(found / _TENS.take(decimals, mode="clip"))
+
+
+def _sum_of_digits(bits: NDArray[np.uint64]) -> FloatArray:
+    """The whole numbers that eight characters make, the last digit in the highest byte; bytes of zero before them."""
+    pairs = bits * 10 + (bits >> 8)
+    return np.asarray((((pairs & _PAIRS) * _EVEN + ((pairs >> 16) & _PAIRS) * _ODD) >> 32).astype(np.float64))
 
 
 def _in_columns(n: int, line: IntArray, rank: IntArray, value: FloatArray, form: ByteArray) -> PlainWords:
