@@ -158,10 +158,7 @@ def drawn(draw: Callable[P, Figure]) -> Picture[P, Drawing]:
 
 def add_heading(figure: Figure, analysis: Analysis) -> None:
     """Program, machine, load, mean and range, and those of the plunges, above everything."""
-    from toolpath_stiff.analysis.statistics import class_figures
-
     width, height = figure.get_size_inches()
-    figures = class_figures(analysis, np.arange(len(analysis.samples)))
     figure.text(
         0.35 / width,
         1.0 - 0.42 / height,
@@ -173,7 +170,7 @@ def add_heading(figure: Figure, analysis: Analysis) -> None:
         0.35 / width,
         1.0 - 0.70 / height,
         f"machine {shortened(plain(analysis.machine.name), 40)}   ·   load {analysis.load}   ·   "
-        f"{headline_text(figures, '   ·   ')}",
+        f"{headline_text(analysis.figures, '   ·   ')}",
         fontsize=10.5,
         color=MUTED,
     )

@@ -16,7 +16,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
+from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report.analysis.path import legend_extend, scale_limits
 from toolpath_stiff.report.figure import page_colours
@@ -317,7 +317,7 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "kind": _base64(kind.astype("u1")),
         "tools": [[int(i), int(samples.tool[i])] for i in tool_starts],
         "operations": _operation_starts(analysis, samples.move),
-        "weakest": [int(np.searchsorted(rows, row)) for row in weakest_places(analysis)],
+        "weakest": [int(np.searchsorted(rows, row)) for row in analysis.weakest],
         "scale": _scale(analysis, False),
         "scale_with_plunges": _scale(analysis, True) if analysis.set_aside.any() else None,
         "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
@@ -349,7 +349,7 @@ def page_rows(analysis: Analysis) -> IntArray:
     extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too
     firsts = np.searchsorted(analysis.samples.move, [row.first_move for row in analysis.operations.rows])
-    wanted = np.array([0, *weakest_places(analysis)], dtype=np.int64)
+    wanted = np.array([0, *analysis.weakest], dtype=np.int64)
     return np.unique(np.concatenate([*extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
 
 
