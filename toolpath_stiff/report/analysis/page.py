@@ -9,7 +9,7 @@ content security policy lets only our own script run.
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report.analysis.path import legend_extend, scale_limits
 from toolpath_stiff.report.figure import page_colours
-from toolpath_stiff.report.pages import bullets, markup, render, table
+from toolpath_stiff.report.pages import bullets, markup, render_pieces, table
 from toolpath_stiff.report.profile import extremes_by_column, profile_curve
 from toolpath_stiff.report.words import (
     FIGURES,
@@ -52,7 +52,19 @@ def page(
     other: Analysis | None = None,
     show_plunges: bool = False,
 ) -> str:
-    """The page as text.
+    """The page as text; arguments as of `page_pieces`."""
+    return "".join(page_pieces(analysis, summary, required=required, other=other, show_plunges=show_plunges))
+
+
+def page_pieces(
+    analysis: Analysis,
+    summary: Mapping[str, Any],
+    *,
+    required: float | None = None,
+    other: Analysis | None = None,
+    show_plunges: bool = False,
+) -> Iterator[str]:
+    """The page in pieces of text.
 
     Parameters
     ----------
@@ -68,7 +80,7 @@ def page(
         How the switch stands that lets plunges set the axis and the colour scale.
     """
     data = page_data(analysis, required, other)
-    return render(
+    return render_pieces(
         "analysis.html",
         styles=["viewer.css", "analysis.css"],
         scripts=SCRIPTS,
