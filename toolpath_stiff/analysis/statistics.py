@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_of, headline_words, plunging_rows
+from toolpath_stiff.analysis.loads import Load, along_tool_axis, follows_motion, headline_of, headline_words
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
@@ -76,9 +76,14 @@ class EvaluatedPath:
         return np.asarray(self.samples.cutting & self.at.reachable & (self.samples.weight > 0.0))
 
     @cached_property
+    def along_axis(self) -> BoolArray:
+        """(n,) samples whose tip moves along the tool axis."""
+        return along_tool_axis(self.samples.tangent, self.samples.abc)
+
+    @cached_property
     def plunging(self) -> BoolArray:
         """(n,) counted samples of plunges along the tool axis; none where the load does not follow the motion."""
-        return plunging_rows(self.load, self.samples.tangent, self.samples.abc, self.counted)
+        return np.asarray(self.counted & self.along_axis if follows_motion(self.load) else np.zeros_like(self.counted))
 
     @property
     def headline(self) -> BoolArray:
@@ -455,14 +460,14 @@ def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, 
         "margin": at.margin[rows],
         "margin_limit": names[at.limit[rows]],
         "operation": path.operations.of_move[path.samples.move[rows]] + 1,
-        "cut": _cut(path.samples.take(rows)),
+        "cut": _cut(path, rows),
     }
 
 
-def _cut(samples: Samples) -> TextArray:
+def _cut(path: EvaluatedPath, rows: slice) -> TextArray:
     """(n,) "across" or "plunge", whatever the load; "" on rapids and where the tip does not move."""
-    moving = samples.cutting & samples.tangent.any(axis=1)
-    return np.where(moving, np.where(along_tool_axis(samples.tangent, samples.abc), "plunge", "across"), "")
+    moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)
+    return np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), "")
 
 
 def samples_frame(path: EvaluatedPath) -> pd.DataFrame:
