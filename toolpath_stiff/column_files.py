@@ -204,24 +204,24 @@ def _cell(column: AnyArray, digits: int | None) -> Cells | None:
         longest = int(np.flatnonzero(letters.any(axis=0)).max(initial=-1)) + 1
         return letters[:, :longest].astype(np.uint8) if letters.max() < 128 else None
     if digits is None:
-        return _number(column, 0, int(column.min()), int(column.max())) if column.dtype.kind in "iu" else None
+        low, high = int(column.min()), int(column.max())
+        known = column.dtype.kind in "iu" and max(-low, high) < LARGEST
+        return _number(column, 0, low, high) if known else None
     # As numpy's round counts them, so that both ways print the same digits.
     units = np.rint(column * 10.0**digits)
     missing = None
     if math.isnan(units.min()):
         missing = np.isnan(units)
         units[missing] = 0.0
-    low, high = float(units.min()), float(units.max())
-    if not max(-low, high) < LARGEST:
+    ends = float(units.min()), float(units.max())
+    if not max(-ends[0], ends[1]) < LARGEST:
         return None
-    cell = _number(units, digits, int(low), int(high))
+    cell = _number(units, digits, int(ends[0]), int(ends[1]))
     return cell if missing is None else np.where(missing[:, None], np.uint8(0), cell)
 
 
-def _number(units: AnyArray, digits: int, low: int, high: int) -> Cells | None:
+def _number(units: AnyArray, digits: int, low: int, high: int) -> Cells:
     """Whole numbers of units (n,), from `low` to `high`, with a decimal point before the last `digits`."""
-    if not max(-low, high) < LARGEST:
-        return None
     if low == high:  # an axis that stands still, the only tool
         text = f"{abs(low):0{digits + 1}d}"
         text = "-" * (low < 0) + (f"{text[:-digits]}.{text[-digits:]}" if digits else text)
@@ -231,11 +231,12 @@ def _number(units: AnyArray, digits: int, low: int, high: int) -> Cells | None:
     size = np.abs(units).astype(np.uint32 if largest < 2**32 else np.int64)
     least, width = max(low, -high, 0), max(len(str(largest)), digits + 1)
     fours = np.empty((len(units), -(-width // 4)), dtype=np.uint32)
-    rest = size
-    for place in range(fours.shape[1] - 1, -1, -1):
-        above = rest // 10_000 if place else None
-        fours[:, place] = _FOUR_DIGITS.take(rest if above is None else rest - 10_000 * above, mode="clip")
-        rest = rest if above is None else above
+    rest: Any = size
+    for place in range(fours.shape[1] - 1, 0, -1):
+        above = rest // 10_000
+        fours[:, place] = _FOUR_DIGITS.take(rest - 10_000 * above, mode="clip")
+        rest = above
+    fours[:, 0] = _FOUR_DIGITS.take(rest, mode="clip")
     figures = fours.view(np.uint8)[:, -width:]
     for place in range(width - digits - 1):  # no zeros before the first figure, but the one before the point
         if least < 10 ** (width - 1 - place):
