@@ -204,9 +204,10 @@ def _cell(column: AnyArray, digits: int | None) -> Cells | None:
         longest = int(np.flatnonzero(letters.any(axis=0)).max(initial=-1)) + 1
         return letters[:, :longest].astype(np.uint8) if letters.max() < 128 else None
     if digits is None:
+        if column.dtype.kind not in "iu":
+            return None
         low, high = int(column.min()), int(column.max())
-        known = column.dtype.kind in "iu" and max(-low, high) < LARGEST
-        return _number(column, 0, low, high) if known else None
+        return _number(column, 0, low, high) if max(-low, high) < LARGEST else None
     # As numpy's round counts them, so that both ways print the same digits.
     units = np.rint(column * 10.0**digits)
     missing = None
