@@ -77,11 +77,11 @@ def reading(report: Report, lines: int, rounds: int) -> None:
     )
     for kind in KINDS:
         text = program(kind, lines)
-        slow = program(kind, lines // 10)
+        slow = program(kind, lines // 10)  # as fast a line, and enough of it
         ours, theirs, single, ratios = [], [], [], []
         parse_program(text)
         for _ in range(rounds):
-            theirs.append(lines / cpu(lambda text=text: pygcode_alone(text)))
+            theirs.append(lines // 10 / cpu(lambda slow=slow: pygcode_alone(slow)))
             ours.append(lines / cpu(lambda text=text: parse_program(text)))
             single.append(lines // 10 / cpu(lambda slow=slow: one_by_one(slow)))
             ratios.append(ours[-1] / theirs[-1])

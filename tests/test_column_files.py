@@ -98,3 +98,13 @@ def test_such_words_are_read_back_as_they_were(tmp_path):
     file.write_text(csv_text(["point", "x_mm"], [["-A1", "-1.5"], ["=B", "2"], ["it's", "3"]]))
     rows = read_table(str(file), "points", Columns(("x_mm",), ("point",))).rows
     assert [list(cells) for _, cells in rows] == [["-A1", "-1.5"], ["=B", "2"], ["it's", "3"]]
+
+
+def test_rows_that_repeat_are_written_as_the_others():
+    twice = np.repeat(np.array([-1.25, 3.0, np.nan, 0.5, 7.75]), 2)
+    words = np.repeat(np.array(["strut1", "x min", "strut1", "", "x"]), 2)
+    columns = {"a": twice, "word": words, "b": np.roll(twice, 1), "line": np.arange(10), "c": np.zeros(10)}
+    decimals = {"a": 3, "word": None, "b": 6, "line": None, "c": 1}
+    assert column_files._by_digits(columns, decimals) == csv_rows(columns, decimals).encode()
+    table = parquet.read_table(io.BytesIO(b"".join(parquet_pieces(lambda rows: columns, 10))))
+    assert table["word"].to_pylist() == words.tolist()

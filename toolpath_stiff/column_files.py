@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import AnyArray
+from toolpath_stiff.arrays import AnyArray, BoolArray
 
 Columns = Mapping[str, AnyArray]
 Decimals = Mapping[str, int | None]  # None: a whole number or a word
@@ -23,6 +24,7 @@ Cells = NDArray[np.uint8]
 
 BLOCK = 8_192  # rows of CSV: their bytes fit into a processor's cache
 ROW_GROUP = 131_072  # rows of Parquet
+MOST_FRESH = 0.7  # share of rows; of columns that change in fewer, the rows in which they do not are copied
 LARGEST = 2.0**53  # beyond, a double does not hold every whole number
 
 
@@ -94,8 +96,7 @@ def parquet_pieces(columns_of: Callable[[slice], Columns], rows: int) -> Iterato
     pieces = _Pieces()
     writer: Any = None
     for block in _blocks(rows, ROW_GROUP):
-        columns = {name: pa.array(column, from_pandas=True) for name, column in columns_of(block).items()}
-        table = pa.table(columns)
+        table = pa.table({name: _arrow(column) for name, column in columns_of(block).items()})
         if writer is None:
             words = [field.name for field in table.schema if pa.types.is_string(field.type)]
             writer = pq.ParquetWriter(pieces, table.schema, use_dictionary=words, compression="snappy")
@@ -103,6 +104,16 @@ def parquet_pieces(columns_of: Callable[[slice], Columns], rows: int) -> Iterato
         yield from pieces.taken()
     writer.close()
     yield from pieces.taken()
+
+
+def _arrow(column: AnyArray) -> Any:
+    """A column of a Parquet file; of words, which cost a microsecond each to convert, those that follow others."""
+    import pyarrow as pa
+
+    fresh = _changes(column) if column.dtype.kind == "U" else None
+    if fresh is None:
+        return pa.array(column, from_pandas=True)
+    return pa.array(column[fresh]).take(pa.array(np.cumsum(fresh) - 1))
 
 
 def _blocks(rows: int, size: int) -> Iterator[slice]:
@@ -137,18 +148,60 @@ class _Pieces:
 
 def _by_digits(columns: Columns, decimals: Decimals) -> bytes | None:
     """Rows as `csv_rows` has them; None where a number is infinite or too large, or a word is not plain ASCII."""
-    cells = []
-    for name, column in columns.items():
-        cell = _cell(np.asarray(column), decimals[name])
-        if cell is None:
+    parts = []
+    for names, fresh in _runs(columns):
+        some = [columns[name] if fresh is None else columns[name][fresh] for name in names]
+        part = _joined([_cell(np.asarray(column), decimals[name]) for name, column in zip(names, some, strict=True)])
+        if part is None:
             return None
-        cells.append(cell)
-    ends = np.cumsum([cell.shape[1] + 1 for cell in cells])
-    rows = np.full((len(cells[0]), int(ends[-1])), ord(","), dtype=np.uint8)
-    for cell, end in zip(cells, ends, strict=True):
-        rows[:, end - 1 - cell.shape[1] : end - 1] = cell
+        parts.append(part if fresh is None else part.take(np.cumsum(fresh) - 1, axis=0))
+    rows = np.concatenate(parts, axis=1)
     rows[:, -1] = ord("\n")
     return rows.tobytes().replace(b"\0", b"")
+
+
+def _runs(columns: Columns) -> Iterator[tuple[list[str], BoolArray | None]]:
+    """Columns side by side that are written alike: all rows, or those (n,) in which any of them changes.
+
+    At a corner of a path the end of one move and the start of the next stand at the same place: half the digits of a
+    program of short moves are those of the row before.
+    """
+    names: list[str] = []
+    changed: BoolArray | None = None
+    for name, column in columns.items():
+        differs = _changes(column)
+        either = None if changed is None or differs is None else _if_few(changed | differs)
+        if names and either is None and not (changed is None and differs is None):
+            yield names, changed
+            names, either = [], None
+        names.append(name)
+        changed = differs if either is None else either
+    yield names, changed
+
+
+def _if_few(fresh: BoolArray) -> BoolArray | None:
+    return fresh if np.count_nonzero(fresh) <= MOST_FRESH * len(fresh) else None
+
+
+def _changes(column: AnyArray) -> BoolArray | None:
+    """(n,) whether a number or word is another one than in the row before; None where most are."""
+    if not len(column):
+        return None
+    fresh = np.ones(len(column), dtype=bool)
+    np.not_equal(column[1:], column[:-1], out=fresh[1:])
+    return _if_few(fresh)
+
+
+def _joined(cells: Sequence[Cells | None]) -> Cells | None:
+    """Cells side by side, a comma behind each; None where one of them is none."""
+    known = [cell for cell in cells if cell is not None]
+    if len(known) < len(cells):
+        return None
+    ends = np.cumsum([cell.shape[1] + 1 for cell in known])
+    rows = np.full((len(known[0]), int(ends[-1])), ord(","), dtype=np.uint8)
+    for cell, end in zip(known, ends, strict=True):
+        rows[:, end - 1 - cell.shape[1] : end - 1] = cell
+    return rows
 
 
 def _cell(column: AnyArray, digits: int | None) -> Cells | None:
@@ -160,41 +213,55 @@ def _cell(column: AnyArray, digits: int | None) -> Cells | None:
         longest = int(np.flatnonzero(letters.any(axis=0)).max(initial=-1)) + 1
         return letters[:, :longest].astype(np.uint8) if letters.max() < 128 else None
     if digits is None:
-        return _number(column, 0) if column.dtype.kind in "iu" and (np.abs(column) < LARGEST).all() else None
-    missing = np.isnan(column)
+        if column.dtype.kind not in "iu":
+            return None
+        low, high = int(column.min()), int(column.max())
+        return _number(column, 0, low, high) if max(-low, high) < LARGEST else None
     # As numpy's round counts them, so that both ways print the same digits.
-    units = np.rint(np.where(missing, 0.0, column) * 10.0**digits)
-    if not (np.abs(units) < LARGEST).all():
+    units = np.rint(column * 10.0**digits)
+    missing = None
+    if math.isnan(units.min()):
+        missing = np.isnan(units)
+        units[missing] = 0.0
+    ends = float(units.min()), float(units.max())
+    if not max(-ends[0], ends[1]) < LARGEST:
         return None
-    cell = _number(units.astype(np.int64), digits)
-    return np.where(missing[:, None], np.uint8(0), cell) if missing.any() else cell
+    cell = _number(units, digits, int(ends[0]), int(ends[1]))
+    return cell if missing is None else np.where(missing[:, None], np.uint8(0), cell)
 
 
-def _number(units: AnyArray, digits: int) -> Cells:
-    """Whole numbers of units (n,) with a decimal point before the last `digits`."""
-    low, high = int(units.min()), int(units.max())
+def _number(units: AnyArray, digits: int, low: int, high: int) -> Cells:
+    """Whole numbers of units (n,), from `low` to `high`, with a decimal point before the last `digits`."""
     if low == high:  # an axis that stands still, the only tool
         text = f"{abs(low):0{digits + 1}d}"
         text = "-" * (low < 0) + (f"{text[:-digits]}.{text[-digits:]}" if digits else text)
         return np.broadcast_to(np.frombuffer(text.encode(), dtype=np.uint8), (len(units), len(text)))
-    size = np.abs(units)
-    least, width = int(size.min()), max(len(str(size.max())), digits + 1)
+    largest = max(-low, high)
+    # Half as wide numbers are divided four times as fast.
+    size = np.abs(units).astype(np.uint32 if largest < 2**32 else np.int64)
+    least, width = max(low, -high, 0), max(len(str(largest)), digits + 1)
     fours = np.empty((len(units), -(-width // 4)), dtype=np.uint32)
-    rest = size
-    for place in range(fours.shape[1] - 1, -1, -1):
+    rest: Any = size
+    for place in range(fours.shape[1] - 1, 0, -1):
         above = rest // 10_000
         fours[:, place] = _FOUR_DIGITS.take(rest - 10_000 * above, mode="clip")
         rest = above
+    fours[:, 0] = _FOUR_DIGITS.take(rest, mode="clip")
     figures = fours.view(np.uint8)[:, -width:]
     for place in range(width - digits - 1):  # no zeros before the first figure, but the one before the point
         if least < 10 ** (width - 1 - place):
             figures[:, place] *= size >= 10 ** (width - 1 - place)
-    parts = [figures[:, : width - digits]]
-    if low < 0:
-        parts.insert(0, np.where(units < 0, np.uint8(ord("-")), np.uint8(0))[:, None])
+    if not digits and low >= 0:
+        return figures
+    sign, point = int(low < 0), width - digits
+    cell = np.empty((len(units), sign + width + bool(digits)), dtype=np.uint8)
+    if sign:
+        np.multiply(units < 0, np.uint8(ord("-")), out=cell[:, 0])
+    cell[:, sign : sign + point] = figures[:, :point]
     if digits:
-        parts += [np.full((len(units), 1), ord("."), dtype=np.uint8), figures[:, width - digits :]]
-    return np.concatenate(parts, axis=1)
+        cell[:, sign + point] = ord(".")
+        cell[:, sign + point + 1 :] = figures[:, point:]
+    return cell
 
 
 # "0000" to "9999" as four bytes each.

@@ -97,7 +97,7 @@ def test_an_error_midway_leaves_everything_as_it_was(analysis, tmp_path, monkeyp
     def fail(*_args, **_kwargs):
         raise error
 
-    monkeypatch.setattr(page_module, "page", fail)
+    monkeypatch.setattr(page_module, "page_pieces", fail)
     with pytest.raises(type(error)):
         write(analysis, out)
     assert tree(tmp_path) == before

@@ -211,9 +211,14 @@ def along_tool_axis(tangent: FloatArray, abc: FloatArray) -> BoolArray:
 
 def plunging_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: BoolArray) -> BoolArray:
     """(n,) the counted samples of plunges; none where the load does not follow the motion. As `headline_rows`."""
-    if load.kind != "tangential":
+    if not follows_motion(load):
         return np.zeros(len(counted), dtype=bool)
     return np.asarray(counted & along_tool_axis(tangent, abc))
+
+
+def follows_motion(load: Load) -> bool:
+    """Whether the load points along the motion, so that a plunge is another case than a cut across the axis."""
+    return load.kind == "tangential"
 
 
 def headline_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: BoolArray) -> BoolArray:

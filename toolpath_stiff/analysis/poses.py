@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m
 
 BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
+MOST_NEW = 0.8  # share of rows; where fewer are poses of their own, each pose is evaluated once
 Progress = Callable[[int, int], None]
 
 MOST_POINTS = 5_000_000
@@ -120,7 +122,8 @@ def evaluate(
     n = len(position)
     load = load or Load()
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    route = core.choose_route(model, n)  # by all poses, not by those of a block
+    new = _new_poses(position, abc, lengths)
+    route = core.choose_route(model, int(np.count_nonzero(new)))  # by all poses, not by those of a block
     result = PoseStiffness(
         stiffness=np.empty(n),
         direction=np.empty((n, 3)),
@@ -136,7 +139,7 @@ def evaluate(
         rows = slice(start, min(start + BLOCK, n))
         left: slice | IntArray = rows
         if route != "exact" and load.kind != "softest":
-            left = _evaluate_fast(model.machine, rows, position, abc, tangent, lengths, load, route, result)
+            left = _evaluate_fast(model.machine, rows, new, position, abc, tangent, lengths, load, route, result)
         if isinstance(left, slice) or len(left):
             _evaluate_rows(model, left, position, abc, tangent, lengths, load, force, route, result)
         if progress:
@@ -144,9 +147,30 @@ def evaluate(
     return result
 
 
+def _new_poses(position: FloatArray, abc: FloatArray, tool_length: FloatArray) -> BoolArray:
+    """(n,) whether a row is another pose than the one before it, of more than two alike every other one.
+
+    At a corner of a path the end of one move and the start of the next are one pose under two loads. True throughout
+    where few rows are such.
+    """
+    new = np.zeros(len(position), dtype=bool)
+    new[:1] = True
+    tools = () if isinstance(_one_if_equal(tool_length), float) else (tool_length,)
+    for values in (*position.T, *abc.T, *tools):
+        new[1:] |= values[1:] != values[:-1]
+    if np.count_nonzero(new) > MOST_NEW * len(new):
+        return np.ones_like(new)
+    third = ~(new[1:] | new[:-1])
+    if third.any():
+        row = np.arange(len(new))
+        new |= (row - np.maximum.accumulate(np.where(new, row, 0))) % 2 == 0
+    return new
+
+
 def _evaluate_fast(
     machine: Machine,
     rows: slice,
+    new: BoolArray,
     position: FloatArray,
     abc: FloatArray,
     tangent: FloatArray,
@@ -157,30 +181,52 @@ def _evaluate_fast(
 ) -> IntArray:
     """Poses of struts on a rigid platform along loads that the geometry directs: margins and stiffness at once.
 
-    Returns the rows that are left: other directions, poses near singular ones, and where an angle near zero decides.
+    `new` (n,) as of `_new_poses`. Returns the rows that are left: other directions, poses near singular ones, and where
+    an angle near zero decides.
     """
-    left = []
-    rotation = rotation_matrices(abc[rows]) if np.any(abc[rows] != 0.0) else None
-    direction, known = geometric_directions(load, position[rows], rotation, tangent[rows])
+    left: list[Any] = []
+    samples = _rows_of_poses(rows, new[rows])
+    poses = samples[0]
+    rotation = rotation_matrices(abc[poses]) if np.any(abc[rows] != 0.0) else None
+    directed = [geometric_directions(load, position[some], rotation, tangent[some]) for some in samples]
     turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
-    tip, towards = (np.ascontiguousarray(values.T) for values in (position[rows], direction))
-    for tool, some in _of_one_tool(tool_length[rows]):
-        into = rows if isinstance(some, slice) else rows.start + some
+    tip, towards = np.ascontiguousarray(position[poses].T), np.stack([direction.T for direction, _ in directed])
+    for tool, some in _of_one_tool(tool_length[poses]):
         turn = None if turns is None else turns[:, some]
         there = tip[:, some]
-        along, determinant, lengths, good = core.compliance_along_columns(
-            machine, there, towards[:, some], turn, tool, route
+        compliance, determinant, lengths, good = core.compliance_along_columns(
+            machine, there, towards[:, :, some], turn, tool, route
         )
         stand, sure = gauge_of(machine).reach(there, lengths, determinant, turn, tool)
-        sure &= good & known[some] & (along > 0.0) & (along < np.inf)  # the others are looked at one by one
-        along[~(stand.reachable & known[some])] = np.nan
-        result.stiffness[into] = 1.0 / along
-        result.direction[into] = direction[some]
-        result.strut_lengths[into] = lengths.T
-        result.extrapolated[into] = machine.strut_law.room(lengths).min(axis=0) < 0.0
-        result.margin[into], result.limit[into], result.limit_value[into] = stand.margin, stand.limit, stand.value
-        left.append(np.arange(rows.start, rows.stop)[some][~sure])
-    return np.concatenate(left)
+        extrapolated = machine.strut_law.room(lengths).min(axis=0) < 0.0
+        for into, (direction, known), along in zip(samples, directed, compliance, strict=True):
+            at = _part(into, some)
+            certain = sure & good & known[some] & (along > 0.0) & (along < np.inf)
+            along[~(stand.reachable & known[some])] = np.nan
+            result.stiffness[at] = 1.0 / along
+            result.direction[at] = direction[some]
+            result.strut_lengths[at] = lengths.T
+            result.extrapolated[at] = extrapolated
+            result.margin[at], result.limit[at], result.limit_value[at] = stand.margin, stand.limit, stand.value
+            if not certain.all():
+                left.append(_part(at, np.flatnonzero(~certain)))  # they are looked at one by one
+    return np.unique(np.concatenate(left)) if left else np.empty(0, dtype=np.int64)
+
+
+def _part(rows: slice | IntArray, some: slice | IntArray) -> slice | IntArray:
+    """Some of the rows; `some` counts from the first of them, and is all of them if it is a slice."""
+    if isinstance(some, slice):
+        return rows
+    return rows.start + some if isinstance(rows, slice) else rows[some]
+
+
+def _rows_of_poses(rows: slice, new: BoolArray) -> list[slice | IntArray]:
+    """Rows of the first sample of each pose of a block, and of the last; `new` (n,) of its rows as of `_new_poses`."""
+    if new.all():
+        return [rows]
+    first = np.flatnonzero(new[1:]) + 1
+    first = rows.start + np.concatenate([[0], first])
+    return [first, np.append(first[1:], rows.stop) - 1]
 
 
 def _of_one_tool(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:

@@ -15,7 +15,6 @@ from toolpath_stiff.analysis.statistics import (
     EvaluatedPath,
     ParameterBand,
     band_figures,
-    class_figures,
     describe_sample,
     parameter_band,
     path_length,
@@ -23,7 +22,6 @@ from toolpath_stiff.analysis.statistics import (
     per_tool,
     samples_frame,
     share,
-    weakest_places,
 )
 from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.errors import ProgramError, UnreachableError
@@ -287,7 +285,7 @@ def assumptions(analysis: Analysis) -> list[str]:
 def summarise(analysis: Analysis) -> dict[str, Any]:
     """The figures of `summary.json`, in the shop's units."""
     samples = analysis.samples
-    places = weakest_places(analysis)
+    places = analysis.weakest
     cutting = samples.cutting & analysis.at.reachable
     x, y, z, a, b, c = analysis.origin
     nearest = int(np.argmin(np.where(cutting, analysis.at.margin, np.inf)))
@@ -306,7 +304,7 @@ def summarise(analysis: Analysis) -> dict[str, Any]:
         "cutting_length_mm": mm_from_m(path_length(samples, rapid=False)),
         "rapid_length_mm": mm_from_m(path_length(samples, rapid=True)),
         "time_s": float(samples.t[-1]) if len(samples) else 0.0,
-        **class_figures(analysis, np.arange(len(samples))),
+        **analysis.figures,
         **({} if band is None else {"parameter_uncertainty": band}),
         "weakest_places": [describe_sample(analysis, row) for row in places],
         "per_tool": per_tool(analysis),

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_of, headline_words, plunging_rows
+from toolpath_stiff.analysis.loads import Load, along_tool_axis, follows_motion, headline_of, headline_words
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
@@ -44,6 +44,7 @@ COLUMNS: dict[str, int | None] = {
     "cut": None,
 }
 
+FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
 STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
 
 
@@ -75,9 +76,14 @@ class EvaluatedPath:
         return np.asarray(self.samples.cutting & self.at.reachable & (self.samples.weight > 0.0))
 
     @cached_property
+    def along_axis(self) -> BoolArray:
+        """(n,) samples whose tip moves along the tool axis."""
+        return along_tool_axis(self.samples.tangent, self.samples.abc)
+
+    @cached_property
     def plunging(self) -> BoolArray:
         """(n,) counted samples of plunges along the tool axis; none where the load does not follow the motion."""
-        return plunging_rows(self.load, self.samples.tangent, self.samples.abc, self.counted)
+        return np.asarray(self.counted & self.along_axis if follows_motion(self.load) else np.zeros_like(self.counted))
 
     @property
     def headline(self) -> BoolArray:
@@ -88,6 +94,32 @@ class EvaluatedPath:
     def set_aside(self) -> BoolArray:
         """(n,) plunges beside the headline; none of a program that only plunges."""
         return np.asarray(self.counted & ~self.headline)
+
+    @cached_property
+    def figures(self) -> dict[str, Any]:
+        """`class_figures` of the whole path."""
+        return class_figures(self, np.arange(len(self.samples)))
+
+    @cached_property
+    def weakest(self) -> list[int]:
+        """The rows of `weakest_places`."""
+        return weakest_places(self)
+
+    @cached_property
+    def central_range(self) -> tuple[float, float]:
+        """Lowest and highest of `charted` in N/m, values far out set aside."""
+        return central_range(*self.charted)
+
+    @property
+    def charted(self) -> tuple[FloatArray, FloatArray]:
+        """Stiffness in N/m and length in m of the headline samples.
+
+        A program that only turns rotary axes has none: then every reachable cutting sample counts alike.
+        """
+        about, weight = self.headline, self.samples.weight
+        if not about.any():
+            about, weight = self.samples.cutting & self.at.reachable, np.ones(len(weight))
+        return self.at.stiffness[about], weight[about]
 
     @property
     def deflection(self) -> FloatArray:
@@ -140,6 +172,17 @@ def weakest_places(path: EvaluatedPath, count: int = 3) -> list[int]:
         chosen.append(best)
         rows = rows[(np.abs(s[rows] - s[best]) >= apart) & (line[rows] != line[best])]
     return chosen
+
+
+def central_range(stiffness: FloatArray, weight: FloatArray) -> tuple[float, float]:
+    """Lowest and highest of values (n,) with weights (n,), those far out (`FENCE`) set aside."""
+    order = np.argsort(stiffness, kind="stable")
+    length = np.cumsum(weight[order])
+    lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
+    reach = FENCE * (upper - lower)
+    inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
+    values = inside if np.ptp(inside) > 0.0 else stiffness
+    return float(values.min()), float(values.max())
 
 
 def share(condition: BoolArray, among: BoolArray) -> float:
@@ -261,10 +304,7 @@ class _Parts:
         self.time = np.bincount(of_move, time, count)
         self.out_of_reach = path.out_of_reach
         self.margin = np.where(samples.cutting & path.at.reachable, path.at.margin, np.inf)
-        of_sample = of_move[samples.move]
-        order = np.argsort(of_sample, kind="stable")
-        ends = np.searchsorted(of_sample[order], np.arange(count + 1))
-        self.rows = [order[ends[part] : ends[part + 1]] for part in range(count)]
+        self.rows = _rows_of_parts(of_move[samples.move], count)
 
     def row(self, part: int) -> dict[str, Any]:
         """Length, time, figures, weakest place and nearest limit of one part."""
@@ -275,12 +315,21 @@ class _Parts:
             "cutting_length_mm": mm_from_m(float(self.cutting_length[part])),
             "rapid_length_mm": mm_from_m(float(self.rapid_length[part])),
             "time_s": float(self.time[part]),
-            **class_figures(path, rows),
+            **(path.figures if len(rows) == len(path.samples) else class_figures(path, rows)),
             "min_margin": float(self.margin[nearest]) if known else None,
             "min_margin_limit": path.at.reach.describe(nearest) if known else None,
             "min_margin_line": int(path.samples.line[nearest]) if known else None,
             "out_of_reach_samples": int(self.out_of_reach[rows].sum()),
         }
+
+
+def _rows_of_parts(part: IntArray, count: int) -> list[IntArray]:
+    """The rows of each of `count` parts, in order; `part` (n,) says in which each row is."""
+    if count == 1:
+        return [np.arange(len(part))]
+    order = np.argsort(part, kind="stable")
+    ends = np.searchsorted(part[order], np.arange(count + 1))
+    return [order[ends[one] : ends[one + 1]] for one in range(count)]
 
 
 def describe_sample(path: EvaluatedPath, row: int) -> dict[str, Any]:
@@ -411,14 +460,14 @@ def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, 
         "margin": at.margin[rows],
         "margin_limit": names[at.limit[rows]],
         "operation": path.operations.of_move[path.samples.move[rows]] + 1,
-        "cut": _cut(path.samples.take(rows)),
+        "cut": _cut(path, rows),
     }
 
 
-def _cut(samples: Samples) -> TextArray:
+def _cut(path: EvaluatedPath, rows: slice) -> TextArray:
     """(n,) "across" or "plunge", whatever the load; "" on rapids and where the tip does not move."""
-    moving = samples.cutting & samples.tangent.any(axis=1)
-    return np.where(moving, np.where(along_tool_axis(samples.tangent, samples.abc), "plunge", "across"), "")
+    moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)
+    return np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), "")
 
 
 def samples_frame(path: EvaluatedPath) -> pd.DataFrame:

@@ -45,9 +45,13 @@ _COMMENT = r"(?:\([^()\n]*+\))*+"
 _LINE = rf"^{_COMMENT}(?:N[0-9]++)?(?:G0?([0-3]))?{_FEED}{_WORDS}{_FEED}{_SPEED}{_COMMENT}%s$|^(.+)$"
 _BARE_NUMBER = re.compile(r"^[+-]?0*[1-9][0-9]*$")
 
-_DIGIT, _POINT, _SIGN, _LETTER, _END, _OTHER = range(6)
+_POINT, _SIGN, _LETTER, _END, _OTHER = range(1, 6)
 MOST_DIGITS = 15
 _TENS = 10.0 ** np.arange(MOST_DIGITS + 1)  # exact
+_BEFORE = b"0" * 16  # so that 16 characters stand before any place in the text
+_MASKS = np.array([0x0F0F0F0F0F0F0F0F & ~((1 << 8 * (8 - n)) - 1) for n in range(9)], dtype=np.uint64)  # n digits
+_SHIFTS = np.arange(0, 72, 8, dtype=np.uint64)  # past n digits
+_PAIRS, _EVEN, _ODD = np.uint64(0x000000FF000000FF), np.uint64(100 + (1000000 << 32)), np.uint64(1 + (10000 << 32))
 _FEED_RANK = KEYS.index(FIRST_F)
 
 
@@ -60,7 +64,7 @@ def _pattern(semicolon: bool) -> re.Pattern[str]:
 def _tables() -> tuple[ByteArray, NDArray[np.int8]]:
     """Class and rank (place in `KEYS`; -1 for none) of each byte; small letters are as large ones."""
     kinds, ranks = np.full(256, _OTHER, dtype=np.uint8), np.full(256, -1, dtype=np.int8)
-    kinds[ord("0") : ord("9") + 1], kinds[ord(".")], kinds[ord("\n")] = _DIGIT, _POINT, _END
+    kinds[ord(".")], kinds[ord("\n")] = _POINT, _END
     kinds[[ord("+"), ord("-")]] = _SIGN
     for rank, key in enumerate(KEYS):
         if key != LAST_F:
@@ -141,12 +145,10 @@ class PlainLines:
         chunk = self.lines[at : at + CHUNK]
         if max(map(len, chunk)) > LONGEST_PLAIN:
             chunk = [line if len(line) <= LONGEST_PLAIN else "!" for line in chunk]
-        text = "\n".join(chunk).replace(" ", "").replace("\t", "")
-        line, rank, value, form, odd = _tokens(text)
+        line, rank, value, form, odd = _tokens("\n".join(chunk))
         others = np.empty(0, dtype=np.int64)
         if len(odd):
-            every = text.split("\n")
-            more, others = self._by_pattern([every[row] for row in odd.tolist()], odd)
+            more, others = self._by_pattern([_without_blanks(chunk[row]) for row in odd.tolist()], odd)
             line, rank = np.append(line, more[0]), np.append(rank, more[1])
             value, form = np.append(value, more[2]), np.append(form, more[3])
         self._start, self._words = at, _in_columns(len(chunk), line, rank, value, form)
@@ -172,36 +174,42 @@ class PlainLines:
         return (where[:, 0], where[:, 1], value, forms), np.array(others, dtype=np.int64)
 
 
+def _without_blanks(line: str) -> str:
+    return line.replace(" ", "").replace("\t", "")
+
+
 def _tokens(text: str) -> tuple[IntArray, IntArray, FloatArray, ByteArray, IntArray]:
     """Line, rank, value and form of each word of the lines of words alone; the other lines."""
-    codes = np.frombuffer(f"\n{text}\n".encode("ascii", "replace"), dtype=np.uint8)
-    kinds = _KINDS[codes]
-    at = np.flatnonzero(kinds >= _LETTER)  # what begins a word, ends a line, or is none of it
-    begins, kind = codes[at], kinds[at]
-    size = np.diff(at, append=len(codes))  # characters, the first one included
-    of = np.repeat(np.arange(len(at)), size)
+    characters = text.encode("ascii", "replace").translate(None, b" \t")
+    buffer = b"%b\n%b\n" % (_BEFORE, characters)
+    codes = np.frombuffer(buffer, dtype=np.uint8)
+    marks = np.flatnonzero(codes - np.uint8(ord("0")) > 9)  # all characters but digits
+    kinds = np.append(_KINDS[codes[marks]], np.array([_END, _END], dtype=np.uint8))
+    first = np.flatnonzero(kinds[:-2] >= _LETTER)  # what begins a word, ends a line, or is none of it
+    following = np.append(first[1:], len(marks))
+    at, kind = marks[first], kinds[first]
+    end = np.append(at[1:], len(codes))
     is_end = kind == _END
     line = np.cumsum(is_end) - 1
-    points, signs = np.flatnonzero(kinds == _POINT), np.flatnonzero(kinds == _SIGN)
-    point_count = np.bincount(of[points], minlength=len(at))
-    signed = np.bincount(of[signs], minlength=len(at))
-    digits = size - 1 - point_count - signed
-    decimals = np.zeros(len(at), dtype=np.int64)
-    decimals[of[points]] = at[of[points]] + size[of[points]] - 1 - points
-    rank = _ranks(begins, kind)
+    signed = kinds[first + 1] == _SIGN
+    pointed = kinds[first + 1 + signed] == _POINT
+    last = first + signed + pointed
+    sign, point = marks.take(first + 1, mode="clip"), np.where(pointed, marks.take(last, mode="clip"), end)
+    digits, decimals = end - at - 1 - (last - first), end - point - pointed
+    rank = _ranks(codes[at], kind)
     unsigned = (rank < _FEED_RANK + 1) | (rank >= len(KEYS) - 2)
-    whole = rank < _FEED_RANK
-    bad = (digits < 1) | (digits > MOST_DIGITS) | (point_count > 1) | (unsigned & (signed > 0))
-    bad |= (whole & (point_count > 0)) | (rank <= np.concatenate([[-1], rank[:-1]])) | (kind == _OTHER)
-    bad[is_end] = size[is_end] > 1  # numbers without a letter
-    bad[of[signs[kinds[signs - 1] != _LETTER]]] = True
-    value = _values(codes, kinds, of, digits, np.minimum(decimals, MOST_DIGITS))
-    value[of[signs[codes[signs] == ord("-")]]] *= -1.0
+    bad = (digits < 1) | (digits > MOST_DIGITS) | (unsigned & signed) | ((rank < _FEED_RANK) & pointed)
+    bad |= (signed & (sign > at + 1)) | (following > last + 1)  # misplaced, or too many
+    bad[1:] |= rank[1:] <= rank[:-1]
+    bad |= kind == _OTHER
+    bad[is_end] = (end > at + 1)[is_end]  # numbers without a letter
+    value = _values(buffer, point, end, digits, decimals)
+    value[codes[sign] == ord("-")] *= -1.0
     bad |= (rank == KEYS.index("G")) & ((digits > 2) | (value > 3.0))
     odd = np.zeros(int(line[-1]) + 1, dtype=bool)
     odd[line[bad]] = True
     kept = ~is_end & ~odd[line]
-    form = np.where(point_count == 0, BARE, np.where(decimals == 0, POINTED, BROKEN)).astype(np.uint8)
+    form = np.where(pointed, np.where(decimals == 0, POINTED, BROKEN), BARE).astype(np.uint8)
     return line[kept], rank[kept], value[kept], form[kept], np.flatnonzero(odd)
 
 
@@ -213,13 +221,33 @@ def _ranks(begins: ByteArray, kind: ByteArray) -> IntArray:
     return rank
 
 
-def _values(codes: ByteArray, kinds: ByteArray, of: IntArray, digits: IntArray, decimals: IntArray) -> FloatArray:
-    """The numbers, without their signs, of words of up to `MOST_DIGITS` digits."""
-    at = np.flatnonzero(kinds == _DIGIT)
-    word = of[at]
-    after = np.cumsum(digits)[word] - 1 - np.arange(len(at))  # digits of the word that follow
-    parts = (codes[at] - np.uint8(ord("0"))) * _TENS[np.minimum(after, MOST_DIGITS)]
-    return np.asarray(np.bincount(word, weights=parts, minlength=len(digits)) / _TENS[decimals])
+def _values(buffer: bytes, point: IntArray, end: IntArray, digits: IntArray, decimals: IntArray) -> FloatArray:
+    """The numbers, without their signs, of words of up to `MOST_DIGITS` digits: `decimals` of them before `end`.
+
+    Eight characters are one word of 64 bits, whose digits add up by pairs, fours and eights: three multiplications.
+    Lemire, "Number parsing at a gigabyte per second", Software: Practice and Experience 51 (2021) 1700.
+    """
+    eights = np.ndarray(len(buffer) - 7, dtype="<u8", buffer=buffer, strides=(1,))  # the eight from each place on
+    bits = eights[end - 8] & _MASKS.take(decimals, mode="clip")
+    bits |= (eights[point - 8] & _MASKS.take(digits - decimals, mode="clip")) >> _SHIFTS.take(decimals, mode="clip")
+    found = _sum_of_digits(bits)
+    longer = np.flatnonzero((digits > 8) & (digits <= MOST_DIGITS))
+    if len(longer):
+        after = decimals[longer]
+        places = ((point[longer], digits[longer] - after), (end[longer], after))
+        before, behind = (
+            1e8 * _sum_of_digits(eights[at - 16] & _MASKS.take(count - 8, mode="clip"))
+            + _sum_of_digits(eights[at - 8] & _MASKS.take(count, mode="clip"))
+            for at, count in places
+        )
+        found[longer] = before * _TENS[after] + behind
+    return np.asarray(found / _TENS.take(decimals, mode="clip"))
+
+
+def _sum_of_digits(bits: NDArray[np.uint64]) -> FloatArray:
+    """The whole numbers that eight characters make, the last digit in the highest byte; bytes of zero before them."""
+    pairs = bits * 10 + (bits >> 8)
+    return np.asarray((((pairs & _PAIRS) * _EVEN + ((pairs >> 16) & _PAIRS) * _ODD) >> 32).astype(np.float64))
 
 
 def _in_columns(n: int, line: IntArray, rank: IntArray, value: FloatArray, form: ByteArray) -> PlainWords:

@@ -39,14 +39,11 @@ def _paint_words(
 
 def add_heading(figure: Figure, analysis: Analysis) -> None:
     """Program, machine, load, mean and range, and those of the plunges, above everything."""
-    from toolpath_stiff.analysis.statistics import class_figures
-
     width, height = figure.get_size_inches()
-    figures = class_figures(analysis, np.arange(len(analysis.samples)))
     name = shortened(plain(analysis.program.name), 70)
     text = (
         f"machine {shortened(plain(analysis.machine.name), 40)}   ·   load {analysis.load}   ·   "
-        f"{headline_text(figures, '   ·   ')}"
+        f"{headline_text(analysis.figures, '   ·   ')}"
     )
     add_words(figure, 0.35 / width, 1.0 - 0.42 / height, name, size=15.0, weight="bold")
     add_words(figure, 0.35 / width, 1.0 - 0.70 / height, text, size=10.5, colour=MUTED)

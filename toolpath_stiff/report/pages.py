@@ -10,7 +10,7 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,9 @@ from toolpath_stiff.report.words import machine_text, plain
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+
+DATA = Markup("<data>")  # where the data of a page go; what is not `Markup` has no such letters in a page
+LONG_LIST = 20_000  # entries
 
 Row = tuple[str, Sequence[str]]  # class of the row, its cells: text, or `Markup`
 
@@ -46,15 +49,27 @@ def render(
     values
         What the template names.
     """
+    return "".join(render_pieces(template, styles=styles, scripts=scripts, data=data, **values))
+
+
+def render_pieces(
+    template: str, *, styles: Sequence[str] = (), scripts: Sequence[str] = (), data: Any = None, **values: Any
+) -> Iterator[str]:
+    """The same in pieces: the data of a long program are most of a page, and stand in memory once."""
     script = '\n"use strict";\n(() => {\n' + "".join(map(asset, scripts)) + "})();\n" if scripts else ""
-    return _templates().get_template(template).render(
+    text = _templates().get_template(template).render(
         style=Markup("".join(map(asset, ("page.css", *styles)))),
         script=Markup(script),
         script_hash=script_hash(script),
-        data=None if data is None else Markup(json_for_script(data)),
+        data=None if data is None else DATA,
         version=VERSION,
         **values,
     )  # fmt: skip
+    before, mark, after = text.partition(DATA)
+    yield before
+    if mark:
+        yield from json_pieces(data)
+        yield after
 
 
 @cache
@@ -84,7 +99,32 @@ def script_hash(script: str) -> str:
 
 def json_for_script(value: Any) -> str:
     """JSON that can stand inside a script element: nothing in it ends the element, or a line of JavaScript."""
+    return "".join(json_pieces(value))
+
+
+def json_pieces(value: Any) -> Iterator[str]:
+    """The text of `json_for_script` in pieces: the values of an object and the entries of a long list one by one."""
+    if isinstance(value, dict) and value:
+        before = "{"
+        for key, entry in value.items():
+            yield f"{before}{_json(str(key))}:"
+            yield from json_pieces(entry)
+            before = ","
+        yield "}"
+    elif isinstance(value, list) and len(value) > LONG_LIST:
+        before = "["
+        for start in range(0, len(value), LONG_LIST):
+            yield before + _json(value[start : start + LONG_LIST])[1:-1]
+            before = ","
+        yield "]"
+    else:
+        yield _json(value)
+
+
+def _json(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    if text.isascii() and not any(character in text for character in "<>&"):  # a long text is searched, not copied
+        return text
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
     # A lone surrogate (a byte that was no text) cannot be written as UTF-8, and browsers stumble over it.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
+from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.report.captions import add_heading, add_legend
 from toolpath_stiff.report.figure import (
     DPI,
@@ -105,7 +105,7 @@ def profile_picture(
     if strip:
         _operations(axes, analysis, strip / frame)
     _line_numbers(axes, analysis, 1.0 + strip / frame)
-    places = weakest_places(analysis)
+    places = analysis.weakest
     spots = [(float(s[row]), float(k[row])) for row in places]
     label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
     _legend(figure, axes)

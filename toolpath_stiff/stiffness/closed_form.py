@@ -154,18 +154,18 @@ def compliance_along_columns(
     kernel
         From `prepare`.
     position, direction
-        (3, n) m and unit vectors, poses last.
+        (3, n) m and unit vectors, poses last; or (k, 3, n) vectors, k a pose.
     rotation
         (9, n) rows of the rotation matrices one after the other; None: vertical spindle.
 
     Returns
     -------
     compliance, determinant, lengths, good
-        (n,) m/N; (n,) |det J| in m^3 (`kinematics.singularity_index` is its ratio to the neutral pose's); (6, n) m,
-        struts in the machine's order; (n,) as in `tip_compliance`.
+        (n,) or (k, n) m/N; (n,) |det J| in m^3 (`kinematics.singularity_index` is its ratio to the neutral pose's);
+        (6, n) m, struts in the machine's order; (n,) as in `tip_compliance`.
     """
-    n = position.shape[1]
-    compliance, determinant, lengths = np.empty(n), np.empty(n), np.empty((6, n))
+    n, loads = position.shape[1], direction if direction.ndim == 3 else direction[None]
+    compliance, determinant, lengths = np.empty((len(loads), n)), np.empty(n), np.empty((6, n))
     good = np.empty(n, dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for rows, work in _blocks(n):
@@ -173,14 +173,15 @@ def compliance_along_columns(
             first, second = _eliminate(kernel, position[:, rows], turn, work)
             for strut, values in zip(kernel.order, work.length, strict=True):
                 lengths[strut, rows] = values
-            force = _forces(work, direction[:, rows])
-            law_holds = _strut_compliances(kernel, work)
-            np.multiply(force, force, out=force)
-            force *= work.six
-            force.sum(axis=0, out=compliance[rows])
+            good[rows] = _strut_compliances(kernel, work) & well_conditioned(kernel, first, second)
             np.abs(first * second, out=determinant[rows])
-            good[rows] = law_holds & well_conditioned(kernel, first, second) & np.isfinite(compliance[rows])
-    return compliance, determinant, lengths, good
+            for load, along in zip(loads, compliance, strict=True):
+                force = _forces(work, load[:, rows])
+                np.multiply(force, force, out=force)
+                force *= work.six
+                force.sum(axis=0, out=along[rows])
+                good[rows] &= np.isfinite(along[rows])
+    return compliance if direction.ndim == 3 else compliance[0], determinant, lengths, good
 
 
 def well_conditioned(kernel: ClosedForm, first: FloatArray, second: FloatArray) -> BoolArray:

@@ -61,26 +61,28 @@ def compliance_along_columns(
     kernel
         From `closed_form.prepare`.
     position, direction
-        (3, n) m and unit vectors, contiguous.
+        (3, n) m and unit vectors, contiguous; or (k, 3, n) vectors, k a pose.
     rotation
         (9, n) rows of the rotation matrices one after the other, contiguous; None: vertical spindle.
 
     Returns
     -------
     compliance, determinant, lengths, good
-        (n,) m/N; (n,) |det J| in m^3 (`kinematics.singularity_index` is its ratio to the neutral pose's); (6, n) m,
-        struts in the machine's order; (n,) as in `closed_form.tip_compliance`.
+        (n,) or (k, n) m/N; (n,) |det J| in m^3 (`kinematics.singularity_index` is its ratio to the neutral pose's);
+        (6, n) m, struts in the machine's order; (n,) as in `closed_form.tip_compliance`.
     """
     from toolpath_stiff.stiffness import compiled_loops
 
-    n = position.shape[1]
-    out, det, lengths = np.empty(n), np.empty((2, n)), np.empty((6, n))
+    n, loads = position.shape[1], np.ascontiguousarray(direction if direction.ndim == 3 else direction[None])
+    out, det, lengths = np.empty((len(loads), n)), np.empty((2, n)), np.empty((6, n))
     arms, frame = _joints(kernel)
     law = (kernel.intercept, kernel.slope)
-    if rotation is None:
-        compiled_loops.directed_vertical(n, position, direction, arms, frame, *law, out, det, lengths)
-    else:
-        compiled_loops.directed_tilted(n, position, rotation, direction, arms, frame, *law, out, det, lengths)
+    for load, along in zip(loads, out, strict=True):
+        if rotation is None:
+            compiled_loops.directed_vertical(n, position, load, arms, frame, *law, along, det, lengths)
+        else:
+            compiled_loops.directed_tilted(n, position, rotation, load, arms, frame, *law, along, det, lengths)
     in_order = np.empty_like(lengths)
     in_order[list(kernel.order)] = lengths
-    return out, np.abs(det[0] * det[1]), in_order, _trusted(kernel, det, out)
+    good = np.asarray(_trusted(kernel, det, out).all(axis=0))
+    return out if direction.ndim == 3 else out[0], np.abs(det[0] * det[1]), in_order, good

@@ -75,7 +75,7 @@ def files(
         "summary.json": lambda: json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
     }
     if plots:
-        from toolpath_stiff.report.analysis.page import page
+        from toolpath_stiff.report.analysis.page import page_pieces
         from toolpath_stiff.report.analysis.path import path_picture
         from toolpath_stiff.report.profile import profile_picture
 
@@ -83,7 +83,7 @@ def files(
         contents["profile.png"] = lambda: profile_picture(
             analysis, other=other, required=required, show_plunges=show_plunges
         )
-        contents["report.html"] = lambda: page(
+        contents["report.html"] = lambda: page_pieces(
             analysis, document, required=required, other=other, show_plunges=show_plunges
         )
     return contents

@@ -9,18 +9,18 @@ content security policy lets only our own script run.
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.statistics import stiffness_figures, weakest_places
+from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report.analysis.path import legend_extend, scale_limits
 from toolpath_stiff.report.figure import page_colours
-from toolpath_stiff.report.pages import bullets, markup, render, table
+from toolpath_stiff.report.pages import bullets, markup, render_pieces, table
 from toolpath_stiff.report.profile import extremes_by_column, profile_curve
 from toolpath_stiff.report.words import (
     FIGURES,
@@ -52,7 +52,19 @@ def page(
     other: Analysis | None = None,
     show_plunges: bool = False,
 ) -> str:
-    """The page as text.
+    """The page as text; arguments as of `page_pieces`."""
+    return "".join(page_pieces(analysis, summary, required=required, other=other, show_plunges=show_plunges))
+
+
+def page_pieces(
+    analysis: Analysis,
+    summary: Mapping[str, Any],
+    *,
+    required: float | None = None,
+    other: Analysis | None = None,
+    show_plunges: bool = False,
+) -> Iterator[str]:
+    """The page in pieces of text.
 
     Parameters
     ----------
@@ -68,7 +80,7 @@ def page(
         How the switch stands that lets plunges set the axis and the colour scale.
     """
     data = page_data(analysis, required, other)
-    return render(
+    return render_pieces(
         "analysis.html",
         styles=["viewer.css", "analysis.css"],
         scripts=SCRIPTS,
@@ -317,7 +329,7 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "kind": _base64(kind.astype("u1")),
         "tools": [[int(i), int(samples.tool[i])] for i in tool_starts],
         "operations": _operation_starts(analysis, samples.move),
-        "weakest": [int(np.searchsorted(rows, row)) for row in weakest_places(analysis)],
+        "weakest": [int(np.searchsorted(rows, row)) for row in analysis.weakest],
         "scale": _scale(analysis, False),
         "scale_with_plunges": _scale(analysis, True) if analysis.set_aside.any() else None,
         "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
@@ -349,7 +361,7 @@ def page_rows(analysis: Analysis) -> IntArray:
     extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too
     firsts = np.searchsorted(analysis.samples.move, [row.first_move for row in analysis.operations.rows])
-    wanted = np.array([0, *weakest_places(analysis)], dtype=np.int64)
+    wanted = np.array([0, *analysis.weakest], dtype=np.int64)
     return np.unique(np.concatenate([*extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.analysis.statistics import weakest_places
 from toolpath_stiff.report.captions import add_heading, add_legend, add_words
 from toolpath_stiff.report.figure import (
     CLASSES,
@@ -40,7 +39,6 @@ BoolArray = NDArray[np.bool_]
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views
 MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
-FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
 UNREACHABLE, PLUNGE = -1, CLASSES  # without a colour of the scale; a lower class wins where segments are joined
 STROKE = 1.5  # points
 TITLE = 6.0  # points above a view
@@ -65,7 +63,7 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     )
     middle, span = _frame(mm_from_m(samples.position[samples.cutting]))
     figure, views, corner = _lay_out(span)
-    places = weakest_places(analysis)
+    places = analysis.weakest
     for axes, (across, up, title) in zip(
         views, ((0, 1, "XY  top"), (0, 2, "XZ  front"), (1, 2, "YZ  side, from +X")), strict=True
     ):
@@ -262,36 +260,18 @@ def _paint_colours(renderer: Any, axes: Axes, colours: FloatArray, left: bool, r
 
 
 def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:
-    """Ends of the colour scale in N/mm: lowest and highest of the headline, values far out (`FENCE`) set aside.
+    """Ends of the colour scale in N/mm: lowest and highest of the headline, values far out set aside.
 
     A few short cuts, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
     that values lie beyond. With `show_plunges` the plunges beside the headline are on the scale, all of them.
     """
-    stiffness, weight = _scaled_samples(analysis)
-    order = np.argsort(stiffness, kind="stable")
-    length = np.cumsum(weight[order])
-    lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
-    reach = FENCE * (upper - lower)
-    inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
-    values = inside if np.ptp(inside) > 0.0 else stiffness
-    low, high = float(values.min()), float(values.max())
+    low, high = map(n_per_mm_from_n_per_m, analysis.central_range)
     if show_plunges and analysis.set_aside.any():
         plunges = n_per_mm_from_n_per_m(analysis.at.stiffness[analysis.set_aside])
         low, high = min(low, float(plunges.min())), max(high, float(plunges.max()))
     if high - low < 1e-6 * high:  # a constant: keep the scale from collapsing
         low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
     return low, high
-
-
-def _scaled_samples(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
-    """Stiffness in N/mm and length of the headline samples.
-
-    A program that only turns rotary axes has none: then every reachable cutting sample counts alike.
-    """
-    about, weight = analysis.headline, analysis.samples.weight
-    if not about.any():
-        about, weight = analysis.samples.cutting & analysis.at.reachable, np.ones(len(weight))
-    return n_per_mm_from_n_per_m(analysis.at.stiffness[about]), weight[about]
 
 
 def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntArray:
@@ -308,6 +288,6 @@ def segment_classes(stiffness: FloatArray, limits: tuple[float, float]) -> IntAr
 
 def legend_extend(analysis: Analysis, limits: tuple[float, float]) -> str:
     """Which ends of the scale headline values lie beyond: "neither", "min", "max" or "both" (matplotlib's words)."""
-    stiffness = _scaled_samples(analysis)[0]
+    stiffness = n_per_mm_from_n_per_m(analysis.charted[0])
     below, above = bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])
     return {(False, False): "neither", (True, False): "min", (False, True): "max"}.get((below, above), "both")
