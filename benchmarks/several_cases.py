@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.diagnosis_cases import judged
+from benchmarks.several_seen import shows_beside
 from toolpath_stiff import rig
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.rig.hidden import Nuisances
@@ -103,6 +104,9 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     elif job.way == "option":
         rows = {name: values for name, values in rows.items() if name != "sd_N_per_mm"}
         stated["noise"] = (job.factor * nuisances.repeat, job.factor * nuisances.clamping)
+    if len(truth["effects"]) > 1:
+        beside = zip(truth["effects"], shows_beside(case), strict=True)
+        truth["effects"] = [{**effect, "beside": round(length, 2)} for effect, length in beside]
     if job.slip:
         rows, more["slips"] = slipped_case(case, job.seed, job.slip)
     try:
@@ -113,10 +117,18 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
                        "refused": message, "suspects": suspects_of_refusal(message)}  # fmt: skip
     return more | record | {
         "noise_found": document["noise"],
+        "invisible": invisible(document),
         "noise_remarks": noise_remarks(document),
         # The folder is another one in every run.
         "suspects": json.loads(json.dumps(document.get("suspect_rows", [])).replace(f"{folder}/", "")),
     }  # fmt: skip
+
+
+def invisible(document: Mapping[str, Any]) -> list[str]:
+    """Effects of which the document says that these readings would show none of their parameters at any size."""
+    entries = document["detectable"]
+    seen = {entry["effect"] for entry in entries if entry["detectable"]}
+    return sorted({entry["effect"] for entry in entries} - seen)
 
 
 def suspects_of_refusal(message: str) -> list[dict[str, Any]]:
