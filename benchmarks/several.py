@@ -107,8 +107,9 @@ _WHAT = (
     "Each case is a machine of [the rig](../docs/rig.md) with 2 % repeat noise, 1 % clamping, 1 % strut spread, joints "
     "off by 0.5 mm and 2 % wild readings unless more is said. Pairs change the stiffness by 10 and 5 % rms, three "
     "effects by 10, 7 and 5 %, less where a bound is nearer. An effect that does not show alone (detectability below "
-    "3.9) cannot be found beside others either; one that does may still be taken up by the sizes of the others: "
-    "how far it shows beside them is given with each miss. Intervals of shares are Wilson's; a bar is cleared by the figure."
+    "3.9) cannot be found beside others either; one that does may still be taken up by the sizes of the others: how "
+    "far it shows beside them is given with each miss. Intervals of shares are Wilson's; a bar is cleared by the "
+    "figure."
 )
 
 
