@@ -168,8 +168,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print; exit code 1 if a bar is not cleared."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.drafts", description=__doc__)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
-    parser.add_argument("--cases", type=int, default=18, help="drafts of unknowns (default: 18)")
-    parser.add_argument("--noise-cases", type=int, default=9, help="drafts of noise (default: 9)")
+    parser.add_argument("--cases", type=int, default=16, help="drafts of unknowns (default: 16)")
+    parser.add_argument("--noise-cases", type=int, default=8, help="drafts of noise (default: 8)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--records", type=Path, default=RECORDS, help="JSON lines, one a case")
     parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
@@ -183,7 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = "".join(
         f" {name} {value}"
         for name, value, usual in (
-            ("--cases", args.cases, 18), ("--noise-cases", args.noise_cases, 9),
+            ("--cases", args.cases, 16), ("--noise-cases", args.noise_cases, 8),
             ("--first-seed", args.first_seed, FIRST_SEED),
         )
         if value != usual

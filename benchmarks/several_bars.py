@@ -28,11 +28,6 @@ def all_show(record: Record) -> bool:
     return all(effect["beside"] >= JUST_SEEN for effect in record["effects"])
 
 
-def told(record: Record) -> bool:
-    """Whether each hidden effect is in `plausible`, or said to be invisible to these readings at any size."""
-    return set(record["truth"]) <= {*record["plausible"], *record["invisible"]}
-
-
 def strongest_right(record: Record, count: int = 2) -> bool:
     """Whether the strongest effects by the size they have are in `plausible`, and nothing false is named."""
     ordered = sorted(record["effects"], key=lambda effect: -effect["size"])
@@ -109,8 +104,6 @@ def _pairs(records: Sequence[Record]) -> list[Figure]:
               [holds_truth(r) for r in records if all_seen(r)]),
         share(at, "the same, each beside the other, whose sizes are free",
               [holds_truth(r) for r in records if all_show(r)]),
-        share(at, "pairs: both in `plausible`, or said to be invisible to these readings at any size",
-              [told(r) for r in records]),
         share(at, "pairs: `identified`, both", [named(r) for r in records]),
         share(at, "pairs: `identified`, a name that is not hidden", [false_name(r) for r in records], at_most=0.04),
         share(at, "pairs: `identified`, one of them alone",

@@ -117,18 +117,10 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
                        "refused": message, "suspects": suspects_of_refusal(message)}  # fmt: skip
     return more | record | {
         "noise_found": document["noise"],
-        "invisible": invisible(document),
         "noise_remarks": noise_remarks(document),
         # The folder is another one in every run.
         "suspects": json.loads(json.dumps(document.get("suspect_rows", [])).replace(f"{folder}/", "")),
     }  # fmt: skip
-
-
-def invisible(document: Mapping[str, Any]) -> list[str]:
-    """Effects of which the document says that these readings would show none of their parameters at any size."""
-    entries = document["detectable"]
-    seen = {entry["effect"] for entry in entries if entry["detectable"]}
-    return sorted({entry["effect"] for entry in entries} - seen)
 
 
 def suspects_of_refusal(message: str) -> list[dict[str, Any]]:

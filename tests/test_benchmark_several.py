@@ -15,9 +15,8 @@ from benchmarks.several_bars import (
     rows_of_suspect,
     slip_found,
     strongest_right,
-    told,
 )
-from benchmarks.several_cases import GROUPS, invisible, make_jobs, noise_remarks, suspects_of_refusal
+from benchmarks.several_cases import GROUPS, make_jobs, noise_remarks, suspects_of_refusal
 from benchmarks.several_seen import shows_beside
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.case import clamp_of, draw_case, rows_of
@@ -29,7 +28,7 @@ def record(truth: dict[str, float], verdict: str, plausible: list[str], **more: 
     effects = [{"effect": name, "size": size, "detectability": 9.0, "beside": 9.0} for name, size in truth.items()]
     return {"group": "pair", "layout": "tilted", "seed": 1, "hidden": "pair", "slip": "", "outliers": 0.02,
             "truth": list(truth), "effects": effects, "verdict": verdict, "plausible": plausible, "suspects": [],
-            "invisible": [], **more}  # fmt: skip
+            **more}  # fmt: skip
 
 
 def test_a_part_of_the_truth_is_no_false_name_and_an_open_list_is_none_either() -> None:
@@ -37,14 +36,6 @@ def test_a_part_of_the_truth_is_no_false_name_and_an_open_list_is_none_either() 
     assert not false_name(record(pair, "identified", ["weak_strut"]))
     assert not false_name(record(pair, "ambiguous", ["weak_strut", "strut_law"]))
     assert false_name(record(pair, "identified", ["weak_strut", "strut_law"]))
-
-
-def test_what_is_said_to_be_invisible_counts_as_told() -> None:
-    pair = {"weak_strut": 0.1, "joint_compliance": 0.05}
-    assert not told(record(pair, "identified", ["weak_strut"]))
-    assert told(record(pair, "identified", ["weak_strut"], invisible=["joint_compliance"]))
-    entries = [("a", False), ("a", True), ("b", False)]  # one parameter that shows is enough
-    assert invisible({"detectable": [{"effect": name, "detectable": seen} for name, seen in entries]}) == ["b"]
 
 
 def test_an_effect_shows_beside_another_by_what_that_cannot_take_up() -> None:
