@@ -6,8 +6,8 @@ Each case is the paper's layout on a blind machine of the rig whose diagnosis is
 give way. A plan with indicators is made and measured on the same machine; so are as many visits drawn at random from
 the same menu. Counted are the verdicts over all readings after the plan, the minutes until one explanation has 95 %,
 and how often that was to be expected: over all rivals as they stand, `none` among them, and if what is hidden in the
-case is the truth. Bars: 90 % settled, half of random's minutes, forecast within 5 points,
-`joint_compliance` named in 80 %.
+case is the truth. Bars: 90 % settled, half of random's minutes, forecast within 5 points, `joint_compliance` named in
+80 %.
 """
 
 from __future__ import annotations
