@@ -23,6 +23,11 @@ def all_seen(record: Record) -> bool:
     return all(effect["detectability"] >= JUST_SEEN for effect in record["effects"])
 
 
+def all_show(record: Record) -> bool:
+    """Whether each hidden effect shows beside the others, whose sizes are free (`several_seen`)."""
+    return all(effect["beside"] >= JUST_SEEN for effect in record["effects"])
+
+
 def strongest_right(record: Record, count: int = 2) -> bool:
     """Whether the strongest effects by the size they have are in `plausible`, and nothing false is named."""
     ordered = sorted(record["effects"], key=lambda effect: -effect["size"])
@@ -92,11 +97,13 @@ def figures(records: Sequence[Record]) -> list[Figure]:
 
 
 def _pairs(records: Sequence[Record]) -> list[Figure]:
-    seen = [r for r in records if all_seen(r)]
     at = "tilted"
     return [
         share(at, "pairs: both in `plausible`", [holds_truth(r) for r in records], at_least=0.90),
-        share(at, f"the same, both with a detectability of {JUST_SEEN:g} or more", [holds_truth(r) for r in seen]),
+        share(at, f"the same, both with a detectability of {JUST_SEEN:g} or more",
+              [holds_truth(r) for r in records if all_seen(r)]),
+        share(at, "the same, each beside the other, whose sizes are free",
+              [holds_truth(r) for r in records if all_show(r)]),
         share(at, "pairs: `identified`, both", [named(r) for r in records]),
         share(at, "pairs: `identified`, a name that is not hidden", [false_name(r) for r in records], at_most=0.04),
         share(at, "pairs: `identified`, one of them alone",
@@ -111,8 +118,10 @@ def _three(records: Sequence[Record]) -> list[Figure]:
     return [
         share(at, "three: the strongest two in `plausible`, nothing false named", [strongest_right(r) for r in records],
               at_least=0.80),
-        share(at, "the same, all with a detectability of 3.9 or more",
+        share(at, f"the same, all with a detectability of {JUST_SEEN:g} or more",
               [strongest_right(r) for r in records if all_seen(r)]),
+        share(at, "the same, each beside the others, whose sizes are free",
+              [strongest_right(r) for r in records if all_show(r)]),
         share(at, "three: all in `plausible`", [holds_truth(r) for r in records]),
         share(at, "three: `identified`, a name that is not hidden", [false_name(r) for r in records], at_most=0.05),
         share(at, "three: `unexplained`", [r["verdict"] == "unexplained" for r in records]),

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.diagnosis_cases import judged
+from benchmarks.several_seen import shows_beside
 from toolpath_stiff import rig
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.rig.hidden import Nuisances
@@ -103,6 +104,9 @@ def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     elif job.way == "option":
         rows = {name: values for name, values in rows.items() if name != "sd_N_per_mm"}
         stated["noise"] = (job.factor * nuisances.repeat, job.factor * nuisances.clamping)
+    if len(truth["effects"]) > 1:
+        beside = zip(truth["effects"], shows_beside(case), strict=True)
+        truth["effects"] = [{**effect, "beside": round(length, 2)} for effect, length in beside]
     if job.slip:
         rows, more["slips"] = slipped_case(case, job.seed, job.slip)
     try:

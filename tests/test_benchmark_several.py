@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from benchmarks.several import FIRST_SEED, report
 from benchmarks.several_bars import (
     false_name,
@@ -15,10 +17,15 @@ from benchmarks.several_bars import (
     strongest_right,
 )
 from benchmarks.several_cases import GROUPS, make_jobs, noise_remarks, suspects_of_refusal
+from benchmarks.several_seen import shows_beside
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.case import clamp_of, draw_case, rows_of
+from toolpath_stiff.rig.effects import scale_of, with_effect
+from toolpath_stiff.rig.hidden import HiddenMachine, readings
 
 
 def record(truth: dict[str, float], verdict: str, plausible: list[str], **more: Any) -> dict[str, Any]:
-    effects = [{"effect": name, "size": size, "detectability": 9.0} for name, size in truth.items()]
+    effects = [{"effect": name, "size": size, "detectability": 9.0, "beside": 9.0} for name, size in truth.items()]
     return {"group": "pair", "layout": "tilted", "seed": 1, "hidden": "pair", "slip": "", "outliers": 0.02,
             "truth": list(truth), "effects": effects, "verdict": verdict, "plausible": plausible, "suspects": [],
             **more}  # fmt: skip
@@ -29,6 +36,31 @@ def test_a_part_of_the_truth_is_no_false_name_and_an_open_list_is_none_either() 
     assert not false_name(record(pair, "identified", ["weak_strut"]))
     assert not false_name(record(pair, "ambiguous", ["weak_strut", "strut_law"]))
     assert false_name(record(pair, "identified", ["weak_strut", "strut_law"]))
+
+
+def test_an_effect_shows_beside_another_by_what_that_cannot_take_up() -> None:
+    """Against generalised least squares with a full covariance, and bounded by what it shows alone."""
+    case = draw_case(3, "paper", ["weak_strut", "table_compliance"], size=[0.05, 0.04])
+    first, second = shows_beside(case)
+    assert 0.0 < first < case.truth["effects"][0]["detectability"] * 1.2
+    assert 0.0 < second < case.truth["effects"][1]["detectability"] * 1.2
+    rows, clamps = rows_of(case.rows), clamp_of(case.rows)
+    known = scale_of(case.nominal, rows, clamps, case.nuisances).covariance
+    covariance = known.spread @ known.spread.T + known.noise * np.eye(len(clamps))
+    covariance += case.nuisances.clamping**2 * (clamps[:, None] == clamps)
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+
+    def logs(factor: float) -> FloatArray:
+        strut = {"strut": case.truth["effects"][0]["parameters"]["strut"], "factor": factor}
+        machine = with_effect(HiddenMachine(), "table_compliance", case.truth["effects"][1]["parameters"])
+        return np.asarray(np.log(readings(case.nominal, with_effect(machine, "weak_strut", strut), rows)))
+
+    weak = case.truth["effects"][0]["parameters"]["factor"]
+    alone = with_effect(HiddenMachine(), "weak_strut", case.truth["effects"][0]["parameters"])
+    change = root @ (logs(weak) - np.log(readings(case.nominal, alone, rows)))
+    slope = root @ (logs(1.001 * weak) - logs(weak))
+    left = change - slope * float(slope @ change) / float(slope @ slope)
+    np.testing.assert_allclose(second, np.linalg.norm(left), rtol=0.02)
 
 
 def test_the_strongest_two_are_those_with_the_largest_sizes() -> None:

@@ -19,6 +19,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.nominal import reachable as rig_reachable
+from toolpath_stiff.updating.inference import NAMED
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits
 from toolpath_stiff.updating.planning.document import plan_document
@@ -117,6 +118,23 @@ def test_expected_probability_of_the_truth(gap):
     found = expected_outcome(forecasts, np.array([0]), np.array([0]), noise, seed=3)
     # 400 draws a rival of a figure between 0 and 1: four standard errors.
     assert found.truth == pytest.approx(expected, abs=4 * 0.5 / np.sqrt(800))
+
+
+def test_a_verdict_is_settled_where_a_diagnosis_would_name_it():
+    """Ln of the Bayes factor is normal, as above; a rival is named once prior odds times it leave `NAMED`."""
+    gap, weights = 2.0, np.array([0.7, 0.3])
+    forecasts = [
+        Forecast(name, weight, np.array([mean]), np.zeros((1, 0)))
+        for name, weight, mean in zip("ab", weights, (0.0, gap * np.sqrt(2.0) * 0.02), strict=True)
+    ]
+    noise = ReadingNoise(0.02, 0.0, np.zeros((1, 0)))
+    found = expected_outcome(forecasts, np.array([0]), np.array([0]), noise, seed=3)
+    needed, sd = np.log(NAMED / (1.0 - NAMED)), gap * np.sqrt(2.0)
+    for got, own in zip(found.settled_if, weights, strict=True):
+        middle = np.log(own / (1.0 - own)) + gap**2
+        chance = norm.sf((needed - middle) / sd) + norm.cdf((-needed - middle) / sd)
+        assert got == pytest.approx(chance, abs=3.0 * np.sqrt(0.25 / 400))
+    assert found.settled == pytest.approx(weights @ found.settled_if)
 
 
 def test_columns_of_the_joints_agree_with_the_predictors():

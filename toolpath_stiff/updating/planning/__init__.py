@@ -24,7 +24,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.updating.inference import Judgement, judge, question
+from toolpath_stiff.updating.inference import NAMED, Judgement, judge, question
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.noise import LEAST, Noise, noise_models
@@ -32,7 +32,6 @@ from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning.campaign import RISER, TABLE, Campaign, first_campaign
 from toolpath_stiff.updating.planning.gaps import (
-    SETTLED,
     Expectation,
     GapShares,
     ReadingNoise,
@@ -241,7 +240,7 @@ def plan_measurements(
         pairs=pairs,
         kinds=kinds,
         why=why,
-        before=Expectation(before, float(max(weights.values()) >= SETTLED)),
+        before=Expectation(before, float(max(weights.values()) >= NAMED)),
         after=after,
         enough=enough(visits, picked, forecasts, noise, seed),
         repeats=repeats_needed(visits, picked, forecasts, noise, seed),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import certain, deg_from_rad, min_from_s, mm_from_m
+from toolpath_stiff.updating.inference import NAMED
 from toolpath_stiff.updating.planning import Plan, Proposal, matters
 from toolpath_stiff.updating.planning.campaign import Campaign
 from toolpath_stiff.updating.planning.gaps import MOST_REPEATS, SETTLED, ReadingNoise, pair_shares
@@ -241,7 +242,7 @@ def plan_document(plan: Plan) -> RivalsPlan:
             "probability_of_truth_after": plan.after.truth,
             "settled_before": plan.before.settled,
             "settled_after": plan.after.settled,
-            "settled_at": SETTLED,
+            "settled_at": NAMED,
             "poses_to_settle": plan.enough,
             "repeats_to_settle": plan.repeats,
         },

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import min_from_s
+from toolpath_stiff.updating.inference import NAMED
 from toolpath_stiff.updating.planning.rivals import Forecast
 from toolpath_stiff.updating.planning.visits import Costs, Menu, Visits
 
@@ -112,13 +113,24 @@ def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: Readin
 
 @dataclass(frozen=True)
 class Expectation:
-    """What is to be expected of readings: mean probability of the truth, and how often one rival exceeds `SETTLED`."""
+    """What is to be expected of readings.
+
+    Attributes
+    ----------
+    truth
+        Mean probability of the truth.
+    settled
+        How often the verdict is settled: one rival has the probability from which a diagnosis names it (`NAMED`).
+    settled_if
+        The same for each rival in turn, were it the truth; `settled` is their mean by the rivals' weights.
+    """
 
     truth: float
     settled: float
+    settled_if: tuple[float, ...] = ()
 
 
-SETTLED = 0.95  # probability at which a question counts as settled
+SETTLED = 0.95  # probability of one rival at which visits are enough: on the safe side of a diagnosis's `NAMED`
 DRAWS = 400  # simulated results a rival
 
 
@@ -156,7 +168,7 @@ def expected_outcome(
     means = np.stack([forecast.mean[rows] for forecast in forecasts], axis=1)
     whitened = solve_triangular(np.linalg.cholesky(covariance), means, lower=True).T
     standard = rng.standard_normal((DRAWS, len(rows)))
-    truth = settled = 0.0
+    truth, settled = 0.0, []
     for i, weight in enumerate(weights):
         # Of -|z + (m_i - m_j)|^2 / 2 for every j, z standard normal.
         apart = whitened[i] - whitened
@@ -164,8 +176,8 @@ def expected_outcome(
         probability = np.exp(logs - logs.max(axis=1, keepdims=True))
         probability /= probability.sum(axis=1, keepdims=True)
         truth += weight * float(probability[:, i].mean())
-        settled += weight * float((probability.max(axis=1) >= SETTLED).mean())
-    return Expectation(truth, settled)
+        settled.append(float((probability.max(axis=1) >= NAMED).mean()))
+    return Expectation(truth, float(weights @ settled), tuple(settled))
 
 
 def expectation(

@@ -1,0 +1,198 @@
+"""`python -m benchmarks.drafts`: how often a draft is confirmed by readings that it has not seen, rightly or wrongly.
+
+Each case is a tilted campaign of the rig. A draft is made of every other clamping; then all readings are judged with it
+and with the whole catalogue. `same`: the others are of the same machine. `gone`: the others are of the same machine
+without what the draft was read off, so that it says nothing true of them. `noise`: nothing is hidden at all, but the
+noise is stated half as large as it is, so that the draft is read off scatter.
+"""
+
+from __future__ import annotations
+
+import os
+
+for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+# ruff: noqa: E402 - the thread limits above must come before numpy
+import argparse
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.case_loop import Record, case_loop, document, read_records
+from benchmarks.diagnosis_bars import Figure, share
+from benchmarks.diagnosis_cases import machine
+from benchmarks.diagnosis_tables import bars_table, summary
+from toolpath_stiff import rig
+from toolpath_stiff.rig import UNKNOWNS
+from toolpath_stiff.rig.hidden import Nuisances
+from toolpath_stiff.updating.diagnosis import diagnose
+from toolpath_stiff.updating.drafting import draft
+from toolpath_stiff.updating.inference import judge
+from toolpath_stiff.updating.inference.candidates import testable_effects
+from toolpath_stiff.updating.inference.evidence import Problem
+from toolpath_stiff.updating.inference.noise import noise_models
+from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.measurements import read_measurements
+
+FIRST_SEED = 83_000_000
+NOISE_SEEDS = 1_000_000  # distance of the seeds of the cases without anything hidden
+RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_drafts.jsonl"
+OUT = Path(__file__).parent / "drafts.md"
+STATED = (0.01, 0.005)  # half of the rig's repeat noise and clamping
+NOISE = "noise"
+STRIDE = 7  # kinds stand in the order of their links; prime to their number
+
+
+@dataclass(frozen=True)
+class Job:
+    """One draft: of an unknown of this kind, or of `NOISE`."""
+
+    seed: int
+    hidden: str
+
+
+def make_jobs(first_seed: int, unknowns: int, noises: int) -> list[Job]:
+    """Drafts of unknowns, of each kind in turn, those of different links mixed, and of noise."""
+    kinds = list(UNKNOWNS)
+    found = [Job(first_seed + k, kinds[k * STRIDE % len(kinds)]) for k in range(unknowns)]
+    return found + [Job(first_seed + NOISE_SEEDS + k, NOISE) for k in range(noises)]
+
+
+def run(job: Job) -> dict[str, Any]:
+    """The record of a draft; with `error`, the traceback, where it failed."""
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            return asdict(job) | _drafted(job, Path(folder))
+    except Exception:  # a case that breaks must be counted, not end the run
+        return asdict(job) | {"error": traceback.format_exc()}
+
+
+def _drafted(job: Job, folder: Path) -> dict[str, Any]:
+    """Draft from every other clamping, judge with all readings; the links that hold the truth and what was drafted."""
+    noise = STATED if job.hidden == NOISE else None
+    case = rig.draw_case(job.seed, "tilted", "none" if job.hidden == NOISE else job.hidden)
+    tables = {"same": case.rows}
+    if job.hidden != NOISE:
+        # The same seed: the same poses, struts, joints and scatter.
+        tables["gone"] = rig.draw_case(job.seed, "tilted", "none", nuisances=Nuisances()).rows
+    old = np.asarray(case.rows["clamp"]) % 2 == 0
+    file = folder / "old.csv"
+    file.write_text(rig.csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))
+    before = diagnose(machine(), read_measurements(file, machine()), noise=noise, plan_next=False)
+    made = draft(before, "missing.py")
+    links = [] if not made.text or before.portrait is None else [one.term.link for one in before.portrait.terms]
+    truth = [link for effect in case.truth["effects"] for link in effect["links"]]
+    record = {"verdict": before.verdict, "drafted": list(made.effects), "links": links, "truth": truth, "judged": {}}
+    if not made.text:
+        return record
+    (folder / "missing.py").write_text(made.text)
+    for what, table in tables.items():
+        mixed = {n: np.where(old, np.asarray(case.rows[n]), np.asarray(table[n])) for n in case.rows}
+        file = folder / f"{what}.csv"
+        file.write_text(rig.csv_text(mixed))
+        record["judged"][what] = _judged(file, str(folder / "missing.py"), noise)
+    return record
+
+
+def _judged(file: Path, effects: str, noise: tuple[float, float] | None) -> dict[str, Any]:
+    """Verdict over all readings with the draft among the catalogue, and what the new ones say of it."""
+    data = read_measurements(file, machine())
+    predictor = Predictor(machine(), data, [effects])
+    scatter = noise_models(data, noise)[-1]
+    found = judge(Problem.of(predictor, scatter), scatter, testable_effects(predictor)[0], seed=0)
+    drawn = found.drawn.document if found.drawn else None
+    return {"verdict": found.verdict, "explanations": list(found.explanations), "drawn": drawn}
+
+
+def confirmed(record: Record, what: str) -> bool:
+    """`identified` under a name that is drafted."""
+    one = record["judged"][what]
+    return one["verdict"] == "identified" and any(
+        name in words for name in record["drafted"] for words in one["explanations"]
+    )
+
+
+def figures(records: Sequence[Record]) -> list[Figure]:
+    """What becomes of drafts, by what they were read off."""
+    made = [r for r in records if r["judged"]]
+    unknown = [r for r in made if r["hidden"] != NOISE]
+    right = [r for r in unknown if set(r["links"][:1]) & set(r["truth"])]
+    wrong = [r for r in unknown if r not in right]
+    noise = [r for r in records if r["hidden"] == NOISE]
+    of_noise = [r for r in noise if r["judged"]]
+    at = "tilted"
+    return [
+        share(at, "an unknown hidden: a draft is made", [bool(r["judged"]) for r in records if r["hidden"] != NOISE]),
+        share(at, "leading link right, same machine: `identified`", [confirmed(r, "same") for r in right]),
+        share(at, "leading link wrong, same machine: `identified`", [confirmed(r, "same") for r in wrong]),
+        share(at, "gone from the new readings: `identified`", [confirmed(r, "gone") for r in unknown], at_most=0.05),
+        share(at, "noise stated half as large: a draft is made", [bool(r["judged"]) for r in noise]),
+        share(at, "read off noise: `identified`", [confirmed(r, "same") for r in of_noise], at_most=0.05),
+    ]
+
+
+def cases_table(records: Sequence[Record]) -> list[str]:
+    """Each draft."""
+    lines = [
+        "| seed | hidden | links | drafted | new readings | verdict | log probability gained |",
+        "| ---: " + "| --- " * 5 + "| ---: |",
+    ]
+    for r in records:
+        for what, one in r["judged"].items() or [("", {"verdict": f"no draft: {r['verdict']}", "drawn": None})]:
+            gain = one["drawn"]["gain"] if one["drawn"] else None
+            cells = (r["seed"], r["hidden"], ", ".join(r["truth"]), ", ".join(r["links"]), what, one["verdict"],
+                     "" if gain is None else f"{gain:.1f}")  # fmt: skip
+            lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return lines
+
+
+def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
+    """The document, and whether all bars are cleared."""
+    broken = [r for r in records if "error" in r]
+    good = sorted((r for r in records if "error" not in r), key=lambda r: r["seed"])
+    found = figures(good)
+    what = " ".join((__doc__ or "").split("\n\n", 1)[1].split())
+    parts = [("", [summary(found)]), ("Figures", bars_table(found)), ("Cases", cases_table(good))]
+    text = document("Are drafts confirmed?", what, parts, broken, command)
+    return text, not broken and all(figure.cleared is not False for figure in found)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run and print; exit code 1 if a bar is not cleared."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.drafts", description=__doc__)
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
+    parser.add_argument("--cases", type=int, default=16, help="drafts of unknowns (default: 16)")
+    parser.add_argument("--noise-cases", type=int, default=8, help="drafts of noise (default: 8)")
+    parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
+    parser.add_argument("--records", type=Path, default=RECORDS, help="JSON lines, one a case")
+    parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
+    parser.add_argument("--out", type=Path, default=OUT, help=f"markdown file to write (default: {OUT.name} beside)")
+    args = parser.parse_args(arguments)
+    if args.table_only:
+        records = read_records(args.records)
+    else:
+        with case_loop(args.jobs, args.records) as collect:
+            records = collect("drafted", run, make_jobs(args.first_seed, args.cases, args.noise_cases))
+    options = "".join(
+        f" {name} {value}"
+        for name, value, usual in (
+            ("--cases", args.cases, 16), ("--noise-cases", args.noise_cases, 8),
+            ("--first-seed", args.first_seed, FIRST_SEED),
+        )
+        if value != usual
+    )  # fmt: skip
+    text, cleared = report(records, f"python -m benchmarks.drafts{options}")
+    print(text)
+    args.out.write_text(text, encoding="utf-8")
+    return 0 if cleared else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
