@@ -24,7 +24,8 @@ SAID: dict[str, tuple[str, float, str]] = {
     "temperature": ("the temperature", 1.0, "deg C"),
 }
 GIVES = {
-    "X": "along X", "Y": "along Y", "Z": "along Z", "all": "alike in all directions", "radial": "radially",
+    "X": "along X", "Y": "along Y", "Z": "along Z", "horizontal": "sideways, alike along X and Y",
+    "all": "alike in all directions", "radial": "radially",
     "tangential": "tangentially", "axial": "along the tool axis", "along the struts": "along the struts",
 }  # fmt: skip
 ROCKS = {
