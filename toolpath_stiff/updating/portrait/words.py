@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import RAD_PER_DEG
 from toolpath_stiff.updating.portrait import Portrait, Sized
+from toolpath_stiff.updating.portrait.alike import Alike
 from toolpath_stiff.updating.portrait.terms import Term
 
 # Variable -> how it is said, SI value of the unit shown, that unit.
@@ -165,10 +166,17 @@ def _named(names: Sequence[tuple[str, float]]) -> str:
     return joined([f"{name} ({100.0 * weight:.0f} %)" for name, weight in names]).replace(" and ", " or ")
 
 
+def alike_text(name: str, alike: Alike) -> str:
+    """What else would look the same as a named effect."""
+    told = "; or if ".join(term_words(term) for term, _ in alike.terms)
+    links = joined([link for link, _ in alike.links]).replace(" and ", " or ")
+    return f"These readings fit as well, without {name}, if {told}. By link: {links}."
+
+
 def variable_label(term: Term) -> tuple[str, float]:
     """Of an axis: what a term varies with and its unit, and the SI value of that unit."""
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     return (f"{name}, {unit}" if unit else name), si
 
 
-__all__ = ["portrait_text", "size_words", "term_words", "variable_label"]
+__all__ = ["alike_text", "portrait_text", "size_words", "term_words", "variable_label"]
