@@ -21,7 +21,9 @@ from toolpath_stiff.updating.portrait.terms import CATALOGUE_LINKS, Term
 
 FloatArray = NDArray[np.float64]
 
-AS_WELL = float(np.log(20.0))  # of log likelihood: what fits worse by more is not the same (odds of 20; Kass, Raftery)
+# Odds beyond which what fits worse is not the same (strong evidence: Kass and Raftery 1995). A term that is one of many
+# constants or places must fit better than the plainest ones by as much as its prior weight is smaller.
+AS_WELL = float(np.log(20.0))
 ITSELF = 0.99  # correlation from which a term of the same link is the named effect itself
 MOST_TOLD, TOLD = 6, 0.03  # terms that are told, and the least share of one
 HELD = 0.90  # share that the links and variables told add up to
@@ -71,13 +73,15 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     found = selection.together(start, terms)
     squares = float(start.fit.scatter.precision.squares(named.residual))
     reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2)
-    same = (found.posterior >= reached - AS_WELL) & (np.abs(found.size[:, -1]) > 0.0)
+    prior = np.array([entry.log_prior for entry in entries])
+    plainest = float(selection.dictionary.log_prior.max())
+    same = (found.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(found.size[:, -1]) > 0.0)
     change = np.exp(named.residual - problem.observed) - problem.predictor.strut_part(named.law) - problem.rest
     same &= ~_itself(selection.ground, terms, named, change)
     if not same.any():
         return None
     rows = np.flatnonzero(same)
-    logs = found.posterior[rows] / ROUGH + np.array([entries[i].log_prior for i in rows.tolist()])
+    logs = found.posterior[rows] / ROUGH + prior[rows]
     weights = np.exp(logs - logs.max())
     order = np.argsort(-weights, kind="stable")
     sized = tuple(terms[i].sized(_size(selection, terms[i], float(found.size[i, -1]))) for i in rows[order].tolist())

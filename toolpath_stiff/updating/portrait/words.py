@@ -35,6 +35,9 @@ ROCKS = {
 TIPS = {"X": "tips about the platform's Y", "Y": "tips about the platform's X", "radial": "tips"}
 
 
+MOST_SAID = 3  # terms in a sentence on what else would look the same; a document has more
+
+
 def term_words(term: Term) -> str:
     """What gives way and what it varies with: a clause, without its size."""
     return f"{_cause(term)}{_with(term)}"
@@ -168,7 +171,7 @@ def _named(names: Sequence[tuple[str, float]]) -> str:
 
 def alike_text(name: str, alike: Alike) -> str:
     """What else would look the same as a named effect."""
-    told = "; or if ".join(term_words(term) for term, _ in alike.terms)
+    told = "; or if ".join(term_words(term) for term, _ in alike.terms[:MOST_SAID])
     links = joined([link for link, _ in alike.links]).replace(" and ", " or ")
     return f"These readings fit as well, without {name}, if {told}. By link: {links}."
 
