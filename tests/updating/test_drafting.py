@@ -29,6 +29,7 @@ STRUT = "along the struts"
 TERMS = [
     Term("table", "Y", "y", "slope", "give", at=LINE),
     Term("table", "all", "constant", "offset", "give"),
+    Term("table", "horizontal", "temperature", "slope", "give", at=(("start", 20.0), ("end", 21.5))),
     Term("table", "radial", "radius", "square", "give", at=(("centre", 0.03), ("reach", 0.2))),
     Term("table", "tangential", "setup", "offset", "give", column="it's \"here\""),
     Term("table", "X", "x", "bump", "give", at=(("centre", -0.05), ("width", 0.08))),

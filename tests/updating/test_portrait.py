@@ -115,6 +115,32 @@ def test_a_table_that_gives_way_towards_one_side_is_recognised(folder):
     assert entry["look_elsewhere"] < 0.01
 
 
+def test_a_plate_that_gives_in_shear_is_recognised(folder):
+    # Along X and Y alike, growing with the order of the readings as no shape of the dictionary does.
+    predictor = sound(1, folder)
+    order = np.linspace(0.0, 1.0, 288)
+    sideways = (predictor.data.direction[:, :2] ** 2).sum(axis=1)
+    found = portrait_with(predictor, 5e-9 * sideways * (1.0 - np.exp(-order / 0.25)))
+    assert {"table", "frame"} & {name for name, _ in found.links}
+    assert "horizontal" in {one.term.direction for one in (*found.terms, *found.alike)}
+    assert [name for name, _ in found.variables] == ["order"]
+
+
+def test_two_causes_are_found_wherever_the_search_begins(folder):
+    # Joints that hold small loads and a frame that gives: added one by one, from the frame on, they are not found.
+    predictor = sound(2, folder)
+    ground = Ground(predictor, np.exp(-predictor.log_stiffness()), np.zeros(2))
+    causes = [
+        (8e-9, Term("joints", "along the struts", "load", "threshold", "strut", at=(("beyond", 400.0),))),
+        (9e-9, Term("frame", "along the struts", "load", "slope", "vertex", at=(("power", -1.0), ("reference", 2e3)))),
+    ]
+    found = portrait_with(predictor, sum(size * ground.column(term) for size, term in causes))
+    assert {"load", "strut force"} >= {one.term.variable for one in found.terms}
+    assert {one.term.link for one in found.terms} >= {"frame"}
+    assert found.held_out_rms < 1.3 * found.noise_floor
+    assert sum(weight for _, weight in found.links) == pytest.approx(1.0, abs=0.1)
+
+
 def test_a_strut_that_is_softer_in_tension_is_recognised(folder):
     predictor = sound(2, folder)
     own = forces(predictor)[:, 4]
