@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.updating.inference.candidates import candidates_of
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.portrait.choice import ROUGH, Weighed
@@ -72,7 +73,7 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     terms = [entry.term for entry in entries]
     found = selection.together(start, terms)
     squares = float(start.fit.scatter.precision.squares(named.residual))
-    reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2)
+    reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2) - _freedom(problem, named)
     prior = np.array([entry.log_prior for entry in entries])
     plainest = float(selection.dictionary.log_prior.max())
     same = (found.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(found.size[:, -1]) > 0.0)
@@ -91,6 +92,13 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
         _fewest(weighed.summed(lambda term: term.link)),
         _fewest(weighed.summed(lambda term: term.variable)),
     )
+
+
+def _freedom(problem: Problem, named: Fit) -> float:
+    """Log likelihood that an effect gains by its further sizes (Schwarz 1978) and by a choice, which a term has not."""
+    data = problem.predictor.data
+    choices = len(candidates_of(named.candidates[0].effect, data))
+    return 0.5 * (len(named.free) - 1) * float(np.log(len(data))) + float(np.log(max(choices, 1)))
 
 
 def _size(selection: Selection, term: Term, scaled: float) -> float:
