@@ -7,7 +7,7 @@ is put in the place of the named effect, the strut law refitted, and those that 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,7 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
         return None
     # Both under the scatter of the named fit, so that wild readings count alike.
     start = selection.start
-    start = selection.described((), start.columns, start.scale, start.fit.law, named.scatter)
+    start = replace(start, fit=replace(start.fit, scatter=named.scatter))
     entries = selection.finalists(selection.scores(start))
     if not entries:
         return None
