@@ -29,7 +29,6 @@ STRUT = "along the struts"
 TERMS = [
     Term("table", "Y", "y", "slope", "give", at=LINE),
     Term("table", "all", "constant", "offset", "give"),
-    Term("table", "horizontal", "temperature", "slope", "give", at=(("start", 20.0), ("end", 21.5))),
     Term("table", "radial", "radius", "square", "give", at=(("centre", 0.03), ("reach", 0.2))),
     Term("table", "tangential", "setup", "offset", "give", column="it's \"here\""),
     Term("table", "X", "x", "bump", "give", at=(("centre", -0.05), ("width", 0.08))),
@@ -61,6 +60,7 @@ TERMS = [
     Term("instrument", "X", "x", "slope", "reading factor", at=(("start", 0.0), ("end", 0.3))),
     Term("instrument", "all", "time", "slope", "reading factor", at=(("start", 0.0), ("end", 7200.0))),
     Term("instrument", "reading", "load", "slope", "reading shift", at=(("start", 0.0), ("end", 2000.0))),
+    Term("table", "horizontal", "temperature", "slope", "give", at=(("start", 20.0), ("end", 21.5))),
 ]  # fmt: skip
 WORDS = "a long clause without an end, " * 5 + 'the "table" of C:\\new gives way """here"""'
 

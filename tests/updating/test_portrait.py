@@ -12,7 +12,7 @@ import pytest
 from toolpath_stiff import rig
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.inference.candidates import candidates_of, testable_effects
+from toolpath_stiff.updating.inference import candidates
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import fit_effects
 from toolpath_stiff.updating.inference.noise import noise_models
@@ -174,9 +174,10 @@ def test_a_frame_looks_the_same_as_a_table(folder):
     added = 5e-9 * predictor.data.direction[:, 0] ** 2
     data = replace(predictor.data, stiffness=predictor.data.stiffness * compliance / (compliance + added))
     problem = Problem.of(Predictor(predictor.machine, data), noise_models(data)[-1])
-    table = next(effect for effect in testable_effects(problem.predictor)[0] if effect.name == "table_compliance")
+    effects = candidates.testable_effects(problem.predictor)[0]
+    (table,) = candidates.candidates_of(next(one for one in effects if one.name == "table_compliance"), data)
     base = problem.score_base()
-    named = fit_effects(problem, candidates_of(table, data), [np.array([5e-9, 0.0, 0.0, 0.0])], (0,), base.law)
+    named = fit_effects(problem, [table], [np.array([5e-9, 0.0, 0.0, 0.0])], (0,), base.law)
     found = looks_the_same(problem, base, named, noise_models(data)[-1], seed=0)
     assert found is not None
     told = {(term.link, term.direction, term.variable) for term, _ in found.terms}
