@@ -41,6 +41,11 @@ def named_by_catalogue(record: Record) -> bool:
     return bool(record["verdict"] == "identified")
 
 
+def told_beside(record: Record, name: str) -> bool:
+    """Whether what looks the same as the name of the catalogue holds an acceptable word."""
+    return bool(record.get("same")) and not set(record["same"][name]).isdisjoint(record["effects"][0][name])
+
+
 def figures(records: Sequence[Record]) -> list[Figure]:
     """Every figure, by layout."""
     found: list[Figure] = []
@@ -61,6 +66,7 @@ def _of_unknowns(layout: str, records: Sequence[Record]) -> list[Figure]:
         share(layout, "the same, or a portrait of what a name of the catalogue leaves",
               [r["verdict"] in SEEN or bool(r["portrait"]) for r in records]),
         share(layout, "unknown: `identified`, a name of the catalogue", [named_by_catalogue(r) for r in records]),
+        *_beside_names(layout, [r for r in records if named_by_catalogue(r)]),
         share(layout, "unknown: has a portrait", [bool(r["portrait"]) for r in records]),
     ]  # fmt: skip
     found += [figure for name in LARGEST_SET for figure in _of_set(layout, name, records, drawn, barred)]
@@ -77,6 +83,20 @@ def _of_unknowns(layout: str, records: Sequence[Record]) -> list[Figure]:
         middle_of(layout, "CPU of `diagnose` with the portrait, median", [r["cpu"] for r in records], None, " s")
     )
     return found
+
+
+def _beside_names(layout: str, named: Sequence[Record]) -> list[Figure]:
+    """What is said to look the same as the name that an unknown was given."""
+    if not named:
+        return []
+    return [
+        share(layout, "`identified`: something is said to look the same", [bool(r.get("same")) for r in named]),
+        *(
+            share(layout, f"`identified`: {name}, what looks the same holds the truth",
+                  [told_beside(r, name) for r in named])
+            for name in LARGEST_SET
+        ),
+    ]  # fmt: skip
 
 
 def _of_set(layout: str, name: str, records: Sequence[Record], drawn: Sequence[Record], barred: bool) -> list[Figure]:

@@ -71,7 +71,15 @@ def run(job: Job) -> dict[str, Any]:
             record, document = judged(rows, truth, Path(folder))
     except Exception:  # a case that breaks must be counted, not end the run
         return heading | {"error": traceback.format_exc()}
-    return heading | record | {"portrait": in_short(document.get("portrait"))}
+    same = document.get("looks_the_same")
+    return (
+        heading
+        | record
+        | {
+            "portrait": in_short(document.get("portrait")),
+            "same": same and {name: [entry[ENTRY[name]] for entry in same[name]] for name in NAMES},
+        }
+    )
 
 
 def in_short(portrait: Mapping[str, Any] | None) -> dict[str, Any] | None:

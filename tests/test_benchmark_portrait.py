@@ -71,6 +71,15 @@ def test_bars() -> None:
     assert found["unknown: links right, cases without a portrait counted as wrong"].value == "82.6 % (19 of 23)"
 
 
+def test_what_looks_the_same_as_a_name_is_counted() -> None:
+    same = {"links": ["frame", "table"], "variables": ["z"]}
+    named = [record(None, verdict="identified", same=same), record(None, verdict="identified", same=None)]
+    found = {figure.what: figure for figure in figures(named)}
+    assert found["`identified`: something is said to look the same"].value == "50.0 % (1 of 2)"
+    assert found["`identified`: links, what looks the same holds the truth"].value == "50.0 % (1 of 2)"
+    assert found["`identified`: variables, what looks the same holds the truth"].value == "0.0 % (0 of 2)"
+
+
 def test_jobs_are_the_same_whatever_else_is_run() -> None:
     jobs = make_jobs(FIRST_SEED, 2, 3)
     assert len(jobs) == 2 * (len(UNKNOWNS) + len(kinds_of_layout("paper"))) + 6

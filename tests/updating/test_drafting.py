@@ -60,6 +60,7 @@ TERMS = [
     Term("instrument", "X", "x", "slope", "reading factor", at=(("start", 0.0), ("end", 0.3))),
     Term("instrument", "all", "time", "slope", "reading factor", at=(("start", 0.0), ("end", 7200.0))),
     Term("instrument", "reading", "load", "slope", "reading shift", at=(("start", 0.0), ("end", 2000.0))),
+    Term("table", "horizontal", "temperature", "slope", "give", at=(("start", 20.0), ("end", 21.5))),
 ]  # fmt: skip
 WORDS = "a long clause without an end, " * 5 + 'the "table" of C:\\new gives way """here"""'
 

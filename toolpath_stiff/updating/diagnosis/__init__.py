@@ -40,6 +40,7 @@ from toolpath_stiff.updating.planning.document import plan_rows
 from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
 from toolpath_stiff.updating.portrait import Portrait, draw_portrait
+from toolpath_stiff.updating.portrait.alike import Alike, looks_the_same
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc import Program
@@ -83,6 +84,8 @@ class Diagnosis:
         How much the choice between the explanations matters on a program (`choice_on_path`); None where there is none.
     portrait
         What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
+    alike
+        What else would look the same as the effect that is named (`alike_of`); None where nothing would, or none is.
     suspects
         Rows that look mistyped; `data` no longer holds those that are clear.
     slips
@@ -115,6 +118,7 @@ class Diagnosis:
     remarks: tuple[str, ...] = ()
     path: dict[str, Any] | None = None
     portrait: Portrait | None = None
+    alike: Alike | None = None
     suspects: tuple[SuspectEntry, ...] = ()
     slips: tuple[SlipSize, ...] = ()
     loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
@@ -229,7 +233,7 @@ def diagnose(
     """
     say = progress or (lambda text: None)
     found = _examined(machine, data, noise, strut_spread, joint_error, effect_files, seed, tuple(files), say)
-    found = replace(found, command=command, asked=asked, portrait=portrait_of(found, say))
+    found = replace(found, command=command, asked=asked, portrait=portrait_of(found, say), alike=alike_of(found))
     if found.verdict not in ("ambiguous", "described"):
         return found
     if plan_next:
@@ -372,6 +376,15 @@ def portrait_of(diagnosis: Diagnosis, say: Callable[[str], None]) -> Portrait | 
     say("describing what is missing")
     found = draw_portrait(problem, base, noise, diagnosis.seed, main.base_gate.worst)
     return found if found.terms or verdict == "unexplained" else None
+
+
+def alike_of(diagnosis: Diagnosis) -> Alike | None:
+    """What else would look the same as the one effect that is named: parts that the catalogue does not have."""
+    main = diagnosis.main
+    named = diagnosis.fits.get(diagnosis.best or "")
+    if diagnosis.verdict not in NAMING or named is None or main.noise.tip is not None:
+        return None
+    return looks_the_same(main.problem, diagnosis.base, named, diagnosis.noise, diagnosis.seed)
 
 
 # -- what next ---------------------------------------------------------------------------------------------------------

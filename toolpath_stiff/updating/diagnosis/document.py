@@ -28,7 +28,7 @@ from toolpath_stiff.updating.inference.drawn import DrawnEntry
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
-from toolpath_stiff.updating.portrait.document import PortraitEntry, portrait_entry
+from toolpath_stiff.updating.portrait.document import PortraitEntry, SameEntry, alike_entry, portrait_entry
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
@@ -229,6 +229,7 @@ class DiagnosisDocument(TypedDict):
     confounding: ConfoundingEntry
     path: dict[str, Any] | None
     portrait: PortraitEntry | None
+    looks_the_same: SameEntry | None
     assumptions: list[str]
     warnings: list[str]
     notes: list[str]
@@ -285,6 +286,9 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         },
         "path": diagnosis.path,
         "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
+        "looks_the_same": (
+            None if diagnosis.alike is None else alike_entry(diagnosis.explanations[0], diagnosis.alike)
+        ),
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],

@@ -16,13 +16,15 @@ from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
 from toolpath_stiff.updating.inference.fits import errors_text
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED
 from toolpath_stiff.updating.inference.repeats import OUTLIERS
+from toolpath_stiff.updating.portrait.words import alike_text
 
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
-    return " ".join([_verdict_text(diagnosis), *(f"{_capital(one)}." for one in doubts(diagnosis))])
+    same = [] if diagnosis.alike is None else [alike_text(diagnosis.explanations[0], diagnosis.alike)]
+    return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(one)}." for one in doubts(diagnosis))])
 
 
 def doubts(diagnosis: Diagnosis) -> list[str]:

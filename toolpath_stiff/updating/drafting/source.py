@@ -280,10 +280,11 @@ def _rows(term: Term) -> tuple[list[str], str]:
             f"rows[:, 0, 6] = {first} / reach",
             f"rows[:, 0, 7] = {second} / reach",
         ], f"{term.direction} tip force"
-    own = [0, 1, 2] if term.direction == "all" else [AXES.index(term.direction)]
+    own = {"all": [0, 1, 2], "horizontal": [0, 1]}.get(term.direction) or [AXES.index(term.direction)]
     lines = [f"rows = np.zeros((len(path), {len(own)}, 12))"]
     lines += [f"rows[:, {k}, {6 + axis}] = 1.0" for k, axis in enumerate(own)]
-    return lines, "tip force" if term.direction == "all" else f"tip force along {term.direction}"
+    named = {"all": "tip force", "horizontal": "horizontal tip force"}
+    return lines, named.get(term.direction, f"tip force along {term.direction}")
 
 
 def _vertex_rows(term: Term) -> tuple[list[str], str]:

@@ -337,6 +337,11 @@ class Scatter:
         """Inverse covariance."""
         return self.covariance.precision
 
+    @property
+    def log_price(self) -> float:
+        """What a log likelihood loses by the width of the scatter and by the readings taken for wild."""
+        return -0.5 * self.covariance.log_determinant - len(self.wild) * self.price
+
     def with_wild(self, residual: FloatArray, known: Scatter | None = None) -> Scatter:
         """With those readings taken for wild whose widening pays its price at these residuals (n,).
 

@@ -19,8 +19,9 @@ from toolpath_stiff.updating.inference.fits import held_out
 from toolpath_stiff.updating.inference.gates import Simulator
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor
+from toolpath_stiff.updating.portrait.choice import Chosen, choose
 from toolpath_stiff.updating.portrait.columns import Ground
-from toolpath_stiff.updating.portrait.selection import Chosen, Description, Selection, choose, law_prior
+from toolpath_stiff.updating.portrait.selection import Description, Selection, law_prior
 from toolpath_stiff.updating.portrait.smooth import smooth_rms
 from toolpath_stiff.updating.portrait.terms import Term
 
@@ -179,10 +180,11 @@ def _alike(selection: Selection, chosen: Chosen) -> tuple[Sized, ...]:
     others = selection.scattered(selection.without(found, 0), found)
     seen = {_kind(found.terms[0])}
     alike: list[Sized] = []
-    for term, weight in zip(chosen.weighed.terms, chosen.weighed.weights.tolist(), strict=True):
+    weighed = chosen.weighed
+    for term, weight, here in zip(weighed.terms, weighed.weights.tolist(), weighed.chosen.tolist(), strict=True):
         if weight < SHOWN or len(alike) == MOST_ALIKE:
             break
-        if _kind(term) in seen:
+        if not here or _kind(term) in seen:
             continue
         seen.add(_kind(term))
         fitted = selection.extended(others, term)

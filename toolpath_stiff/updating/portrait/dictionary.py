@@ -64,7 +64,7 @@ def locals_of(extra: Iterable[str]) -> list[Local]:
     """Every link with its places and directions; `extra`: names of further columns, which instruments may feel."""
     further = tuple(extra)
     whole = (*WHOLE, *further)
-    turning = ("X", "Y", "all", "tangential")
+    base, turning = ("X", "Y", "Z", "horizontal", "all"), ("X", "Y", "all", "tangential")
     return [
         Local("instrument", "reading factor", "reading", None, (*PLACE, *whole[1:], "tilt")),
         *(
@@ -81,12 +81,9 @@ def locals_of(extra: Iterable[str]) -> list[Local]:
         *_of_joints(whole),
         *_of_struts(whole),
         *_of_vertices("frame", ("radial", "tangential", "Z", "along the struts"), whole),
-        *(Local("frame", "give", axis, None, (*whole, *PLACE), side=PLACE) for axis in ("X", "Y", "Z", "all")),
+        *(Local("frame", "give", axis, None, (*whole, *PLACE), side=PLACE) for axis in base),
         *(Local("frame", "rocking", axis, None, ("constant", "load")) for axis in turning),
-        *(
-            Local("table", "give", axis, None, (*whole, *PLACE))
-            for axis in ("X", "Y", "Z", "all", "radial", "tangential")
-        ),
+        *(Local("table", "give", axis, None, (*whole, *PLACE)) for axis in (*base, "radial", "tangential")),
         *(Local("table", "rocking", axis, None, ("constant", "load", "setup", "z")) for axis in turning),
     ]
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from toolpath_stiff.units import json_number
 from toolpath_stiff.updating.portrait import Portrait, Sized
-from toolpath_stiff.updating.portrait.words import portrait_text, term_words
+from toolpath_stiff.updating.portrait.alike import Alike
+from toolpath_stiff.updating.portrait.words import alike_text, portrait_text, term_words
 
 
 class LinkEntry(TypedDict):
@@ -46,6 +47,29 @@ class AlikeEntry(TermEntry):
     probability: float | None
 
 
+class SameTermEntry(TypedDict):
+    """A term that fits as well as a named effect, with its share among those that do."""
+
+    link: str
+    where: int | None
+    direction: str
+    variable: str
+    shape: str
+    size: float | None
+    unit: str
+    share: float | None
+    words: str
+
+
+class SameEntry(TypedDict):
+    """The content of `looks_the_same`."""
+
+    text: str
+    links: list[LinkEntry]
+    variables: list[VariableEntry]
+    terms: list[SameTermEntry]
+
+
 class PortraitEntry(TypedDict):
     """The content of `portrait`."""
 
@@ -78,6 +102,29 @@ def portrait_entry(portrait: Portrait) -> PortraitEntry:
         "noise_floor_percent": json_number(100.0 * portrait.noise_floor, 4),
         "smooth_rms_percent": json_number(100.0 * portrait.smooth_rms, 4),
         "look_elsewhere": json_number(portrait.look_elsewhere, 3),
+    }
+
+
+def alike_entry(name: str, alike: Alike) -> SameEntry:
+    """What else would look the same as a named effect, as diagnose.json has it."""
+    return {
+        "text": alike_text(name, alike),
+        "links": [{"link": link, "probability": json_number(share, 3)} for link, share in alike.links],
+        "variables": [{"variable": one, "probability": json_number(share, 3)} for one, share in alike.variables],
+        "terms": [
+            {
+                "link": term.link,
+                "where": term.where,
+                "direction": term.direction,
+                "variable": term.variable,
+                "shape": term.shape,
+                "size": json_number(term.size / term.si),
+                "unit": term.unit,
+                "share": json_number(share, 3),
+                "words": term_words(term),
+            }
+            for term, share in alike.terms
+        ],
     }
 
 

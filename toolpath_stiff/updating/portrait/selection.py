@@ -1,14 +1,13 @@
-"""Which terms of the dictionary describe what is missing: few, chosen by likelihood, held to left-out points.
+"""Fits of terms of the dictionary beside a base fit, and the search for the best further one.
 
-Terms are added one by one. Every term's gain is first its score beside what is fitted already (Rao's score test, sizes
-on their allowed side); the best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j,
-exact for whatever gives way in series. A term joins where its gain is more than the best of the whole dictionary would
-reach by chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls.
+Every term's gain is first its score beside what is fitted already (Rao's score test, sizes on their allowed side); the
+best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j, exact for whatever gives way in
+series.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.updating.inference.covariances import Precision, inverse_root
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
-from toolpath_stiff.updating.inference.fits import HeldOut, held_out
 from toolpath_stiff.updating.inference.gates import Simulator, set_wild_aside
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, scaled_inverse
 from toolpath_stiff.updating.portrait.columns import Ground, shapes_near
@@ -27,15 +25,9 @@ from toolpath_stiff.updating.portrait.terms import Term
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MOST_TERMS, POINTS_EACH = 3, 6  # and points for each term but the first
 DRAWS = 200  # simulated campaigns
-LEADS = 0.01  # probability by chance below which the first term is taken for something
-JOINS = 0.02  # and a further one
-BETTER = 0.98  # share of the rms at left-out points to which a further term must bring it
+JOINS = 0.02  # probability by chance below which a further term is taken for something
 TIE = 0.5  # of log likelihood: so near, the place with the larger prior is taken
-# By how much likelihoods are flattened: the true shape is none of the dictionary's, so that what fits a little better
-# is not that much likelier. Of a large effect the shape's error counts, which grows with the gain; assumed.
-ROUGH, SHAPE = 2.5, 0.0015
 FINALISTS, EACH = 40, 1  # terms that are fitted in full: the best of all, and of every link and variable
 STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
 ROUNDS = 2  # searches for wild readings
@@ -190,8 +182,7 @@ class Selection:
             self.base, law=found.law[0], residual=found.residual[0], jacobian=jacobian.T,
             covariance=np.asarray(scaled_inverse(information)), scatter=scatter,
         )  # fmt: skip
-        price = -0.5 * scatter.covariance.log_determinant - len(scatter.wild) * scatter.price
-        return Description(sized, columns, scale, fit, float(found.posterior[0]) + price)
+        return Description(sized, columns, scale, fit, float(found.posterior[0]) + scatter.log_price)
 
     # -- search --------------------------------------------------------------------------------------------------------
 
@@ -265,7 +256,7 @@ class Selection:
         found = self.together(before, [entry.term for entry in entries])
         # Under the law of few places for many constants, the likelier of two that fit alike.
         best = int(np.argmax(found.posterior))
-        grown = self._settled(before, self.extended(before, entries[best].term))
+        grown = self.settled(before, self.extended(before, entries[best].term))
         return self._best_place(before, grown)
 
     def _best_place(self, before: Description, grown: Description) -> Description:
@@ -297,7 +288,7 @@ class Selection:
             before.fit.scatter,
         )
 
-    def _settled(self, before: Description, grown: Description) -> Description:
+    def settled(self, before: Description, grown: Description) -> Description:
         """With finer constants of the last term's shape."""
         for finer in (1.0, 0.4):
             near = shapes_near(grown.terms[-1], self.ground, finer)
@@ -341,123 +332,3 @@ def _bounded_step(
     reduced += np.einsum("gi,ij->gij", held * 1.0, np.eye(step.shape[1]))
     again = np.linalg.solve(reduced, np.where(free, left, 0.0)[..., None])[..., 0] / scale
     return np.where(held, fixed, again)
-
-
-# -- the way through ---------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Weighed:
-    """Terms in the place of the leading one, with their posterior probabilities, the likeliest first."""
-
-    terms: tuple[Term, ...]
-    weights: FloatArray
-    sizes: FloatArray
-
-    def summed(self, of: Callable[[Term], str]) -> list[tuple[str, float]]:
-        """Name -> probability summed over the terms, the likeliest first."""
-        found: dict[str, float] = {}
-        for term, weight in zip(self.terms, self.weights.tolist(), strict=True):
-            found[of(term)] = found.get(of(term), 0.0) + weight
-        return sorted(found.items(), key=lambda item: (-item[1], item[0]))
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """What was chosen.
-
-    Attributes
-    ----------
-    description
-        The terms, the leading one first.
-    chance
-        How often something as strong as the leading term comes up by chance.
-    weighed
-        What else may stand in the place of the leading term.
-    held
-        Errors at left-out points.
-    """
-
-    description: Description
-    chance: float
-    weighed: Weighed
-    held: HeldOut
-
-
-def choose(selection: Selection) -> tuple[Chosen | None, float]:
-    """One to three terms, none where nothing stands out from chance; and how often chance does as much."""
-    start = selection.start
-    if not len(selection.dictionary):
-        return None, 1.0
-    gains = selection.scores(start)
-    chance, threshold = selection.chance(start, float(gains.max(initial=0.0)))
-    found = selection.grown(start)
-    if chance > LEADS or found is None:
-        return None, chance
-    points = len(set(selection.problem.predictor.data.point.tolist()))
-    while len(found.terms) < min(MOST_TERMS, points // POINTS_EACH):
-        more = _one_more(selection, found, threshold)
-        if more is None:
-            break
-        found = more
-    found = _leading_first(selection, found)
-    return Chosen(found, chance, weigh(selection, found), _held(selection, found)), chance
-
-
-def _one_more(selection: Selection, before: Description, threshold: float) -> Description | None:
-    """With a further term, where it does more than chance and helps at left-out points."""
-    if selection.scores(before).max() <= threshold:
-        return None
-    more = selection.grown(before)
-    if more is None or 2.0 * (more.posterior - before.posterior) <= threshold:
-        return None
-    more = _swapped(selection, more)
-    return more if _held(selection, more).rms <= BETTER * _held(selection, before).rms else None
-
-
-def _swapped(selection: Selection, description: Description) -> Description:
-    """The first term once more the best beside the others: it was chosen without them."""
-    again = selection.grown(selection.without(description, 0))
-    return again if again is not None and again.posterior > description.posterior else description
-
-
-def _leading_first(selection: Selection, description: Description) -> Description:
-    """Terms by what their absence would cost."""
-    if len(description.terms) < 2:
-        return description
-    costs = [selection.without(description, k).posterior for k in range(len(description.terms))]
-    rows = np.argsort(costs, kind="stable").tolist()
-    return selection.described(
-        [description.terms[k] for k in rows], description.columns[rows], description.scale[rows],
-        description.fit.law, description.fit.scatter,
-    )  # fmt: skip
-
-
-def _held(selection: Selection, description: Description) -> HeldOut:
-    return held_out(description.fit, selection.problem.predictor.data.point)
-
-
-def temper(selection: Selection, description: Description, gain: float) -> float:
-    """By how much less a likelihood is to be trusted where shapes are rough, for a gain in log likelihood."""
-    squares = float(description.fit.scatter.precision.squares(description.fit.residual))
-    left = squares / max(len(selection.compliance) - 2 - len(description.terms), 1)
-    return ROUGH * max(left, 1.0) + SHAPE * max(gain, 0.0)
-
-
-def weigh(selection: Selection, description: Description) -> Weighed:
-    """Posterior probabilities of terms in the place of the leading one, beside the others."""
-    others = selection.without(description, 0)
-    others = selection.scattered(others, description)
-    entries = selection.finalists(selection.scores(others)) + crossed(description.terms[0], selection.ground)
-    entries = list({entry.term: entry for entry in entries}.values())
-    found = selection.together(others, [entry.term for entry in entries])
-    fit = others.fit
-    before = -0.5 * float(fit.scatter.precision.squares(fit.residual) + fit.law @ fit.law / LAW_PRIOR**2)
-    gain = float(found.posterior.max()) - before
-    logs = found.posterior / temper(selection, description, gain) + np.array([entry.log_prior for entry in entries])
-    logs = np.where(np.abs(found.size[:, -1]) > 0.0, logs, -np.inf)
-    weights = np.exp(logs - logs.max())
-    order = np.argsort(-weights, kind="stable")
-    return Weighed(
-        tuple(entries[i].term for i in order.tolist()), weights[order] / weights.sum(), found.size[order, -1]
-    )

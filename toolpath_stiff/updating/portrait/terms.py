@@ -28,7 +28,7 @@ VARIABLES = (
     "setup", "temperature", "direction",
 )  # fmt: skip
 SHAPES = ("offset", "slope", "square", "bump", "threshold", "periodic", "sign")
-DIRECTIONS = ("X", "Y", "Z", "radial", "axial", "along the struts", "tangential", "all", "reading")
+DIRECTIONS = ("X", "Y", "Z", "horizontal", "radial", "axial", "along the struts", "tangential", "all", "reading")
 
 # How a term acts:
 #   give            the tip's force moves the link along its directions; m/N
@@ -249,7 +249,7 @@ def _axes(link: str, action: str, direction: str, path: LoadPath) -> FloatArray:
         reach = np.maximum(np.hypot(x, y), 1e-9)
         ends = (x, y, none) if direction == "radial" else (-y, x, none)
         return np.asarray((np.stack(ends, axis=1) / reach[:, None])[:, None])
-    own = [0, 1, 2] if direction == "all" else [AXES[direction]]
+    own = {"all": [0, 1, 2], "horizontal": [0, 1]}.get(direction) or [AXES[direction]]
     return np.broadcast_to(np.eye(3)[own], (n, len(own), 3))
 
 

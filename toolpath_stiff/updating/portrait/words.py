@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import RAD_PER_DEG
 from toolpath_stiff.updating.portrait import Portrait, Sized
+from toolpath_stiff.updating.portrait.alike import Alike
 from toolpath_stiff.updating.portrait.terms import Term
 
 # Variable -> how it is said, SI value of the unit shown, that unit.
@@ -24,13 +25,17 @@ SAID: dict[str, tuple[str, float, str]] = {
     "temperature": ("the temperature", 1.0, "deg C"),
 }
 GIVES = {
-    "X": "along X", "Y": "along Y", "Z": "along Z", "all": "alike in all directions", "radial": "radially",
+    "X": "along X", "Y": "along Y", "Z": "along Z", "horizontal": "sideways, alike along X and Y",
+    "all": "alike in all directions", "radial": "radially",
     "tangential": "tangentially", "axial": "along the tool axis", "along the struts": "along the struts",
 }  # fmt: skip
 ROCKS = {
     "X": "rocks about Y", "Y": "rocks about X", "all": "rocks about X and Y", "tangential": "turns about Z",
 }  # fmt: skip
 TIPS = {"X": "tips about the platform's Y", "Y": "tips about the platform's X", "radial": "tips"}
+
+
+MOST_SAID = 3  # terms in a sentence on what else would look the same; a document has more
 
 
 def term_words(term: Term) -> str:
@@ -164,10 +169,17 @@ def _named(names: Sequence[tuple[str, float]]) -> str:
     return joined([f"{name} ({100.0 * weight:.0f} %)" for name, weight in names]).replace(" and ", " or ")
 
 
+def alike_text(name: str, alike: Alike) -> str:
+    """What else would look the same as a named effect."""
+    told = "; or if ".join(term_words(term) for term, _ in alike.terms[:MOST_SAID])
+    links = joined([link for link, _ in alike.links]).replace(" and ", " or ")
+    return f"These readings fit as well, without {name}, if {told}. By link: {links}."
+
+
 def variable_label(term: Term) -> tuple[str, float]:
     """Of an axis: what a term varies with and its unit, and the SI value of that unit."""
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     return (f"{name}, {unit}" if unit else name), si
 
 
-__all__ = ["portrait_text", "size_words", "term_words", "variable_label"]
+__all__ = ["alike_text", "portrait_text", "size_words", "term_words", "variable_label"]
