@@ -42,8 +42,6 @@ NORMAL_95 = 1.959964  # two-sided 95 % quantile of the normal distribution
 # Environment variables by which linear algebra is told how many threads it may have, before it is loaded. One, by
 # design: on matrices of this size a second one costs four times the CPU, and sums keep their order.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-# Set in the environment of a command and its processes, where nobody asks a library's classes for help.
-IN_COMMAND = "TPS_IN_COMMAND"
 
 
 def usable_cpus() -> int:

@@ -21,7 +21,7 @@ from types import FrameType
 from typing import Any, TextIO
 
 from toolpath_stiff.cli.arguments import whole_options
-from toolpath_stiff.defaults import IN_COMMAND, THREADS, VERSION
+from toolpath_stiff.defaults import THREADS, VERSION
 from toolpath_stiff.errors import FileError, TpsError, harmless
 
 
@@ -265,7 +265,7 @@ def _stop_at(new: Any, *before: Any) -> None:
 
 def entry() -> None:
     """Console script: one thread of linear algebra, whatever the command."""
-    os.environ.update(dict.fromkeys((*THREADS, IN_COMMAND), "1"))
+    os.environ.update(dict.fromkeys(THREADS, "1"))
     _stop_at(_stop, signal.SIG_DFL)  # one that is ignored (nohup) stays so
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal that cannot show a letter shows a question mark

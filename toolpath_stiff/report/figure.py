@@ -8,9 +8,7 @@ are. Letters are outlines, so that nothing moves with the fonts of whoever reads
 
 from __future__ import annotations
 
-import importlib
 import io
-import os
 import re
 import struct
 import warnings
@@ -23,7 +21,6 @@ from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.defaults import IN_COMMAND
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
 if TYPE_CHECKING:
@@ -70,7 +67,6 @@ def house_style() -> Iterator[None]:
     """Defaults of matplotlib with our style, whatever the user's own settings are; undone at the end."""
     import matplotlib as mpl
 
-    _load()
     settings = _settings()
     held: Any = mpl.rcParams  # a dict that checks each value: these have been
     before = {name: value for name, value in dict.items(held) if name in settings}
@@ -81,20 +77,6 @@ def house_style() -> Iterator[None]:
             yield
     finally:
         dict.update(held, before)
-
-
-@cache
-def _load() -> None:
-    """Load what draws; in a command without the help texts that matplotlib writes for its classes: a sixth of it."""
-    artist: Any = importlib.import_module("matplotlib.artist")
-    written = artist.kwdoc
-    if IN_COMMAND in os.environ:
-        artist.kwdoc = lambda _: ""
-    try:
-        for name in ("figure", "backends.backend_agg"):
-            importlib.import_module(f"matplotlib.{name}")
-    finally:
-        artist.kwdoc = written
 
 
 @cache
