@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.nc.geometry import Vector
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.toml_reader import TomlReader
@@ -221,10 +221,6 @@ def _check_pair(toml: TomlReader, axes: tuple[RotaryAxis, ...], parts: tuple[tup
     (a, b, c), (d, e, f) = axes[0].direction, axes[1].direction
     if math.hypot(b * f - c * e, c * d - a * f, a * e - b * d) < PARALLEL:
         raise toml.error(f"{first}.axis and {second}.axis are parallel", "two directions", where=f"{second}.axis")
-
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 # -- where the tool stands ---------------------------------------------------------------------------------------------

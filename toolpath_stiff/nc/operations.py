@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, IntArray
 from toolpath_stiff.nc.moves import RAPID, Jump, Moves, Program
 
 NAMED, MARKED, TOOL = "named", "marked", "tool"
@@ -143,8 +143,6 @@ def _last_dash(frame: str) -> str:
 
 # -- operations --------------------------------------------------------------------------------------------------------
 
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 MOST_OPERATIONS = 1000  # beyond, comments name passes or moves, not operations: the tools are taken
 # A call, a return, a loop or a condition: M97, M98, M99 and LinuxCNC's O words (`o100 call`, `o<name> while`).

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.moves import RAPID, MovesInMm, Recorder
 from toolpath_stiff.nc.state import State
 
-FloatArray = NDArray[np.float64]
 LEAST = 1e-9  # mm; of a shorter way to the next hole the interpreter decides whether it is one
 
 

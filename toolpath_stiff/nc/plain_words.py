@@ -17,13 +17,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.words import AXES
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
-BoolArray = NDArray[np.bool_]
 Tokens = tuple[IntArray, IntArray, FloatArray, ByteArray]  # line, rank, value, form of each word
 
 CHUNK = 8192  # lines: their words fit into a processor's cache

@@ -11,17 +11,13 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.kinematics import HEAD, LETTERS, PostedKinematics, line_point, roll_pitch, tool_poses, turned
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves
 from toolpath_stiff.units import deg_from_rad, mm_from_m, rad_from_deg
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 AXIS_STEP = rad_from_deg(1.0)  # largest turn of the rotary axes in one piece
 SAME_PLACE = 1e-12  # m and rad: rounding, not motion

@@ -19,7 +19,6 @@ from functools import cache, update_wrapper
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 
 P = ParamSpec("P")
 Made = TypeVar("Made", bound=bytes)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.poses import StiffnessMap, turning_points
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Machine
@@ -57,7 +58,6 @@ def map_page(machine: Machine, found: StiffnessMap, warnings: Sequence[str] = ()
     )
 
 
-FloatArray = NDArray[np.float64]
 DECIMALS: dict[str, int | None] = {"x_mm": 6, "y_mm": 6, "z_mm": 6, "stiffness_N_per_mm": 4, "reachable": None}
 
 CONTOURS = 9

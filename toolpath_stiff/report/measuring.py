@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
 from toolpath_stiff.report.history import dated, history_png
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.updating.raw import LoopFigures, Reduction
     from toolpath_stiff.updating.raw_records import Loop
 
-FloatArray = NDArray[np.float64]
 
 # Colours told apart by eyes that see no red or green (Okabe and Ito 2008), and shapes beside them.
 MARKS = (

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.report.figure import DPI, GRID, INK, MUTED, POINTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 
 TICK, GAP, NAME_GAP = 3.5, 3.5, 4.0  # points: a tick, from it to its figure, from the figures to the name
 LABEL_SIZE = 10.0  # points

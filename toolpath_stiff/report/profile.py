@@ -7,10 +7,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.statistics import stiffness_figures
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.report.captions import add_heading, add_legend
 from toolpath_stiff.report.figure import (
     DPI,
@@ -44,9 +44,6 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.analysis import Analysis
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.report.explanations import AS_GIVEN, best_explanation, figure_of, name_text, percent
 from toolpath_stiff.report.figure import (
     BLUE,
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.updating.measurements import Measurements
 
-FloatArray = NDArray[np.float64]
 
 RESIDUAL_MAP = "RdBu"  # red: measured softer than modelled, blue: stiffer
 DIRECTION_COLOURS = {"X": BLUE, "Y": SECOND_ORANGE, "Z": GREEN, "oblique": PURPLE}

@@ -11,9 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes import MOTION, PLANE
@@ -146,7 +144,6 @@ class LineEdit:
 
 # -- the controls ------------------------------------------------------------------------------------------------------
 
-FloatArray = NDArray[np.float64]
 
 DECIMALS_MM, DECIMALS_INCH = 4, 5
 # Of the last decimal: an axis that its block does not name gets a word where it is off by more than rounding.

@@ -16,13 +16,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.moves import RAPID, Arc, Recorder
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.units import ShopPose
-
-FloatArray = NDArray[np.float64]
 
 NOISE = 1e-12  # of a direction cosine: what is left of 0 or 1 after cosines and products
 UPRIGHT = 1e-9  # degrees; smaller tilts are rounding

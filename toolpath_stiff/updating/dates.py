@@ -6,12 +6,10 @@ import re
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.units import SECONDS_PER_DAY
-
-FloatArray = NDArray[np.float64]
 
 EPOCH = datetime(1970, 1, 1)  # without a zone, as days are counted
 EARLIEST, LATEST = 1900, 2200  # years; beyond, the year is a slip

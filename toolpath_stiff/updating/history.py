@@ -22,11 +22,10 @@ from typing import Literal, TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.units import certain
 from toolpath_stiff.updating.dates import date_text
 
-FloatArray = NDArray[np.float64]
-TextArray = NDArray[np.str_]
 Kind = Literal["step", "drift", "step or drift"]
 
 SURE = 0.05  # probability, all struts and places counted, below which a change is told of

@@ -22,13 +22,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.stiffness.effects.measuring_loop import TIP, WORDS, MeasuringLoop, measuring_loop
 from toolpath_stiff.units import m_from_um
-
-FloatArray = NDArray[np.float64]
-TextArray = NDArray[np.str_]
 
 COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of a measurement file, for loops beside the tip alone
 LARGEST_UM = 1e6

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
 from toolpath_stiff.machine.limits import reach
@@ -36,9 +37,6 @@ from toolpath_stiff.updating.rows import (
     duplicates,
     read_rows,
 )
-
-FloatArray = NDArray[np.float64]
-TextArray = NDArray[np.str_]
 
 NIST_TABLE_1 = "nist-table1"
 RISER_ABOVE = 1.0  # m: of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import TypedDict, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
@@ -53,7 +52,6 @@ from toolpath_stiff.updating.rows import (
     STIFFEST,
 )
 
-FloatArray = NDArray[np.float64]
 USUAL = 5e3, 1e6  # N/mm, of machine tools' struts and spindles; assumed, to tell what a wrong unit may be
 ONE_SIDE = 0.05  # of the range: a force set on a bench that goes less far to the other side is of one side
 CLOSED = 3  # turns of the drive, from which the records hold a closed cycle

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.arrays import FloatArray
 
 NEAR_TURN = 0.1  # of the range: how near to an extreme a cycle must come to turn there
 FEWEST_STILL = 3  # records, and share of the range of the force, over which an indicator stands still at its end

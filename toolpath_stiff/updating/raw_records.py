@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.stiffness.effects.measuring_loop import TIP, MeasuringLoop, measuring_loop
 from toolpath_stiff.tables import Columns, Table
@@ -30,7 +30,6 @@ from toolpath_stiff.updating.rows import (
     optional_number,
 )
 
-FloatArray = NDArray[np.float64]
 Record = tuple[int, dict[str, str], list[float]]  # line, cells, readings and conditions
 
 READINGS = ("jog_um", "force_N", "displacement_um")

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.arrays import FloatArray
 
 MOST = 200  # records of that way that are looked at singly; of more, runs are averaged: a logger's thousands
 FEWEST = 7  # records on the way from extreme to extreme from which a shape is looked for

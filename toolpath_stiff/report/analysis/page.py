@@ -17,6 +17,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from toolpath_stiff.analysis.statistics import stiffness_figures
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report.analysis.path import legend_extend, scale_limits
 from toolpath_stiff.report.figure import page_colours
@@ -285,9 +286,6 @@ def _unsupported(entries: Sequence[Mapping[str, Any]]) -> Markup:
 def _and_more(count: int, what: str) -> Markup:
     return markup("<p>and {} more{}</p>", count, what) if count > 0 else Markup()
 
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 MOST_SAMPLES = 200_000  # on the page: some 5 MB; the tables are always of all samples
 OTHER_COLUMNS = 4000  # columns of pixels that the other machine's curve is thinned to

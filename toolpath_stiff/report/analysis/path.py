@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.report.captions import add_heading, add_legend, add_words
 from toolpath_stiff.report.figure import (
     CLASSES,
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.analysis import Analysis
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views

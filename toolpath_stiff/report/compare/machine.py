@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.report.compare.pictures import heading, near_rows
 from toolpath_stiff.report.figure import (
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.updating.comparison import Comparison
 
-FloatArray = NDArray[np.float64]
 Place = tuple[float, float, float, float]  # x, y, width, height
 
 BAR, GAP = 5.0, 1.0  # points, width of a bar and space between two

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.report.figure import (
     FAINT,
     INK,
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
     from toolpath_stiff.updating.comparison import Comparison
 
-FloatArray = NDArray[np.float64]
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 MOST_CHANGES = 12  # of set-up or file that are marked

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.report.compare.pictures import RESIDUAL_AXIS, count_of, heading
 from toolpath_stiff.report.figure import (
     BLUE,
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.updating.comparison import Comparison
     from toolpath_stiff.updating.comparison.residuals import Label, Variable
 
-FloatArray = NDArray[np.float64]
 
 ACROSS = 5  # panels in a row
 PITCH = 2.15  # inches from one row of panels to the next

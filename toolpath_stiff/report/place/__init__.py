@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.analysis import Analysis
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.nc.moves import Program
@@ -24,7 +24,6 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 if TYPE_CHECKING:
     from toolpath_stiff.placement.placing import Placed
 
-FloatArray = NDArray[np.float64]
 
 POINTS = (150, 800)  # of the path on the page, fewest and most
 ENDS = (0.05, 0.95)  # of the path's length, all placements together, between which the colours run

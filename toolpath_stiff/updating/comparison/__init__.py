@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
@@ -42,8 +43,6 @@ from toolpath_stiff.updating.inference.fits import Baseline, fit_effects
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, covariance, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements, model_stiffness
-
-FloatArray = NDArray[np.float64]
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted

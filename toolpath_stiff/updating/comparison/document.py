@@ -9,6 +9,7 @@ from typing import NotRequired, TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.units import certain, mm_from_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 from toolpath_stiff.updating.comparison.principles import (
@@ -37,8 +38,6 @@ from toolpath_stiff.updating.inference.fits import ErrorFigures, deviation_perce
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
-
-FloatArray = NDArray[np.float64]
 
 HINTS = 3  # patterns named where none stands out
 MOST_ALIKE = 6  # patterns named as not to be told apart

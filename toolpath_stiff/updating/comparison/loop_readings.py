@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.comparison.residuals import directions
 from toolpath_stiff.updating.dates import day_of
 from toolpath_stiff.updating.history import NOTHING, HistoryDocument, Readings, history
 from toolpath_stiff.updating.inference.covariances import Covariance
 from toolpath_stiff.updating.measurements import Measurements
-
-FloatArray = NDArray[np.float64]
 
 STANDS_OUT = 3.0  # standard deviations from which a loop is said to read something else than the model has
 

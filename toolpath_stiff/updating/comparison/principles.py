@@ -20,6 +20,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -28,8 +29,6 @@ from toolpath_stiff.updating.comparison.residuals import directions, radius
 from toolpath_stiff.updating.inference.covariances import Covariance
 from toolpath_stiff.updating.inference.repeats import repeat_groups
 from toolpath_stiff.updating.measurements import Measurements, measured_path
-
-FloatArray = NDArray[np.float64]
 
 SAME = 1e-3  # m, poses and joints closer than this are one
 UPRIGHT = 1e-3  # rad

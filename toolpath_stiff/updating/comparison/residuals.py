@@ -10,16 +10,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
 from toolpath_stiff.stiffness.effects.contract import about
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.comparison.structure import SIGNIFICANT, FoundPattern, Pattern
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
-
-FloatArray = NDArray[np.float64]
-TextArray = NDArray[np.str_]
 
 AXIS_ALIGNED = 0.999  # |cosine| from which a direction counts as X, Y or Z
 SAME_PLANE = 0.005  # m, heights closer than this are one plane
@@ -197,7 +194,6 @@ def labels(data: Measurements) -> tuple[list[Label], list[str]]:
 # A pattern is one direction of load, or all, and either some of the readings (a plane, a zone, a set-up, a clamping) or
 # the way they go with a variable.
 
-BoolArray = NDArray[np.bool_]
 
 FEWEST = 2  # readings in a level; a single one is a reading, not a pattern
 CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose curvature is looked for too

@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.inference.covariances import Covariance, Groups
 from toolpath_stiff.updating.inference.noise import Noise
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-FloatArray = NDArray[np.float64]
 
 # tau: relative sd of the excess; 0, then 0.3 % to 100 % in steps of 30 %.
 EXCESSES = np.concatenate([[0.0], np.geomspace(0.003, 1.0, 23)])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, NotRequired, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.defaults import NORMAL_95
@@ -20,8 +19,6 @@ from toolpath_stiff.updating.diagnosis.document import HeldErrors, RoundedErrors
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent, errors_text, gain_in_standard_errors
 from toolpath_stiff.updating.inference.prediction import scaled_law
-
-FloatArray = NDArray[np.float64]
 
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
 

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
@@ -52,8 +53,6 @@ from toolpath_stiff.updating.inference.hypotheses import Family, score_families,
 from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
-
-FloatArray = NDArray[np.float64]
 
 NEEDED = 1.0  # standard errors by which the error at left-out points must fall
 TRIED = 4  # candidates a step of `--auto`, the most likely first

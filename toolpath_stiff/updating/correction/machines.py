@@ -10,8 +10,8 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.machine import Machine, StrutLaw, load_machine, solve_struts
 from toolpath_stiff.machine.model import EffectEntry, Uncertainty
@@ -23,8 +23,6 @@ from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, n_
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.prediction import scaled_law
 from toolpath_stiff.updating.measurements import NIST_TABLE_1
-
-FloatArray = NDArray[np.float64]
 
 
 def data_hash(files: Sequence[str]) -> str:

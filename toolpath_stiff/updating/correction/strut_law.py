@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
@@ -27,8 +28,6 @@ from toolpath_stiff.updating.inference.fits import AS_GIVEN, LAW_REFITTED, Basel
 from toolpath_stiff.updating.inference.noise import noise_models
 from toolpath_stiff.updating.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
-
-FloatArray = NDArray[np.float64]
 
 STARTS = 6
 START_SPREAD = 0.2  # sd of the starts' logarithms: a law wrong by 20 %

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import Asked
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.units import Pose
     from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 
-FloatArray = NDArray[np.float64]
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.stiffness.effects.contract import joined
@@ -33,7 +33,6 @@ from toolpath_stiff.updating.portrait.document import PortraitEntry, SameEntry, 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 
-FloatArray = NDArray[np.float64]
 
 TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
 

@@ -32,7 +32,6 @@ from dataclasses import dataclass, field, replace
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.inference.candidates import EXPECTED
@@ -51,8 +50,6 @@ from toolpath_stiff.updating.inference.hypotheses import (
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.inference.several import Combination, search_pairs, search_triples
-
-FloatArray = NDArray[np.float64]
 
 NONE = "none"
 OUTSIDE = "outside the catalogue"

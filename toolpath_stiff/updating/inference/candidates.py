@@ -17,8 +17,8 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect
@@ -26,8 +26,6 @@ from toolpath_stiff.updating.inference.covariances import Precision
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.inference.splines import Spline
 from toolpath_stiff.updating.measurements import Measurements
-
-FloatArray = NDArray[np.float64]
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
 POINTS = 9  # sizes a sign

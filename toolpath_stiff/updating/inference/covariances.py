@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.arrays import FloatArray
+
 Rows = NDArray[np.int64]
 
 MOST_RANKS = 64  # by which an inverse is changed before it is worked out anew

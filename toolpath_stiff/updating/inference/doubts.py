@@ -14,6 +14,7 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
@@ -25,7 +26,6 @@ from toolpath_stiff.updating.inference.noise import Noise, Scatter
 from toolpath_stiff.updating.inference.prediction import scaled_law
 from toolpath_stiff.updating.measurements import Measurements, model_stiffness
 
-FloatArray = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 # -- a stated noise that nothing but the misfit tells of ---------------------------------------------------------------

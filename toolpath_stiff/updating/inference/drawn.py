@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import BoolArray
 from toolpath_stiff.stiffness.effects.contract import Effect, joined
 from toolpath_stiff.units import json_number
 from toolpath_stiff.updating.inference.covariances import Groups
@@ -29,9 +29,6 @@ from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import held_out
 from toolpath_stiff.updating.inference.noise import Scatter
 from toolpath_stiff.updating.measurements import Measurements, reading_marks
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 CONFIRMS = 3.0  # log probability that new readings must gain: odds of 20 to 1, strong evidence (Kass and Raftery 1995)
 FEWEST_POINTS = 2  # of new readings: one pose alone cannot confirm a form

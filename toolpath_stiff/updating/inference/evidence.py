@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.candidates import (
     Candidate,
@@ -35,8 +35,6 @@ from toolpath_stiff.updating.inference.noise import (
     scaled_inverse,
 )
 from toolpath_stiff.updating.inference.prediction import Predictor
-
-FloatArray = NDArray[np.float64]
 
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 GRID = 24  # sizes a sign

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.inference.covariances import (
     Covariance,
     Kernel,
@@ -33,8 +33,6 @@ from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.noise import Noise, Scatter
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.inference.tails import surprise
-
-FloatArray = NDArray[np.float64]
 
 DRAWS = 400
 RIDGE = 1e-12  # on the diagonal where readings are set aside: two that a fit explains entirely are not told apart

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.inference.candidates import Table, candidates_of, table_of
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import Forms, Structure, set_wild_aside
 from toolpath_stiff.updating.inference.tails import normal_below
-
-FloatArray = NDArray[np.float64]
 
 NOTHING = -1e9  # log evidence of what cannot be
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.arrays import FloatArray
 
 GOLDEN = 0.5 * (3.0 - np.sqrt(5.0))
 ROOT_EPSILON = float(np.sqrt(np.finfo(float).eps))

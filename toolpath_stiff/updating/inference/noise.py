@@ -24,6 +24,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import both_names
@@ -38,7 +39,6 @@ from toolpath_stiff.updating.inference.repeats import (
 )
 from toolpath_stiff.updating.measurements import Measurements
 
-FloatArray = NDArray[np.float64]
 At = TypeVar("At")  # where a fit stands
 
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.stiffness import exact
@@ -24,8 +25,6 @@ from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import law_products
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
 from toolpath_stiff.updating.measurements import Measurements, measured_path, mechanical_stiffness, shown_by
-
-FloatArray = NDArray[np.float64]
 
 NO_CHANGE = (0.0, 0.0)  # of the strut law
 ANSWERS_KEPT = 64

@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.updating.inference.covariances import Groups
 from toolpath_stiff.updating.inference.minima import bounded_minimum
 from toolpath_stiff.updating.measurements import Measurements
-
-FloatArray = NDArray[np.float64]
 
 # Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their
 # share is expected about the assumed one (sd of its logarithm), within the ends.

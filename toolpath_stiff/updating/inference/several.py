@@ -17,14 +17,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.updating.inference.candidates import Table, tabulate
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.hypotheses import Family
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 SCORED = 8  # sets of effects whose tables are scored
 SEEDS = 6  # pairs from which triples are grown

@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from toolpath_stiff.arrays import FloatArray
 
 MOST_TERMS = 10_000  # next to x = a about 6 sqrt(a) terms are needed
 SMALL = 1e-15  # share that the terms left out may have

@@ -59,8 +59,6 @@ from toolpath_stiff.updating.planning.rivals import (
 )
 from toolpath_stiff.updating.planning.visits import Costs, Matters, Menu, Visits, possible_visits, with_options
 
-FloatArray = NDArray[np.float64]
-
 MOST_RIVALS = 6  # a plan that separates more would separate none well
 MOST_VISITS = 200
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart

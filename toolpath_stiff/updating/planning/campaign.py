@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Effect
@@ -38,8 +38,6 @@ from toolpath_stiff.updating.planning.visits import (
     planned_readings,
     reachable,
 )
-
-FloatArray = NDArray[np.float64]
 
 FEWEST, MOST = 8, 200  # poses
 LEAST_TILT = 15.0 * RAD_PER_DEG

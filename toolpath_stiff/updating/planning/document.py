@@ -11,6 +11,7 @@ from typing import Any, NotRequired, TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import certain, deg_from_rad, min_from_s, mm_from_m
@@ -382,7 +383,6 @@ def plan_csv(rows: Sequence[dict[str, Any]]) -> str:
 #
 # How far two rivals would be apart at each place of the workspace: one visit there, X, Y and Z.
 
-FloatArray = NDArray[np.float64]
 
 ACROSS = 11  # points of the grid a side
 TILTS = 6  # directions of tilt

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import min_from_s
 from toolpath_stiff.updating.inference import NAMED
 from toolpath_stiff.updating.planning.rivals import Forecast
 from toolpath_stiff.updating.planning.visits import Costs, Menu, Visits
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 MOST_REPEATS = 64
 

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import FileError, InputError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.tables import read_table
@@ -27,9 +28,6 @@ from toolpath_stiff.updating.planning.gaps import SETTLED, ReadingNoise, choose,
 from toolpath_stiff.updating.planning.rivals import Forecast, principal
 from toolpath_stiff.updating.planning.visits import Costs, Menu, Visits, planned_readings
 from toolpath_stiff.updating.rows import COLUMNS, Row, read_rows
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 TABLES = "plan_tables.npz"  # in the plan's folder
 VERSION = 1

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
@@ -29,9 +30,6 @@ from toolpath_stiff.updating.inference.hypotheses import score_family
 from toolpath_stiff.updating.inference.noise import JOINT_ERROR
 from toolpath_stiff.updating.inference.prediction import JOINT_STEP, Predictor
 from toolpath_stiff.updating.measurements import Measurements
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LAW_STEP = 1e-4  # of the strut law's logarithms, for differences
 LARGEST_STEP = 0.3  # of a size, for differences: a secant over the posterior's width where that is wide

@@ -17,6 +17,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
@@ -25,8 +26,6 @@ from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import RAD_PER_DEG
 from toolpath_stiff.updating.measurements import Measurements
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 T = TypeVar("T")
 
 AXES = ("X", "Y", "Z")

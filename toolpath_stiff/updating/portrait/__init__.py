@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import held_out
 from toolpath_stiff.updating.inference.gates import Simulator
@@ -24,8 +24,6 @@ from toolpath_stiff.updating.portrait.columns import Ground
 from toolpath_stiff.updating.portrait.selection import Description, Selection, law_prior
 from toolpath_stiff.updating.portrait.smooth import smooth_rms
 from toolpath_stiff.updating.portrait.terms import Term
-
-FloatArray = NDArray[np.float64]
 
 HELD = 0.90  # probability that a set of links or variables adds up to
 MOST_LINKS, MOST_VARIABLES, MOST_ALIKE = 4, 3, 4

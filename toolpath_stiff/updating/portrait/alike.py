@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.inference.candidates import candidates_of
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.noise import Noise
@@ -19,8 +20,6 @@ from toolpath_stiff.updating.portrait.choice import ROUGH, Weighed
 from toolpath_stiff.updating.portrait.columns import Ground
 from toolpath_stiff.updating.portrait.selection import Selection
 from toolpath_stiff.updating.portrait.terms import CATALOGUE_LINKS, Term
-
-FloatArray = NDArray[np.float64]
 
 # Odds beyond which what fits worse is not the same (strong evidence: Kass and Raftery 1995). A term that is one of many
 # constants or places must fit better than the plainest ones by as much as its prior weight is smaller.

@@ -17,12 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.inference.fits import HeldOut, held_out
 from toolpath_stiff.updating.portrait.dictionary import Entry, crossed
 from toolpath_stiff.updating.portrait.selection import Description, Selection
 from toolpath_stiff.updating.portrait.terms import Term
-
-FloatArray = NDArray[np.float64]
 
 MOST_TERMS, POINTS_EACH = 3, 6  # and points for each term but the first
 LEADS = 0.01  # probability by chance below which the first term is taken for something

@@ -7,8 +7,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.effects.contract import LoadPath
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.portrait.terms import (
@@ -23,7 +23,6 @@ from toolpath_stiff.updating.portrait.terms import (
     variable_values,
 )
 
-FloatArray = NDArray[np.float64]
 Shapes = tuple[tuple[tuple[str, Constants], ...], FloatArray]  # shape and constants; (s, n) or (s, n, 6) values
 
 PLACE = ("x", "y", "z", "radius")

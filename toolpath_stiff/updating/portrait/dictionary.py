@@ -18,10 +18,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.portrait.columns import PLACE, Ground
 from toolpath_stiff.updating.portrait.terms import Action, Constants, Term
-
-FloatArray = NDArray[np.float64]
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is

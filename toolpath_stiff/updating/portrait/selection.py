@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.inference.covariances import Precision, inverse_root
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.gates import Simulator, set_wild_aside
@@ -21,9 +21,6 @@ from toolpath_stiff.updating.inference.noise import Noise, Scatter, scaled_inver
 from toolpath_stiff.updating.portrait.columns import Ground, shapes_near
 from toolpath_stiff.updating.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of
 from toolpath_stiff.updating.portrait.terms import Term
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 DRAWS = 200  # simulated campaigns
 JOINS = 0.02  # probability by chance below which a further term is taken for something

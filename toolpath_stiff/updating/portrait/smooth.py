@@ -7,16 +7,13 @@ The discrepancy as a Gaussian process with one of the forms of covariance of `in
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.inference.covariances import Groups
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import POINT_TO_POINT, discrepancy_forms
 from toolpath_stiff.updating.inference.hypotheses import AMPLITUDES
 from toolpath_stiff.updating.portrait.selection import law_prior
-
-FloatArray = NDArray[np.float64]
-
 
 GENERAL = ("smooth over the workspace, different by direction", "linear over the workspace, different by direction")
 
