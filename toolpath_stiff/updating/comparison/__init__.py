@@ -150,16 +150,7 @@ def compare(
             hint="`tps reduce` shows struts measured alone over their dates, raw records or stiffnesses",
         )
     predictor = Predictor(machine, data, effect_files)
-    log_model = predictor.log_stiffness()
-    bad = np.flatnonzero(~np.isfinite(log_model))
-    if len(bad):
-        model_stiffness(predictor.base, data)  # which effect leaves none, at which pose, if it is one
-        raise InputError(
-            "the model has no stiffness for this reading",
-            hint="check the pose and the machine file's effects",
-            file=str(data.file[bad[0]]),
-            line=int(data.line[bad[0]]),
-        )
+    log_model = _log_model(predictor, data)
     residual = np.log(data.stiffness) - log_model
     numbers, (names, notes) = variables(predictor, log_model), labels(data)
     looked_for = patterns(data, numbers, names)
@@ -197,6 +188,21 @@ def compare(
         last.scattering.places, last.structure.excess, tuple(numbers), tuple(names),
         load_path_shares(predictor.base, data), document,
     )  # fmt: skip
+
+
+def _log_model(predictor: Predictor, data: Measurements) -> FloatArray:
+    """Logarithm of the modelled stiffness (N/m) of every reading, (n,)."""
+    log_model = predictor.log_stiffness()
+    bad = np.flatnonzero(~np.isfinite(log_model))
+    if len(bad):
+        model_stiffness(predictor.base, data)  # which effect leaves none, at which pose, if it is one
+        raise InputError(
+            "the model has no stiffness for this reading",
+            hint="check the pose and the machine file's effects",
+            file=str(data.file[bad[0]]),
+            line=int(data.line[bad[0]]),
+        )
+    return log_model
 
 
 def _loops(

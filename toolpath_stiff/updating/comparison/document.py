@@ -261,20 +261,16 @@ def document_of(
         "notes": [*data.notes, *doubts],
         "suspect_rows": suspects,
         "hints": [] if findings else _hints(answers[-1], tests, looked_for, numbers, residual),
-        "text": " ".join(
-            filter(
-                None,
-                (
-                    asked,
-                    overall_text(len(data), baseline, noises, findings),
-                    *(f"{d[:1].upper()}{d[1:]}." for d in doubts),
-                ),
-            )
-        ),
+        "text": _in_words(asked, overall_text(len(data), baseline, noises, findings), doubts),
         "question": asked,
         "next": following,
     }
     return cast(ComparisonDocument, certain(written))
+
+
+def _in_words(asked: str, overall: str, doubts: list[str]) -> str:
+    """What is said of the whole: a question first if there is one, then the error, then what is doubtful."""
+    return " ".join(filter(None, (asked, overall, *(f"{d[:1].upper()}{d[1:]}." for d in doubts))))
 
 
 def _baseline(predictor: Predictor, answers: list[Answer], residual: FloatArray) -> BaselineFigures:

@@ -313,76 +313,104 @@ def _vertex_rows(term: Term) -> tuple[list[str], str]:
 
 # -- one term ----------------------------------------------------------------------------------------------------------
 
+_LAW = "path.machine.strut_law.stiffness(path.struts.lengths{})"
+
 
 def _piece(term: Term, words: str, name: str) -> Piece:
-    lines, (share, shape) = [*_variable_lines(term), *_constant_lines(term)], _shape(term)
-    constants = _constants_in_words(term)
-    size = f'p["{name}"]'
-    law = "path.machine.strut_law.stiffness(path.struts.lengths{})"
-    functions: list[str] = []
     if term.action in ("strut", "strut factor"):
-        functions.append(
-            _function(f"{name}_share", "(n, 6): how much of the size each strut has.", lines, _each(term, share))
-        )
-        own = f"{size} * {name}_share(path)"
-        formula = f"c_i += {_times(name, shape)}"
-        statements: tuple[str, ...] = (f"added += {own}",)
-        if term.action == "strut factor":
-            statements = (
-                f"stiffness = {law.format('')}  # (n, 6) N/m, by the strut law",
-                "# No strut loses more than four fifths of its compliance.",
-                f"added += np.maximum({own}, {-LEAST_STRUT}) / stiffness",
-            )
-            formula = f"c_i += {_times(name, shape)} / k_i"
-        if term.where is not None:
-            formula = formula.replace("_i", f"_{term.where}")
-        return Piece(term, words, name, functions[0], statements, formula + constants)
+        return _strut_piece(term, words, name)
     if term.action == "joint offset":
-        assert term.where is not None
-        joints = f"{term.column}_joints"
-        axis = AXES.index(term.direction)
+        return _joint_piece(term, words, name)
+    if term.action in ("reading factor", "reading shift"):
+        return _reading_piece(term, words, name)
+    if term.action == "coupling":
+        return _coupling_piece(term, words, name)
+    return _spring_piece(term, words, name)
+
+
+def _strut_piece(term: Term, words: str, name: str) -> Piece:
+    lines, (share, shape) = _share_lines(term), _shape(term)
+    function = _function(f"{name}_share", "(n, 6): how much of the size each strut has.", lines, _each(term, share))
+    own = f"{_size(name)} * {name}_share(path)"
+    formula = f"c_i += {_times(name, shape)}"
+    statements: tuple[str, ...] = (f"added += {own}",)
+    if term.action == "strut factor":
         statements = (
-            f"joints = np.array(machine.{joints})",
-            f"joints[{term.where - 1}, {axis}] += {size}",
-            f"machine = machine.with_changes({joints}=joints)",
+            f"stiffness = {_LAW.format('')}  # (n, 6) N/m, by the strut law",
+            "# No strut loses more than four fifths of its compliance.",
+            f"added += np.maximum({own}, {-LEAST_STRUT}) / stiffness",
         )
-        return Piece(
-            term, words, name, "", statements, f"{term.direction.lower()}_{term.column}_{term.where} += {name}"
-        )
-    if term.direction in AXES and term.action in ("reading factor", "reading shift"):
+        formula = f"c_i += {_times(name, shape)} / k_i"
+    if term.where is not None:
+        formula = formula.replace("_i", f"_{term.where}")
+    return Piece(term, words, name, function, statements, formula + _constants_in_words(term))
+
+
+def _joint_piece(term: Term, words: str, name: str) -> Piece:
+    assert term.where is not None
+    joints = f"{term.column}_joints"
+    statements = (
+        f"joints = np.array(machine.{joints})",
+        f"joints[{term.where - 1}, {AXES.index(term.direction)}] += {_size(name)}",
+        f"machine = machine.with_changes({joints}=joints)",
+    )
+    formula = f"{term.direction.lower()}_{term.column}_{term.where} += {name}"
+    return Piece(term, words, name, "", statements, formula)
+
+
+def _reading_piece(term: Term, words: str, name: str) -> Piece:
+    share, shape = _shape(term)
+    if term.direction in AXES:
         along = f"path.direction[:, {AXES.index(term.direction)}] ** 2"
         share = along if share.startswith("np.ones") else f"{_grouped(share)} * {along}"
-    what = "(n,): how much of the size acts at each pose."
-    functions.append(_function(f"{name}_share", what, lines, share))
-    own = f"{size} * {name}_share(path)"
+    function, own = _pose_share(term, name, share)
     if term.action == "reading factor":
-        statements = (f"factor = 1.0 + {own}", f"stiffness = stiffness / np.maximum(factor, {LEAST_READ})")
-        formula = f"k_read = k / (1 + {_times(name, shape)})"
-        return Piece(term, words, name, functions[0], statements, formula + _along(term) + constants)
-    if term.action == "reading shift":
-        statements = (
-            f"factor = 1.0 + {own} * stiffness / path.force",
-            f"stiffness = stiffness / np.maximum(factor, {LEAST_READ})",
-        )
+        factor, formula = f"factor = 1.0 + {own}", f"k_read = k / (1 + {_times(name, shape)})"
+    else:
+        factor = f"factor = 1.0 + {own} * stiffness / path.force"
         formula = f"F / k_read = F / k + {_times(name, shape)}"
-        return Piece(term, words, name, functions[0], statements, formula + _along(term) + constants)
-    if term.action == "coupling":
-        first, second = (int(term.constants[one]) for one in ("first", "second"))
-        statements = (
-            f"stiffness = {law.format(f'[:, [{first - 1}, {second - 1}]]')}",
-            "# Coupled by as much as both give way alone, the pair would have no stiffness left.",
-            f"own = np.clip({own}, {-MOST_COUPLED}, {MOST_COUPLED}) / np.sqrt(stiffness.prod(axis=1))",
-            f"form[:, {first - 1}, {second - 1}] += own",
-            f"form[:, {second - 1}, {first - 1}] += own",
-        )
-        formula = f"c_{first}{second} += {_times(name, shape)} / sqrt(k_{first} k_{second})"
-        return Piece(term, words, name, functions[0], statements, formula + constants)
+    statements = (factor, f"stiffness = stiffness / np.maximum(factor, {LEAST_READ})")
+    return Piece(term, words, name, function, statements, formula + _along(term) + _constants_in_words(term))
+
+
+def _coupling_piece(term: Term, words: str, name: str) -> Piece:
+    share, shape = _shape(term)
+    function, own = _pose_share(term, name, share)
+    first, second = (int(term.constants[one]) for one in ("first", "second"))
+    statements = (
+        f"stiffness = {_LAW.format(f'[:, [{first - 1}, {second - 1}]]')}",
+        "# Coupled by as much as both give way alone, the pair would have no stiffness left.",
+        f"own = np.clip({own}, {-MOST_COUPLED}, {MOST_COUPLED}) / np.sqrt(stiffness.prod(axis=1))",
+        f"form[:, {first - 1}, {second - 1}] += own",
+        f"form[:, {second - 1}, {first - 1}] += own",
+    )
+    formula = f"c_{first}{second} += {_times(name, shape)} / sqrt(k_{first} k_{second})"
+    return Piece(term, words, name, function, statements, formula + _constants_in_words(term))
+
+
+def _spring_piece(term: Term, words: str, name: str) -> Piece:
+    share, shape = _shape(term)
+    function, own = _pose_share(term, name, share)
     rows, load = _rows(term)
     what = "(n, k, 12): what loads the link, of strut forces (0 to 5), tip force (6 to 8), moment (9 to 11)."
-    functions.append(_function(f"{name}_loads", what, rows, "rows"))
+    functions = f"{function}\n\n\n{_function(f'{name}_loads', what, rows, 'rows')}"
     statements = (f"weight = {own}", f"form += springs(weight, {name}_loads(path))")
-    formula = f"c += {_times(name, shape)} h^2, h = {load} per unit load{constants}"
-    return Piece(term, words, name, "\n\n\n".join(functions), statements, formula)
+    formula = f"c += {_times(name, shape)} h^2, h = {load} per unit load{_constants_in_words(term)}"
+    return Piece(term, words, name, functions, statements, formula)
+
+
+def _size(name: str) -> str:
+    return f'p["{name}"]'
+
+
+def _share_lines(term: Term) -> list[str]:
+    return [*_variable_lines(term), *_constant_lines(term)]
+
+
+def _pose_share(term: Term, name: str, share: str) -> tuple[str, str]:
+    """The function of how much of the size acts at each pose, and the size times it."""
+    function = _function(f"{name}_share", "(n,): how much of the size acts at each pose.", _share_lines(term), share)
+    return function, f"{_size(name)} * {name}_share(path)"
 
 
 def _each(term: Term, share: str) -> str:

@@ -198,9 +198,7 @@ def _noise_of_tip(
             total = float(np.sqrt(np.mean(relative[rows] ** 2)))
             used = "instead" if rows.all() else "for the readings that state nothing"
             remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file", used)
-        origin = f"estimated from {repeats.differences} differences between repeats: "
-        origin += _percent(repeats.repeat, repeats.clamping)
-        origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
+        origin = _origin(repeats)
         repeat, freedom = np.full(n, repeats.repeat), repeats.freedom
         if rows.any() and not rows.all():  # of other readings, mostly: both count
             repeat, freedom = _both(relative, rows, repeats, trusted=not remark)
@@ -210,10 +208,9 @@ def _noise_of_tip(
         repeat, clamping = _parts(relative[rows])
         every = np.full(n, np.sqrt(np.mean(repeat**2)))
         every[rows] = repeat
-        origin = (
-            f"sd_N_per_mm of the readings, {100 * float(np.sqrt(np.mean(relative[rows] ** 2))):.2g} % in the mean, of "
-            f"which {100 * clamping:.2g} % is assumed to be clamping"
-        )
+        mean = float(np.sqrt(np.mean(relative[rows] ** 2)))
+        origin = f"sd_N_per_mm of the readings, {100 * mean:.2g} % in the mean, of "
+        origin += f"which {100 * clamping:.2g} % is assumed to be clamping"
         if not rows.all():
             origin += f"; {n - int(rows.sum())} readings do not state it and are assumed to scatter as the others do"
         return (model("stated", every, clamping, STATED_FREEDOM, origin),)
@@ -224,6 +221,12 @@ def _noise_of_tip(
         origin = f"a {name} guess, {_percent(*both)}: {why}"
         guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
     return tuple(guesses)
+
+
+def _origin(repeats: Repeats) -> str:
+    origin = f"estimated from {repeats.differences} differences between repeats: "
+    origin += _percent(repeats.repeat, repeats.clamping)
+    return origin if repeats.clamps else origin + " (clamping assumed: no point was clamped twice)"
 
 
 def _parts(relative: FloatArray) -> tuple[FloatArray, float]:

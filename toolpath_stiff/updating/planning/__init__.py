@@ -216,12 +216,7 @@ def plan_measurements(
     # A reading without an answer belongs to visits that are never chosen; its numbers only must not spread.
     forecasts = [_cleaned(f, good) for f in forecasts]
     noise = ReadingNoise(repeat, clamping, scatter)
-    floors = {name: low for name, low in menu.floors.items() if name in visits.setup}
-    if floors:
-        words = ", ".join(
-            f"{1e3 * low:.4g} mm" + (f" in set-up {name}" if name else "") for name, low in floors.items()
-        )
-        notes.append(f"no pose lower than was measured before: {words}; name heights to go lower")
+    notes.extend(_floors_in_words(menu, visits))
     shares = {(f.name, g.name): pair_shares(visits, f, g, noise) for f, g in combinations(forecasts, 2)}
     weights = {f.name: f.weight for f in forecasts}
     picked = choose(visits, usable, shares, weights, n, costs, menu)
@@ -250,6 +245,12 @@ def plan_measurements(
         usable=usable,
         scatter=noise,
     )
+
+
+def _floors_in_words(menu: Menu, visits: Visits) -> list[str]:
+    floors = {name: low for name, low in menu.floors.items() if name in visits.setup}
+    words = ", ".join(f"{1e3 * low:.4g} mm" + (f" in set-up {name}" if name else "") for name, low in floors.items())
+    return [f"no pose lower than was measured before: {words}; name heights to go lower"] if floors else []
 
 
 def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
