@@ -210,6 +210,7 @@ def ambiguous(**chances: float) -> SimpleNamespace:
         main=main,
         judgements={"measured": main},
         suspects=(),
+        alike=None,
     )
 
 

@@ -167,7 +167,10 @@ def read_raw(table: Table) -> RawRecords:
     if errors:
         raise InputErrors(errors)
     if lost:
-        notes.append(f"{file}: {len(lost)} records without force or displacement are passed over, from line {lost[0]}")
+        if not groups:
+            raise MeasurementError("no record has both a force and a displacement", file=file, line=lost[0])
+        many = f"{len(lost)} records" if len(lost) > 1 else "a record"
+        notes.append(f"{file}: {many} without force or displacement passed over, from line {lost[0]}")
     found = [_loop(one, file) for records in groups.values() for one in _by_time(records)]
     return RawRecords(sorted(found, key=lambda loop: loop.line), notes)
 

@@ -202,13 +202,17 @@ function drawLegend() {
   $("legend").replaceChildren(...parts);
 }
 function drawPanel() {
-  const focus = document.activeElement?.id, [, , make] = PANELS.find(([name]) => name === panel);
+  const typed = document.activeElement, focus = typed?.id, [, , make] = PANELS.find(([name]) => name === panel);
   $("tabs").replaceChildren(...PANELS.map(([name, label]) => h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-selected": String(name === panel), "aria-controls": "panel", tabindex: name === panel ? "0" : "-1", onclick: () => open(name) }, label)));
   $("panel").setAttribute("aria-labelledby", `tab-${panel}`);
-  const within = $("panel").contains(document.activeElement);
+  const within = $("panel").contains(typed), caret = typed?.tagName === "TEXTAREA" ? [typed.selectionStart, typed.selectionEnd, typed.scrollTop] : null;
   $("panel").replaceChildren(...[make(state, act)].flat(9).filter(Boolean));
   if (panel === "program") drawText(state.program?.path?.line[Math.max(0, here)] ?? 1);
   refocus(focus, within ? "panel" : "");
+  if (caret && document.activeElement?.id === focus) { // whoever types goes on where they were
+    document.activeElement.setSelectionRange(caret[0], caret[1]);
+    document.activeElement.scrollTop = caret[2];
+  }
 }
 // What was drawn anew takes the focus that it had; where it is gone or can no longer be used, its surroundings do.
 function refocus(id, instead) {
