@@ -16,8 +16,8 @@ import numpy as np
 from toolpath_stiff import rig
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import Machine, load_machine
+from toolpath_stiff.rig import read_plan
 from toolpath_stiff.rig.case import again
-from toolpath_stiff.rig.exercise import read_plan
 from toolpath_stiff.updating.diagnosis import Diagnosis, diagnose
 from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument, document
 from toolpath_stiff.updating.measurements import read_measurements

@@ -33,11 +33,11 @@ from toolpath_stiff.cli.main import main as tps
 from toolpath_stiff.errors import EffectFault, InputError, InputErrors
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine import load_machine
+from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.controller import DIALECTS, Controller, read_controller
-from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.results_folder import check_folder
-from toolpath_stiff.rig.exercise import read_plan
+from toolpath_stiff.rig import read_plan
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.stiffness.effects import effects_from_file
 from toolpath_stiff.updating.measurements import read_measurements

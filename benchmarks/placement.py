@@ -23,10 +23,10 @@ from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.controller import read_controller
 from toolpath_stiff.nc.moves import Program
+from toolpath_stiff.placement import Placed, Task, place_program
 from toolpath_stiff.placement.climb import Bounds, Rules
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import representative_path, work_path
-from toolpath_stiff.placement.placing import Placed, Task, place_program
 from toolpath_stiff.placement.search import SearchRules
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import closed_form

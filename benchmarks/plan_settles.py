@@ -22,8 +22,8 @@ import numpy as np
 
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine import load_machine
+from toolpath_stiff.rig import csv_text, read_plan
 from toolpath_stiff.rig.case import Case, again, draw_case
-from toolpath_stiff.rig.exercise import csv_text, read_plan
 from toolpath_stiff.updating.diagnosis import diagnose
 from toolpath_stiff.updating.measurements import read_measurements
 from toolpath_stiff.updating.planning import Plan, plan, random_visits

@@ -19,7 +19,7 @@ if __name__ == "__main__":
 
 import toolpath_stiff
 from toolpath_stiff.nc.codes.registry import codes_table
-from toolpath_stiff.nc.cutter_location.vocabulary import words_table
+from toolpath_stiff.nc.cutter_location import words_table
 from toolpath_stiff.rig import UNKNOWNS
 from toolpath_stiff.stiffness.effects import LINKS, Effect, Parameter, packaged_effects
 

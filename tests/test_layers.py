@@ -46,12 +46,10 @@ RANK = {
 }
 # The same within `updating`, of its modules and rooms.
 UPDATING_RANK = {
-    "dates": -2,
-    "history": -1,
     "loops": -1,
     "raw_cycles": -1,
-    "raw_shape": -1,
     "rows": 0,
+    "history": 1,
     "measurements": 1,
     "raw_labels": 1,
     "raw_records": 2,

@@ -20,8 +20,6 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
-    from toolpath_stiff.api.by_hand import Preview as Preview
-    from toolpath_stiff.api.by_hand import preview as preview
     from toolpath_stiff.api.case import Case as Case
     from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
     from toolpath_stiff.api.case_studies import case_study as case_study
@@ -40,10 +38,12 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.effects import EffectCheck as EffectCheck
     from toolpath_stiff.api.effects import EffectDraft as EffectDraft
     from toolpath_stiff.api.effects import EffectFile as EffectFile
+    from toolpath_stiff.api.effects import Preview as Preview
     from toolpath_stiff.api.effects import check_effects as check_effects
     from toolpath_stiff.api.effects import draft_effect as draft_effect
     from toolpath_stiff.api.effects import effect_template as effect_template
     from toolpath_stiff.api.effects import effects as effects
+    from toolpath_stiff.api.effects import preview as preview
     from toolpath_stiff.api.inputs import Program as Program
     from toolpath_stiff.api.machines import Machine as Machine
     from toolpath_stiff.api.machines import MachineCheck as MachineCheck
@@ -94,18 +94,17 @@ __version__ = _VERSION
 _PUBLIC = {
     "api.case": ("Case",),
     "api.case_studies": ("CaseStudy", "case_study"),
+    "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
+    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
     "api.effects": (
-        "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "check_effects", "draft_effect",
-        "effect_template", "effects",
+        "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "Preview", "check_effects", "draft_effect",
+        "effect_template", "effects", "preview",
     ),
     "api.inputs": ("Program",),
     "api.machines": (
         "Machine", "MachineCheck", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry",
     ),
     "api.many": ("ManyAnalyses", "analyze_many"),
-    "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
-    "api.by_hand": ("Preview", "preview"),
-    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
     "api.next_visits": ("NextVisit", "next_visit"),
     "api.placements": (
         "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
@@ -113,8 +112,8 @@ _PUBLIC = {
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),
     "errors": (
-        "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError", "MeasurementError",
-        "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
+        "EffectError", "EffectFault", "FileError", "InputError", "InputErrors", "MachineFileError",
+        "MeasurementError", "PoseError", "ProgramError", "TableError", "TpsError", "UnreachableError",
     ),
     "stiffness.effects.contract": ("Effect", "Parameter"),
 }  # fmt: skip

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine import load_machine
-from toolpath_stiff.machine.file import parse_machine
+from toolpath_stiff.machine import load_machine, parse_machine
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty, with_parameter
 from toolpath_stiff.machine.writer import machine_toml
 

@@ -14,10 +14,10 @@ from benchmarks.hunt import OTHER, hunt_one
 from benchmarks.hunt_programs import Parametric
 from tests.nc import rs274
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, dialect_named
 from toolpath_stiff.nc.moves import FEED, RAPID
-from toolpath_stiff.nc.reader import parse_program
 
 LINUXCNC, FANUC = Controller(dialect_named("linuxcnc")), Controller(dialect_named("fanuc"))
 
@@ -268,7 +268,7 @@ def test_refused_with_line_and_reason(text, controller, line, says):
 
 
 def test_a_loop_without_an_end_is_stopped(monkeypatch):
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_STEPS", 500)
+    monkeypatch.setattr("toolpath_stiff.nc.parametric.MOST_STEPS", 500)
     error = refusal("o1 while [1]\no1 endwhile\n", LINUXCNC)
     assert "500 blocks" in error.found and error.line in (1, 2)
 

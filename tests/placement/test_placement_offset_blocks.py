@@ -11,7 +11,7 @@ import pytest
 from tests.nc import rs274
 from toolpath_stiff.analysis import analyze
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.path import place
 from toolpath_stiff.rewriting import offset_blocks
 

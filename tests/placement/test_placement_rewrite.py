@@ -16,10 +16,10 @@ from toolpath_stiff.analysis import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.placing import rewriting_differences
+from toolpath_stiff.placement import rewriting_differences
 from toolpath_stiff.rewriting import rewrite_program
 
 PROGRAMS = Path(__file__).parents[2] / "programs"

@@ -22,9 +22,8 @@ from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
 from toolpath_stiff.path import place
-from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, least_costs
 from toolpath_stiff.placement.evaluator import Evaluator
-from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
 from toolpath_stiff.stiffness.model import build_model
@@ -361,12 +360,12 @@ def earlier(searched_folder, tmp_path, monkeypatch):
 
 
 def test_pick_takes_a_point_of_the_front_without_a_search(earlier, monkeypatch, capsys):
-    from toolpath_stiff.placement import placing
+    from toolpath_stiff import placement
 
     def never(*_, **__):
         raise AssertionError("searched again")
 
-    monkeypatch.setattr(placing, "search_placements", never)
+    monkeypatch.setattr(placement, "search_placements", never)
     number = 1 if earlier["recommended"]["number"] != 1 else 2
     command = ["place", "part.nc", *SEARCH, "--out", "out", "--pick", str(number), "--write", "placed.nc"]
     assert main([*command, "--decimals", "7"]) == 0

@@ -15,8 +15,7 @@ from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.stiffness.effects.trial import try_effect
 from toolpath_stiff.stiffness.model import build_model, load_path
 from toolpath_stiff.updating.drafting import Description, Origin, draft_source, effect_names
-from toolpath_stiff.updating.portrait.columns import Ground
-from toolpath_stiff.updating.portrait.dictionary import dictionary_of
+from toolpath_stiff.updating.portrait.dictionary import Ground, dictionary_of
 from toolpath_stiff.updating.portrait.terms import Term, effect_of
 
 ORIGIN = Origin(

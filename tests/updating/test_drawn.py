@@ -21,9 +21,9 @@ from toolpath_stiff.updating.correction.document import document as update_docum
 from toolpath_stiff.updating.diagnosis import common_verdict, diagnose
 from toolpath_stiff.updating.diagnosis.document import document
 from toolpath_stiff.updating.inference import judge
-from toolpath_stiff.updating.inference.drawn import CONFIRMS, foretold
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.fits import held_out
+from toolpath_stiff.updating.inference.gates import CONFIRMS, foretold
 from toolpath_stiff.updating.inference.noise import noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import reading_marks

@@ -10,15 +10,14 @@ from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.report.compare import text
+from toolpath_stiff.rig import csv_text
 from toolpath_stiff.rig.case import again, draw_case
-from toolpath_stiff.rig.exercise import csv_text
-from toolpath_stiff.rig.hidden import HiddenMachine, Rows
-from toolpath_stiff.rig.loops import true_displacements
+from toolpath_stiff.rig.hidden import HiddenMachine, Rows, true_displacements
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects import find_effect
-from toolpath_stiff.stiffness.effects.measuring_loop import MeasuringLoop, measuring_loop
-from toolpath_stiff.stiffness.loop_response import loop_compliance
+from toolpath_stiff.stiffness.effects.contract import MeasuringLoop, measuring_loop
+from toolpath_stiff.stiffness.exact import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, build_model
 from toolpath_stiff.updating.comparison import compare
 from toolpath_stiff.updating.correction import update

@@ -30,10 +30,9 @@ from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.comparison import Comparison, compare
 from toolpath_stiff.updating.correction import Correction
-from toolpath_stiff.updating.correction.additions import parse_addition
 from toolpath_stiff.updating.correction.document import document as update_document
 from toolpath_stiff.updating.correction.document import residuals_csv
-from toolpath_stiff.updating.correction.ladder import _Work, build_ladder
+from toolpath_stiff.updating.correction.ladder import _Work, build_ladder, parse_addition
 from toolpath_stiff.updating.diagnosis import words as verdict_words
 from toolpath_stiff.updating.diagnosis.document import document as diagnosis_document
 from toolpath_stiff.updating.diagnosis.words import words

@@ -14,9 +14,8 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import machine_toml, parse_machine
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.updating.correction import Correction
-from toolpath_stiff.updating.correction.additions import parse_addition
 from toolpath_stiff.updating.correction.document import document, residuals_csv
-from toolpath_stiff.updating.correction.ladder import build_ladder
+from toolpath_stiff.updating.correction.ladder import build_ladder, parse_addition
 from toolpath_stiff.updating.correction.strut_law import update_by_mean_error
 from toolpath_stiff.updating.inference.prediction import Predictor
 

@@ -17,30 +17,31 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.api.case_files import (
-    copied,
-    first_name,
-    free_name,
-    machine_bytes,
-    measurements_csv,
-    used_name,
-    without_lines,
-    write_files,
-)
 from toolpath_stiff.api.case_results import Findings
 from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.effects import effects
 from toolpath_stiff.api.inputs import Program
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.steps import CASE_FILE, read_case
+from toolpath_stiff.api.steps import (
+    CASE_FILE,
+    copied,
+    first_name,
+    free_name,
+    machine_bytes,
+    measurements_csv,
+    read_case,
+    used_name,
+    without_lines,
+    write_files,
+)
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.hints import command_line, options
 
 if TYPE_CHECKING:
+    from toolpath_stiff.api import Progress
     from toolpath_stiff.api.effects import EffectDraft
-    from toolpath_stiff.api.results import Progress
 
 
 class Case(Findings):
@@ -428,7 +429,7 @@ class Case(Findings):
 
     def claim(self, effects: str) -> dict[str, Any]:
         """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
-        from toolpath_stiff.api.results import json_text
+        from toolpath_stiff.api import json_text
         from toolpath_stiff.rig import reveal
 
         found = reveal(self.folder / self._exercise(), effects)

@@ -1,16 +1,17 @@
-"""What one finds out on a case: each result as its function gives it, kept in a folder of its own."""
+"""What a case holds, as its steps have made it, and what one finds out on it: each result in a folder of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from toolpath_stiff.api.case_contents import Contents
-from toolpath_stiff.api.case_files import write_files
-from toolpath_stiff.api.effects import effects
-from toolpath_stiff.api.results import FolderResult, Progress
-from toolpath_stiff.api.steps import Step
+from toolpath_stiff.api import FolderResult, Progress
+from toolpath_stiff.api.diagnosis import Measurements
+from toolpath_stiff.api.effects import Preview, effects, preview, with_effects
+from toolpath_stiff.api.inputs import Program
+from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.steps import History, Step, used_name, write_files
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
 
@@ -22,6 +23,92 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.programs import Analysis
 
 Found = TypeVar("Found", bound=FolderResult)
+
+
+class Contents(History):
+    """Machine, readings and program of a case."""
+
+    def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
+        super().__init__(folder, steps, done, text)
+        self._preview: tuple[object, Preview] | None = None
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, effects of one's own included."""
+        state = self.state
+        return Machine.load(self.path(state.machine), effects=[self.path(name) for name in state.effects])
+
+    @property
+    def data_files(self) -> tuple[str, ...]:
+        """The files of the readings in use; those with readings set aside are in used/."""
+        state = self.state
+        touched = {entry.rpartition(":")[0] for entry in state.aside}
+        return tuple(used_name(name) if name in touched else name for name in state.data)
+
+    @property
+    def data(self) -> Measurements:
+        """The readings in use. Raises `InputError` where there are none."""
+        if not self.data_files:
+            raise InputError("this case has no measurements", hint="add a file with add_data, or start an exercise")
+        return Measurements([self.path(name) for name in self.data_files])
+
+    @property
+    def preview(self) -> Preview:
+        """The error of the readings in use with effects of any size, as `tps.preview`; made once for these readings."""
+        state = self.state
+        key = (state.machine, state.effects, state.data, state.aside)
+        if self._preview is None or self._preview[0] != key:
+            self._preview = (key, preview(self.machine, self.data))
+        return self._preview[1]
+
+    def machine_with(self, on: Mapping[str, Mapping[str, Any]]) -> Machine:
+        """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     tps.Case.open(folder).machine_with({"weak_strut": {"strut": 4, "factor": 0.8}})
+        <Machine nist: 6 struts, weak_strut>
+        """
+        if not on:
+            return self.machine
+        return self.preview.machine(on) if self.state.data else with_effects(self.machine, on)
+
+    @property
+    def program(self) -> Program:
+        """The program. Raises `InputError` where there is none."""
+        if not self.state.program:
+            raise InputError("this case has no program", hint="add one with add_program")
+        return Program.read(self.path(self.state.program))
+
+    def latest(self, kind: str) -> str:
+        """Folder of the latest result of a kind among the steps that hold; "" without one."""
+        return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
+
+    def question(self, name: str, **own: Any) -> str:
+        """The command line that asks this of the readings in use."""
+        return self._ask(name, self.data_files, **own)
+
+    def _ask(self, name: str, files: Sequence[str], machine: str = "", **own: Any) -> str:
+        state = self.state
+        asked = options(machine=machine or state.machine, **own, effects=list(state.effects))
+        return command_line(name, *files, *asked)
+
+    def _analyze_line(
+        self,
+        program: str,
+        origin: Sequence[float],
+        name: str = "analyze",
+        machine: str = "",
+        require: float | None = None,
+    ) -> str:
+        state, word = self.state, ",".join(f"{value:.10g}" for value in origin) or None
+        need = state.require if require is None else require
+        own: dict[str, Any] = {"partial": True, "require": f"{need:g}" if need else None} if name == "analyze" else {}
+        asked = options(machine=machine or state.machine, origin=word, **own, effects=list(state.effects))
+        return command_line(name, program, *asked)
 
 
 class Findings(Contents):

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from toolpath_stiff.api import FolderResult, Progress, Result, one_of, teller
 from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
 from toolpath_stiff.api.inputs import FARTHEST_MM, positive
 from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.results import FolderResult, Progress, Result, one_of, teller
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import options
@@ -78,8 +78,8 @@ class Reduction(Result):
         return loops_png.figure(self.reduced.loops, self.reduced.figures, self._title)
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.history import history_text
         from toolpath_stiff.report.measuring import loops_text
+        from toolpath_stiff.report.readings import history_text
 
         return "\n".join([loops_text(self.to_dict()["loops"]), *history_text(self.reduced.history)])
 
@@ -214,8 +214,7 @@ class Update(FolderResult):
 
     def plot(self) -> Figure:
         """What each step does to the error."""
-        from toolpath_stiff.report.update import ladder
-        from toolpath_stiff.report.update.pictures import error_ladder_png
+        from toolpath_stiff.report.update import error_ladder_png, ladder
 
         return error_ladder_png.figure(*ladder(self._document))
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from toolpath_stiff.api import Result, TextResult, one_of
 from toolpath_stiff.api.inputs import Program, pose_si, whole
-from toolpath_stiff.api.results import Result, TextResult, one_of
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
 

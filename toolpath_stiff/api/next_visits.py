@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api.results import Result
+from toolpath_stiff.api import Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,7 +28,7 @@ class NextVisit(Result):
     command: ClassVar[str] = "plan"
 
     def __init__(self, found: Found, folder: str) -> None:
-        from toolpath_stiff.updating.planning.next_document import next_document
+        from toolpath_stiff.updating.planning.next_visit import next_document
 
         self.folder = folder
         self._document = next_document(found)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from toolpath_stiff.api import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.api.inputs import (
     FARTHEST_MM,
     LONGEST_STEP_MM,
@@ -19,7 +20,6 @@ from toolpath_stiff.api.inputs import (
     whole,
 )
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from toolpath_stiff.analysis.loads import Load
     from toolpath_stiff.machine.model import Machine as MachineModel
     from toolpath_stiff.nc.moves import Program as ReadProgram
+    from toolpath_stiff.placement import Placed, Rewriting
     from toolpath_stiff.placement.climb import Bounds
     from toolpath_stiff.placement.paths import WorkPath
-    from toolpath_stiff.placement.placing import Placed, Rewriting
     from toolpath_stiff.placement.search import SearchRules
     from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -132,7 +132,7 @@ class Placement(FolderResult):
 
     def plot(self) -> Figure:
         """The front: mean against range, the chosen and the present placement marked."""
-        from toolpath_stiff.report.place.pictures import front_picture
+        from toolpath_stiff.report.place import front_picture
 
         return front_picture.figure(self.placed.summary)
 
@@ -231,7 +231,7 @@ def place(
     []
     """
     from toolpath_stiff.analysis.loads import parse_load
-    from toolpath_stiff.placement.placing import Task, place_again, place_program
+    from toolpath_stiff.placement import Task, place_again, place_program
 
     on, part = machine_from(machine), program_from(program)
     if write is None and (decimals is not None or linearise_mm is not None):
@@ -300,7 +300,7 @@ def _checked_box(box: KeepOut) -> KeepOut:
 
 
 def _rewriting(part: Program, file: str, decimals: int | None, linearise_mm: float | None) -> Rewriting:
-    from toolpath_stiff.placement.placing import Rewriting
+    from toolpath_stiff.placement import Rewriting
 
     chord = None
     if linearise_mm is not None:

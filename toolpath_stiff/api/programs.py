@@ -7,9 +7,9 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from toolpath_stiff.api import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.api.inputs import LONGEST_STEP_MM, STRONGEST_N, Program, pose_si, positive, program_from
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.results import FolderResult, Progress, Result, counter, one_of
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content
@@ -148,7 +148,7 @@ class Analysis(FolderResult):
         return text(self._document, self.path.program.source, other)
 
     def _short(self) -> str:
-        from toolpath_stiff.report.words import number
+        from toolpath_stiff.report import number
 
         found = self._document
         mean, low = (number(found[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
@@ -447,7 +447,7 @@ class ProgramCheck(Result):
         return text(self._document)
 
     def _short(self) -> str:
-        from toolpath_stiff.report.words import counted
+        from toolpath_stiff.report import counted
 
         return f"{self._document['program']}, {counted(len(self.errors), 'error') if self.errors else 'no errors'}"
 

@@ -9,19 +9,17 @@ from pathlib import Path
 from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_machine_options,
-    finite_number,
-    load_argument,
-    machine_for,
-    pose_argument,
-    range_argument,
-)
-from toolpath_stiff.cli.outputs import (
     add_replace_option,
     check_new,
     check_written,
     destination,
+    finite_number,
     keep,
+    load_argument,
+    machine_for,
+    pose_argument,
     progress_line,
+    range_argument,
     show,
     written_text,
 )
@@ -224,8 +222,8 @@ def machine(args: argparse.Namespace) -> int:
 
 
 def _machine_list(args: argparse.Namespace) -> int:
+    from toolpath_stiff.api import json_text
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.results import json_text
 
     machines = [Machine.load(name) for name in Machine.names()]
     if args.json:
@@ -236,8 +234,8 @@ def _machine_list(args: argparse.Namespace) -> int:
 
 
 def _machine_show(args: argparse.Namespace) -> int:
+    from toolpath_stiff.api import json_text
     from toolpath_stiff.api.machines import Machine
-    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
 
     machine = Machine.load(args.machine)
@@ -377,7 +375,7 @@ def _effects_list(args: argparse.Namespace) -> int:
 
 
 def _effects_show(args: argparse.Namespace) -> int:
-    from toolpath_stiff.api.results import json_text
+    from toolpath_stiff.api import json_text
     from toolpath_stiff.report.machine import describe_effect, effect_details
     from toolpath_stiff.stiffness.effects import find_effect
 

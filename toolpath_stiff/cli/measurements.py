@@ -12,15 +12,13 @@ from toolpath_stiff.cli.arguments import (
     add_condition_options,
     add_json_option,
     add_program_options,
-    finite_number,
-    positive_number,
-    program_for,
-)
-from toolpath_stiff.cli.outputs import (
     add_replace_option,
     check_written,
     destination,
+    finite_number,
     keep,
+    positive_number,
+    program_for,
     progress_line,
     show,
     written_text,
@@ -147,8 +145,8 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
 
 def reduce(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
+    from toolpath_stiff.api import json_text
     from toolpath_stiff.api.correction import reduce
-    from toolpath_stiff.api.results import json_text
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.tables import split_name
 

@@ -10,13 +10,18 @@ from toolpath_stiff.cli.arguments import (
     add_load_options,
     add_machine_options,
     add_program_options,
+    add_replace_option,
+    check_written,
+    destination,
     finite_number,
+    keep,
     machine_for,
     positive_number,
     program_for,
+    progress_line,
     range_argument,
+    show,
 )
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, destination, keep, progress_line, show
 from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import InputError
 

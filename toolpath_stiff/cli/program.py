@@ -13,17 +13,15 @@ from toolpath_stiff.cli.arguments import (
     add_load_options,
     add_machine_options,
     add_program_options,
-    machine_for,
-    positive_number,
-    program_for,
-    reading_options,
-)
-from toolpath_stiff.cli.outputs import (
     add_replace_option,
     check_written,
     destination,
     keep,
+    machine_for,
+    positive_number,
+    program_for,
     progress_line,
+    reading_options,
     say,
     show,
     written_text,
@@ -172,7 +170,7 @@ def _run_single(args: argparse.Namespace, file: str) -> int:
 def _run_many(args: argparse.Namespace, found: Sequence[Found], counts: Sequence[FolderCount]) -> int:
     """The same of many; nothing is printed before the arguments have been found right."""
     from toolpath_stiff.api.many import analyze_many
-    from toolpath_stiff.report.words import plain
+    from toolpath_stiff.report import plain
 
     def told(text: str, done: int, total: int) -> None:
         if done == 0 and not args.json:

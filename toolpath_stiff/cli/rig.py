@@ -7,8 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from toolpath_stiff.cli.arguments import add_json_option
-from toolpath_stiff.cli.outputs import add_replace_option, check_written, inputs_of, keep, tell_kept
+from toolpath_stiff.cli.arguments import add_json_option, add_replace_option, check_written, inputs_of, keep, tell_kept
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.results_folder import Rules
 

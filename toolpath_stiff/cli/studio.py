@@ -32,7 +32,7 @@ def studio_arguments(parser: argparse.ArgumentParser) -> None:
 
 def studio(args: argparse.Namespace) -> int:
     """Open the case and serve it until Ctrl-C."""
-    from toolpath_stiff.studio.run import opened_case, serve
+    from toolpath_stiff.studio import opened_case, serve
 
     case = opened_case(
         args.case, args.data, machine=args.machine, program=args.program, effects=args.effects, exercise=args.exercise

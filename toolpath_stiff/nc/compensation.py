@@ -1,11 +1,16 @@
-"""Cutter compensation: the path of the tool centre beside a programmed contour, as LinuxCNC makes it. mm, rad.
+"""Cutter compensation: the path of the tool centre beside a programmed contour. mm, rad.
 
-What other controls make of the first move and of corners is in `straight_corners`.
+As LinuxCNC makes it (sources: its manual, "Cutter Compensation"; what `rs274` 2.9 prints, against which the tests
+hold this on random contours). In a plane: the first move ends beside its end point; a convex corner is rounded by an
+arc about it (a rapid cuts it straight); a concave one moves the end of the move before to where both offset moves
+meet, and is an error where that lies before its start.
 
-Sources: LinuxCNC's manual, "Cutter Compensation"; what `rs274` 2.9 prints, against which the tests hold this on random
-contours. In a plane: the first move ends beside its end point; a convex corner is rounded by an arc about it (a rapid
-cuts it straight); a concave one moves the end of the move before to where both offset moves meet, and is an error where
-that lies before its start.
+As Fanuc's manuals have it, and Haas' controls whose setting 58 is FANUC (`straight`): with straight corners. Source:
+Fanuc's operator's manuals, "Details of cutter or tool nose radius compensation": start-up and cancellation of type A
+(parameter 5003, bit 0, SUP = 0; Haas: setting 43), corners joined by straight moves (parameter 19607, bit 2,
+CCC = 0). The first move, straight, ends beside the beginning of the next one; inside a corner the tool goes to where
+both offset moves meet; outside, up to 90 degrees, to where the tangents of both meet, and beyond 90 degrees each of
+the two is longer by the tool's radius.
 """
 
 from __future__ import annotations
@@ -22,6 +27,16 @@ FLAT = 1e-4  # cosine below which no arc of entry is tangent
 TIGHT = 0.01  # mm by which an entry arc must be wider than the tool: below, rounding decides on its centre
 GOUGE = "a concave corner that the tool cannot reach without gouging"
 SMALLER = "a smaller tool, or another contour"
+TURNED = 1e-3  # rad; less than this is no corner: it moves the tool by less than half a millionth of its radius
+SHARP = 1e-9  # rad by which a corner of 90 degrees may seem larger
+TYPE_A = (
+    "cutter compensation begins and ends by type A (Fanuc: parameter 5003, bit 0, is 0; Haas: setting 43), and D is "
+    "the tool in the tool table whose diameter it takes"
+)
+STRAIGHT = (
+    "outside corners of cutter compensation are joined by straight moves (Fanuc: parameter 19607, bit 2, is 0; Haas: "
+    "setting 58 is FANUC)"
+)
 
 
 @dataclass
@@ -67,7 +82,7 @@ class Cutter:
     pending
         Moves since the last corner, the one in the plane first.
     straight
-        As Fanuc's and Haas' manuals have it (`straight_corners`), not LinuxCNC's.
+        As Fanuc's and Haas' manuals have it (`enter_fanuc`, `go_on_fanuc`), not LinuxCNC's.
     entering
         The first move waits for the next one, which says where it ends.
     """
@@ -252,3 +267,73 @@ def _arc_meets_arc(cutter: Cutter, arc: OffsetArc, center: Point2, turn: int, ra
     back = math.acos(_within((old * old + apart * apart - new * new) / (2.0 * old * apart)))
     inside = cutter.side * arc.turn > 0
     return _beside(arc.center, old, _angle(arc.center, center) + (turn if inside else -turn) * back)
+
+
+def enter_fanuc(cutter: Cutter, target: Point2, arc: OffsetArc | None) -> Step:
+    """The first move: where it ends, the next one says. Raises `ArcError` for an arc."""
+    if arc is not None:
+        raise ArcError("an arc as the first move of cutter compensation", "G0 or G1")
+    cutter.entering = True
+    return Step(target)
+
+
+def go_on_fanuc(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> Step:
+    """A further move, straight or an arc. Raises `ArcError` where the tool cannot follow it, or controls differ."""
+    along = _heading(start, start, target, arc)
+    beside = _beside_contour(start, cutter, along)
+    if cutter.entering:
+        if len(cutter.pending) > 1:
+            raise ArcError("a move along the tool right after the first move of cutter compensation", "it before G41")
+        cutter.entering = False
+        return Step(_end(cutter, start, target, arc), trim=beside)
+    before = math.atan2(cutter.center[1] - start[1], cutter.center[0] - start[0]) - cutter.side * math.pi / 2.0
+    turn = math.remainder(along - before, math.tau)
+    if abs(turn) <= TURNED:
+        return Step(_end(cutter, start, target, arc))
+    if len(cutter.pending) > 1:
+        raise ArcError("a move along the tool in a corner of cutter compensation", "it where the contour is smooth")
+    if abs(turn) > math.pi - TURNED:
+        raise ArcError("a contour under cutter compensation that turns back on itself", "another contour")
+    if turn * cutter.side > 0.0:
+        return _inside(cutter, start, target, arc)
+    return _outside(cutter, _end(cutter, start, target, arc), (before, turn), beside, arc)
+
+
+def _end(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> Point2:
+    """Where the tool centre is beside the end of a programmed move."""
+    if arc is not None and cutter.side * arc.turn > 0:
+        check_fits(cutter, math.dist(arc.center, target))
+    return _beside_contour(target, cutter, _heading(target, start, target, arc))
+
+
+def _inside(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) -> Step:
+    """An inside corner: where both offset moves meet, on LinuxCNC too."""
+    if arc is None:
+        return go_straight(cutter, start, target, TURNED)
+    return go_round(cutter, start, target, arc.center, arc.turn, TURNED)
+
+
+def _heading(at: Point2, start: Point2, target: Point2, arc: OffsetArc | None) -> float:
+    """Direction of a programmed move at one of its ends."""
+    if arc is None:
+        return math.atan2(target[1] - start[1], target[0] - start[0])
+    return math.atan2(at[1] - arc.center[1], at[0] - arc.center[0]) + arc.turn * math.pi / 2.0
+
+
+def _beside_contour(point: Point2, cutter: Cutter, heading: float) -> Point2:
+    """Where the tool centre is beside a point of a contour with that heading."""
+    return _beside(point, cutter.radius, heading + cutter.side * math.pi / 2.0)
+
+
+def _outside(cutter: Cutter, end: Point2, headings: tuple[float, float], beside: Point2, arc: OffsetArc | None) -> Step:
+    """Straight moves round an outside corner: heading before it, and turn; a straight move before it is made longer."""
+    before, turn = headings
+    acute = abs(turn) > math.pi / 2.0 + SHARP
+    reach = cutter.radius * (1.0 if acute else math.tan(abs(turn) / 2.0))
+    way = [_beside(cutter.center, reach, before)]
+    if acute:
+        way.append(_beside(beside, -reach, before + turn))
+    if arc is not None:
+        way.append(beside)
+    longer = way.pop(0) if cutter.pending[0].arc is None else None
+    return Step(end, trim=longer, outside=True, way=tuple(way))

@@ -1,6 +1,6 @@
 """The kinematics that a program was posted for: rotary axes on tables and heads; tool tip and axis on the part.
 
-Read from `[kinematics]` of a controller file (mm there, SI here); `recovery` gets the tool's moves through it. Types as
+Read from `[kinematics]` of a controller file (mm there, SI here); `posted` gets the tool's moves through it. Types as
 in R.-S. Lee, C.-H. She, "Developing a postprocessor for three types of five-axis machine tools", Int J Adv Manuf
 Technol 13 (1997) 658-665: both axes on the table, both on the spindle, one on each; and machines with one rotary axis.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from toolpath_stiff.report.words import aligned, duration, first_column_fitted, number, plain
+from toolpath_stiff.report import aligned, duration, first_column_fitted, number, plain
 
 INDENT = 2  # columns to the left of the tables
 MOST_ROWS = 40  # all are in --json

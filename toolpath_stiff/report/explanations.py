@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.defaults import MEAN_OVER_SD
 from toolpath_stiff.hints import parted
-from toolpath_stiff.report.words import WIDTH, labelled, machine_text, number, plain, shortened
+from toolpath_stiff.report import WIDTH, labelled, machine_text, number, plain, shortened
 from toolpath_stiff.updating.inference.candidates import choice_text
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Machine, StrutLaw
+from toolpath_stiff.report import machine_text
 from toolpath_stiff.report.figure import BLUE, house_style, new_figure, picture
-from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import acting_names, condition_warnings, effects_stated
 from toolpath_stiff.stiffness.truss import HUB, TIP, platform_bars, platform_nodes

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.files import Content
+from toolpath_stiff.report import plain, shortened
 from toolpath_stiff.report.figure import COLOUR_MAP, INK, MUTED, SECOND_ORANGE, house_style, new_figure, picture
-from toolpath_stiff.report.history import dated, history_png
-from toolpath_stiff.report.words import plain, shortened
+from toolpath_stiff.report.readings import dated, history_png
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.planning import Plan, Proposal
 from toolpath_stiff.updating.planning.document import (

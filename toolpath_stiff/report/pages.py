@@ -19,8 +19,8 @@ from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.hints import parted
+from toolpath_stiff.report import machine_text, plain
 from toolpath_stiff.report.figure import Drawing
-from toolpath_stiff.report.words import machine_text, plain
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -1,4 +1,4 @@
-"""The machine as assembled elements: a displacement method, solved row by row of a measuring campaign.
+"""Rows of a measuring campaign, and the machine as assembled elements: a displacement method, solved row by row.
 
 Unknowns are the movements of the platform (a rigid body, or the eight nodes of its truss) and the give of every link
 that can give way: joints along their struts, frame vertices, spindle, table, set-up. Each element adds k b b^T, with b
@@ -12,16 +12,18 @@ the last loads, solve, repeat. Newton's method would meet the infinite slope of 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 
 BARS = 19  # of the platform truss (the paper's Figure 2b)
 HUB, TIP = 6, 7  # nodes of the platform truss after its six joints
 SECANT_STEPS = 60
 SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two steps
+ROOM_TEMPERATURE = 20.0  # degrees C, reference temperature of length measurements (ISO 1)
 
 
 @dataclass(frozen=True)
@@ -291,3 +293,51 @@ def _load_vector(place: Geometry, links: Links, direction: FloatArray, dofs: int
     for column, (lever, _) in enumerate(links.ends, end + 11):
         vector[:, column] = np.einsum("ni,ni->n", direction, lever)
     return vector
+
+
+@dataclass(frozen=True)
+class Rows:
+    """n rows of a campaign, SI.
+
+    Attributes
+    ----------
+    position, angles
+        (n, 3) m and rad: commanded tool tip; roll, pitch, yaw.
+    direction
+        (n, 3) unit vectors of the load.
+    force
+        (n,) N.
+    extension
+        (n,) m, tool longer than the reference tool.
+    time
+        (n,) s since the indicator was zeroed.
+    elapsed
+        (n,) 0 at the beginning of the campaign, 1 at its end.
+    setup
+        (n,) name of the clamping arrangement.
+    temperature
+        (n,) degrees C; None: 20 throughout.
+    """
+
+    position: FloatArray
+    angles: FloatArray
+    direction: FloatArray
+    force: FloatArray
+    extension: FloatArray
+    time: FloatArray
+    elapsed: FloatArray
+    setup: TextArray
+    temperature: FloatArray | None = None
+
+    def take(self, index: IntArray) -> Rows:
+        """Some of the rows."""
+        columns: dict[str, Any] = {
+            field.name: None if (values := getattr(self, field.name)) is None else values[index]
+            for field in fields(self)
+        }
+        return Rows(**columns)
+
+    @property
+    def warmth(self) -> FloatArray:
+        """(n,) K above 20 degrees C."""
+        return np.zeros(len(self.force)) if self.temperature is None else self.temperature - ROOM_TEMPERATURE

@@ -18,8 +18,7 @@ from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.nominal import Nominal
-from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import Geometry, Links
+from toolpath_stiff.rig.structure import Geometry, Links, Rows
 
 # Words of a description.
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")

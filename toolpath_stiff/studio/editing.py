@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from toolpath_stiff.api.case import Case
-from toolpath_stiff.api.case_files import first_name, free_name, sha256, write_files
+from toolpath_stiff.api.steps import first_name, free_name, sha256, write_files
 from toolpath_stiff.errors import InputError, TpsError
 
 FOLDER = "edit"

@@ -2,23 +2,29 @@
 
 Only the standard library. A page is one document, as the static reports are; it asks for the state, is told of every
 change by an event stream, and posts what is to be done.
+
+The page holds its own scripts and styles, live or, as an export, with the state within it.
 """
 
 from __future__ import annotations
 
 import hmac
+import html
 import json
 import secrets
 import threading
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib import resources
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
+from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.studio.page import exported, page
+from toolpath_stiff.report.figure import page_colours
+from toolpath_stiff.report.pages import asset, json_for_script, script_hash
 from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
 
@@ -40,6 +46,8 @@ PLAIN = {
 }
 SANDBOX = "sandbox allow-scripts"  # a page among the results has an origin of its own and cannot ask the studio
 REFUSED = "This is a studio of toolpath_stiff. Open the address that `tps studio` has printed, with its token."
+SHARED = ("stage.js", "viewer.js", "profile.js")  # of the static pages
+OWN = ("machine.js", "panels.js", "studio.js")
 
 
 class Studio(ThreadingHTTPServer):
@@ -228,3 +236,38 @@ class Handler(BaseHTTPRequestHandler):
             self.send_header(header, value)
         self.end_headers()
         self.wfile.write(body)
+
+
+def page() -> str:
+    """The live page; it holds no state and no token."""
+    return _document("null", "connect-src 'self'; ", "toolpath_stiff studio")
+
+
+def exported(session: Session) -> str:
+    """The case as one file that needs neither the studio nor a network."""
+    return _document(json_for_script(document(session)), "", f"{session.name}: a case of toolpath_stiff")
+
+
+def _document(state: str, connect: str, title: str) -> str:
+    found = page_colours()
+    colours = json.dumps({"light": found["colours"], "dark": found["colours_dark"]})
+    text = "".join([*map(asset, SHARED), *map(_own, OWN)])
+    script = f'\n"use strict";\n(() => {{\nconst COLOURS = {colours};\n{text}}})();\n'
+    policy = (
+        f"default-src 'none'; script-src '{script_hash(script)}'; style-src 'unsafe-inline'; img-src data:; {connect}"
+        "base-uri 'none'; form-action 'none'"
+    )
+    body = _own("studio.html").replace("VERSION", VERSION)
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
+        f"<title>{html.escape(title)}</title>\n<style>\n{asset('page.css')}{_own('studio.css')}</style>\n</head>\n<body>\n"
+        f'{body}<script type="application/json" id="state">{state}</script>\n'
+        f"<script>{script}</script>\n</body>\n</html>\n"
+    )
+
+
+def _own(name: str) -> str:
+    return resources.files("toolpath_stiff.studio").joinpath("assets", name).read_text(encoding="utf-8")

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import toolpath_stiff as tps
+from toolpath_stiff.api import one_of
 from toolpath_stiff.api.case import Case
-from toolpath_stiff.api.results import one_of
 from toolpath_stiff.api.steps import Step
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import command_line, options

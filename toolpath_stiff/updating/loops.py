@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.stiffness.effects.measuring_loop import TIP, WORDS, MeasuringLoop, measuring_loop
+from toolpath_stiff.stiffness.effects.contract import TIP, WORDS, MeasuringLoop, measuring_loop
 from toolpath_stiff.units import m_from_um
 
 COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of a measurement file, for loops beside the tip alone

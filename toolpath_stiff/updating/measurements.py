@@ -22,11 +22,10 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
-from toolpath_stiff.stiffness.loop_response import loop_compliance
+from toolpath_stiff.stiffness.exact import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
 from toolpath_stiff.tables import parse_table, read_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
-from toolpath_stiff.updating.dates import day_of, days_since_first
 from toolpath_stiff.updating.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
 from toolpath_stiff.updating.rows import (
     COLUMNS,
@@ -34,6 +33,8 @@ from toolpath_stiff.updating.rows import (
     OPTIONAL,
     Row,
     RowFile,
+    day_of,
+    days_since_first,
     duplicates,
     read_rows,
 )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from toolpath_stiff.nc import compensation, geometry, straight_corners
+from toolpath_stiff.nc import compensation, geometry
 from toolpath_stiff.nc.codes import (
     ARC_DISTANCE,
     CUTTER,
@@ -74,7 +74,7 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
         side, abs(diameter) / 2.0, geometry.PLANES[state.plane], state.length_scale, straight=straight
     )
     if straight:
-        state.assume(straight_corners.TYPE_A)
+        state.assume(compensation.TYPE_A)
 
 
 def _diameter(state: State, block: CurrentBlock, code: str) -> float:
@@ -185,7 +185,7 @@ def offset_move(
 
 def _enter(cutter: Cutter, start: Point2, target: Point2, own: OffsetArc | None) -> tuple[Step, Point2]:
     if cutter.straight:
-        return straight_corners.enter(cutter, target, own), (0.0, 0.0)
+        return compensation.enter_fanuc(cutter, target, own), (0.0, 0.0)
     if own is not None:
         return compensation.enter_arc(cutter, start, target, own.center, own.turn), (0.0, 0.0)
     return compensation.enter_straight(cutter, start, target)
@@ -193,7 +193,7 @@ def _enter(cutter: Cutter, start: Point2, target: Point2, own: OffsetArc | None)
 
 def _go_on(cutter: Cutter, start: Point2, target: Point2, own: OffsetArc | None) -> Step:
     if cutter.straight:
-        return straight_corners.go_on(cutter, start, target, own)
+        return compensation.go_on_fanuc(cutter, start, target, own)
     if own is not None:
         return compensation.go_round(cutter, start, target, own.center, own.turn)
     return compensation.go_straight(cutter, start, target)
@@ -239,7 +239,7 @@ def _go_straight_round(
 ) -> None:
     """Straight moves round a corner, at the feed of the block; rotary axes have turned at the first one's end."""
     assert cutter.at is not None
-    state.assume(straight_corners.STRAIGHT)
+    state.assume(compensation.STRAIGHT)
     for place in step.way:
         around = [*cutter.at[:3], *there[3:]]
         around[cutter.axes[0]], around[cutter.axes[1]] = place

@@ -1,7 +1,10 @@
-"""G0 to G3, G53, G28, G30: straight moves, arcs, full circles, helices, from the words of a block. mm, degrees.
+"""G0 to G3, G33, G53, G28, G30: straight moves, arcs, full circles, helices, threads, from the words of a block.
 
 A move is recorded with its ends in the set-up frame, its feed and its tool; beside it stands whether the present height
 is known.
+
+G33 and G33.1 are moves whose feed the spindle's turns give, as LinuxCNC has them (manual, "G-Codes", G33, G33.1).
+mm, degrees.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from collections.abc import Collection
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes import CORNER, DISTANCE, MOTION, ONCE, Code, g_codes
 from toolpath_stiff.nc.codes.cutter import offset_move
-from toolpath_stiff.nc.codes.modes import feed_of_move
+from toolpath_stiff.nc.codes.modes import SLOWEST, feed_of_move
 from toolpath_stiff.nc.codes.points import (
     XY,
     axis_words,
@@ -25,7 +28,7 @@ from toolpath_stiff.nc.codes.points import (
     refuse_while_rotated,
 )
 from toolpath_stiff.nc.geometry import Point2
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, ToolUse
+from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, ToolUse
 from toolpath_stiff.nc.state import POINT_WORDS, Corner, CurrentBlock, Segment, State
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import CORNERS, Word
@@ -227,7 +230,6 @@ STRAIGHT_CODES = (
     Code("G30.1", ONCE, set_home, "set the second reference point", _G30, label=ONCE),
 )
 
-
 # -- corners to the next block -----------------------------------------------------------------------------------------
 
 # Fanuc's operator's manuals, "Optional chamfering and corner R": `,C` and `,R` behind a feed move cut or round the
@@ -287,7 +289,6 @@ CORNER_CODES = (
     Code(",C", CORNER, corner, "chamfer to the next block", _CORNER, ("generic", "fanuc", "haas")),
     Code(",R", CORNER, corner, "rounding to the next block", _CORNER, ("generic", "fanuc", "haas")),
 )
-
 
 # -- arcs --------------------------------------------------------------------------------------------------------------
 
@@ -385,4 +386,41 @@ def _center(
 ARC_CODES = (
     Code("G2", MOTION, arc, "clockwise arc", g_codes("G2 G3"), many=True),
     Code("G3", MOTION, arc, "counter-clockwise arc", g_codes("G2 G3"), many=True),
+)
+ROTARY = (3, 4, 5)
+
+
+def synchronised(state: State, block: CurrentBlock, code: str) -> None:
+    """G33: straight, K mm a turn of the spindle; G33.1: so to the point, and back with the spindle reversed."""
+    if not (MOTION in block.groups or any(block.has(letter) for letter in (*POINT_WORDS, "K"))):
+        return
+    first = block.block.words[0]
+    if state.dialect.name != "linuxcnc":
+        raise block.fail(
+            first,
+            f"is under {code}, spindle-synchronised motion, whose words differ from control to control",
+            hint="leave threading and rigid tapping out, or name the control with --dialect linuxcnc",
+        )
+    pitch = block.take("K")
+    words = point_words(state, block)
+    if pitch is None or not words:
+        raise block.fail(first, f"under {code} without its point or its pitch", "X, Y, Z and K")
+    feed = abs(pitch) * state.length_scale * state.speed
+    if feed < SLOWEST:
+        raise block.fail(first, f"under {code} with K{pitch:g} and the spindle at S{state.speed:g}", "both above 0")
+    if any(axis in words for axis in ROTARY):
+        raise block.fail(first, f"moves rotary axes under {code}", "X, Y and Z")
+    frames = state.frames
+    here = list(frames.position)
+    target = control_point(state, block, frames.to_program(here), words)
+    mode, kept, state.feed_mode, state.feed = state.feed_mode, state.feed, "G94", feed
+    record(state, block, FEED if code == "G33" else CYCLE, target, words)
+    if code == "G33.1":
+        record(state, block, CYCLE, here, words)
+    state.feed_mode, state.feed = mode, kept
+
+
+SYNCHRONISED_CODES = (
+    Code("G33", MOTION, synchronised, "straight, K a turn of the spindle", g_codes("G33"), ("linuxcnc",)),
+    Code("G33.1", MOTION, synchronised, "rigid tapping, in and out", g_codes("G33.1"), ("linuxcnc",)),
 )

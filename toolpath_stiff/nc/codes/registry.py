@@ -35,13 +35,11 @@ from toolpath_stiff.nc.codes import (
 )
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
 from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
-from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES
-from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, STRAIGHT_CODES
+from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES, OTHER_CODES, OTHER_REFUSED
+from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, STRAIGHT_CODES, SYNCHRONISED_CODES
 from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_CODES
-from toolpath_stiff.nc.codes.other_controls import OTHER_CODES, OTHER_REFUSED
 from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES
 from toolpath_stiff.nc.codes.saved import SAVED_CODES
-from toolpath_stiff.nc.codes.synchronised import SYNCHRONISED_CODES
 from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
 
 # -- codes that leave the path alone, and refused ones -----------------------------------------------------------------

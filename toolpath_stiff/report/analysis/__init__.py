@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.report.words import (
+from toolpath_stiff.report import (
     FIGURES,
     LABEL,
     READERS,

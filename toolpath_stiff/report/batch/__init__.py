@@ -16,9 +16,9 @@ from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.files import Content
+from toolpath_stiff.report import ONLY_PLUNGES, counted, duration, number, only_plunges, plain, shortened
 from toolpath_stiff.report.batch.programs import RESERVED, Outcome, summary_csv, terminal_summary
 from toolpath_stiff.report.pages import markup, render
-from toolpath_stiff.report.words import ONLY_PLUNGES, counted, duration, number, only_plunges, plain, shortened
 
 INDEX, SUMMARY = RESERVED
 TEXT = 40  # characters of a program's line that are shown

@@ -11,13 +11,11 @@ from markupsafe import Markup
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.report.compare.machine import machine_png
-from toolpath_stiff.report.compare.pictures import measured_modelled_png, planes_png, strips_png
+from toolpath_stiff.report import DEVIATION, MINUS_IS_SOFTER, plain
+from toolpath_stiff.report.compare.pictures import machine_png, measured_modelled_png, planes_png, strips_png
 from toolpath_stiff.report.compare.variables import load_path_png, variables_png
-from toolpath_stiff.report.history import history_section, history_text
-from toolpath_stiff.report.loops import loops_section, loops_text
 from toolpath_stiff.report.pages import bullets, markup, picture, readings_page, section, table
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
+from toolpath_stiff.report.readings import history_section, history_text, loops_section, loops_text
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.comparison import Comparison
 from toolpath_stiff.updating.comparison.residuals import directions, planes

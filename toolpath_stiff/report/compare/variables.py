@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.report import DEVIATION, MINUS_IS_SOFTER, plain, shortened
 from toolpath_stiff.report.compare.pictures import RESIDUAL_AXIS, count_of, heading
 from toolpath_stiff.report.figure import (
     BLUE,
@@ -21,8 +22,7 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.residuals import DIRECTION_COLOURS
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain, shortened
+from toolpath_stiff.report.readings import DIRECTION_COLOURS
 from toolpath_stiff.updating.comparison.residuals import directions
 from toolpath_stiff.updating.comparison.structure import SIGNIFICANT
 from toolpath_stiff.updating.inference.fits import deviation_percent

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpath_stiff.report import plain, shortened
 from toolpath_stiff.report.explanations import (
     AS_GIVEN,
     NONE,
@@ -45,7 +46,6 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.words import plain, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -34,7 +34,7 @@ __all__ = [
 
 ENTRY_POINTS = "toolpath_stiff.effects"
 MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
-NOT_EFFECTS = ("contract", "guard", "trial", "measuring_loop")
+NOT_EFFECTS = ("contract", "guard", "trial")
 
 
 @cache

@@ -10,10 +10,15 @@ An effect sits on one link of the load path, declares its parameters, and implem
 - `reading`: a change of the measured figure, not of the machine (an instrument).
 
 Everything is SI and batched over n poses. A method that an effect does not implement adds nothing.
+
+What an effect does to a reading depends on what the indicator is set between (`MeasuringLoop`, the words of the column
+`loop`): it sees what gives way between the two points that it touches, nothing else. The tip loop, tool against work,
+holds the whole load path; an indicator across one joint holds that joint alone.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Literal
@@ -23,12 +28,36 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import EffectEntry, Machine
-from toolpath_stiff.stiffness.effects.measuring_loop import MeasuringLoop
 
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
+
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
 SETUP = "setup"  # the condition, and the name of every parameter that names a set-up
+LINKS_ON_THE_PATH = ("tool", "platform", "joints", "struts", "frame", "table")
+
+# Kind -> links of the load path between the indicator's two points.
+INSIDE = {
+    "tip": LINKS_ON_THE_PATH,
+    "spindle": ("tool",),
+    "platform": tuple(link for link in LINKS_ON_THE_PATH if link != "tool"),
+    "table": ("table",),
+    "frame": ("frame",),
+    "joint": ("joints",),
+    "strut": ("struts",),
+    "alone": ("struts",),
+}
+
+# Kinds that read along the load, so that a reading is a stiffness; the others read along a strut or across a vertex.
+ALONG_THE_LOAD = ("tip", "spindle", "platform", "table")
+WORDS = (
+    "tip, spindle, platform, table, strut 1 (to 6), strut 1 alone, joint 1, joint 1 platform, joint 1 frame, frame 1 "
+    "(to 3), frame 1 radial, frame 1 vertical"
+)
+_WORD = re.compile(
+    r"(?:(tip|spindle|platform|table)|(strut) ([1-6])( alone)?|(joint) ([1-6])( platform| frame)?"
+    r"|(frame) ([1-3])( radial| vertical)?)"
+)
 
 
 @dataclass(frozen=True)
@@ -435,3 +464,66 @@ def _is_valid(parameter: Parameter, value: object) -> bool:
     numbers = int if parameter.kind == "integer" else int | float
     low, high = parameter.bounds
     return isinstance(value, numbers) and not isinstance(value, bool) and low <= value <= high
+
+
+@dataclass(frozen=True)
+class MeasuringLoop:
+    """Between which two points an indicator reads.
+
+    Attributes
+    ----------
+    kind
+        One of `INSIDE`.
+    number
+        Strut from 1 to 6, or vertex of the frame from 1 to 3 by its lowest strut; 0 where there is none.
+    where
+        Of a joint: "platform" or "frame", its end of the strut; "" both ends added. Of a vertex: "radial" or
+        "vertical"; "" along the load.
+
+    Examples
+    --------
+    >>> MeasuringLoop("strut", 3).links
+    ('struts',)
+    >>> str(measuring_loop("Joint 2  platform"))
+    'joint 2 platform'
+    """
+
+    kind: str = "tip"
+    number: int = 0
+    where: str = ""
+
+    def __str__(self) -> str:
+        if self.kind == "alone":
+            return f"strut {self.number} alone"
+        return " ".join(filter(None, [self.kind, str(self.number or ""), self.where]))
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Links of the load path that it sees."""
+        return INSIDE[self.kind]
+
+    @property
+    def along_load(self) -> bool:
+        """Whether it reads along the load."""
+        return self.kind in ALONG_THE_LOAD or (self.kind == "frame" and not self.where)
+
+
+TIP = MeasuringLoop()
+
+
+def measuring_loop(text: str) -> MeasuringLoop | None:
+    """The loop that a cell of the column `loop` names, an empty one the tip's; None where it names none."""
+    words = " ".join(text.lower().split())
+    if not words:
+        return TIP
+    found = _WORD.fullmatch(words)
+    if found is None:
+        return None
+    plain, strut, strut_number, alone, joint, joint_number, end, frame, vertex, axis = found.groups()
+    if plain:
+        return MeasuringLoop(plain)
+    if strut:
+        return MeasuringLoop("alone" if alone else "strut", int(strut_number))
+    if joint:
+        return MeasuringLoop(joint, int(joint_number), (end or "").strip())
+    return MeasuringLoop(frame, int(vertex), (axis or "").strip())

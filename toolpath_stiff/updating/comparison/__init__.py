@@ -21,13 +21,15 @@ from toolpath_stiff.machine.model import EffectEntry, Machine
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import read_parameters
 from toolpath_stiff.updating.comparison.document import Answer, ComparisonDocument, document_of
-from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument, loops_document, strut_history
 from toolpath_stiff.updating.comparison.principles import LinkShares, assess, load_path_shares, model_free_checks
 from toolpath_stiff.updating.comparison.residuals import (
     Label,
+    LoopsDocument,
     Variable,
     labels,
+    loops_document,
     patterns,
+    strut_history,
     variables,
 )
 from toolpath_stiff.updating.comparison.structure import (

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.units import certain, mm_from_m, n_per_um_from_n_per_m
-from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
 from toolpath_stiff.updating.comparison.principles import (
     CheckEntry,
 )
 from toolpath_stiff.updating.comparison.residuals import (
+    LoopsDocument,
     Variable,
     directions,
     planes,

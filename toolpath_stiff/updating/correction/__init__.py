@@ -12,8 +12,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.model import build_model, setup_of
-from toolpath_stiff.updating.correction.additions import parse_addition
-from toolpath_stiff.updating.correction.ladder import Update, build_ladder
+from toolpath_stiff.updating.correction.ladder import Update, build_ladder, parse_addition
 from toolpath_stiff.updating.correction.machines import data_hash
 from toolpath_stiff.updating.correction.strut_law import BarCurve, StrutLawSearch, bar_curve, update_by_mean_error
 from toolpath_stiff.updating.measurements import Measurements

@@ -13,14 +13,17 @@ An effect is supported if
   that remains, so that data which no effect explains do not lend every effect significance.
 
 Of several effects each is judged beside the others.
+
+What `tps update --add` names is an effect and, if the user says so, what it acts on (`Addition`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +32,12 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
-from toolpath_stiff.stiffness.effects.contract import Effect
-from toolpath_stiff.updating.correction.additions import Addition
+from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.correction.machines import fitted_machine
 from toolpath_stiff.updating.diagnosis import FEWEST
 from toolpath_stiff.updating.inference import question
-from toolpath_stiff.updating.inference.candidates import Candidate, testable_effects
-from toolpath_stiff.updating.inference.drawn import Drawn, drawn, seen_readings
+from toolpath_stiff.updating.inference.candidates import Candidate, Component, candidates_of, testable_effects
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import (
     AS_GIVEN,
@@ -48,7 +50,7 @@ from toolpath_stiff.updating.inference.fits import (
     held_out,
     of_readings,
 )
-from toolpath_stiff.updating.inference.gates import Simulator, gain_threshold
+from toolpath_stiff.updating.inference.gates import Drawn, Simulator, drawn, gain_threshold, seen_readings
 from toolpath_stiff.updating.inference.hypotheses import Family, score_families, signatures, tables_of
 from toolpath_stiff.updating.inference.noise import Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
@@ -57,9 +59,11 @@ from toolpath_stiff.updating.measurements import Measurements
 NEEDED = 1.0  # standard errors by which the error at left-out points must fall
 TRIED = 4  # candidates a step of `--auto`, the most likely first
 MOST_EFFECTS = 4  # that `--auto` adds
+
 # Share of the mean error, or of what scatter alone leaves of it, by which it may rise: a likelier strut law can raise
 # it a little (9.62 to 9.72 % on the paper's Table 1).
 WORSE = 0.05
+AXES = {"X": 1, "Y": 2, "Z": 3}
 
 
 @dataclass(frozen=True)
@@ -466,3 +470,72 @@ class _Work:
             if tried[-1].supported:
                 return step, tuple(tried)
         return None, tuple(tried)
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An effect to be added.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    choice
+        Values of discrete parameters that the user chose; what is not in it is searched.
+    """
+
+    effect: Effect
+    choice: Mapping[str, Any]
+
+    def candidates(self, data: Measurements) -> list[Candidate]:
+        """What may be fitted: one candidate a choice that is left open."""
+        discrete = [p for p in self.effect.parameters if p.discrete]
+        if not self.choice:
+            return candidates_of(self.effect, data)
+        values = {p.name: self.choice.get(p.name, "" if p.kind == "text" else 0) for p in discrete}
+        real = tuple(Component.of(p) for p in self.effect.parameters if not p.discrete)
+        return [Candidate(self.effect, tuple(values.items()), real)]
+
+
+def parse_addition(text: str, data: Measurements, effect_files: Sequence[str | Path] = ()) -> Addition:
+    """`weak_strut`, `weak_strut:strut=3`, `gauge_scale:direction=Z,setup=riser`.
+
+    Raises
+    ------
+    InputError
+        There is no such effect, it has no such choice, or the data lack a column that it needs.
+    """
+    name, _, rest = text.partition(":")
+    effect = find_effect(name.strip(), effect_files)
+    lacking = data.cannot_test([effect]).get(effect.name)
+    if lacking:
+        raise InputError(
+            f"these data cannot test {effect.name}: column {', '.join(lacking)} is missing",
+            hint="measure with it, or add another effect",
+        )
+    if not any(not p.discrete for p in effect.parameters):
+        raise InputError(f"effect {effect.name} has no parameter that could be fitted")
+    choices = {p.name: p for p in effect.parameters if p.discrete}
+    choice = {}
+    for part in filter(None, (piece.strip() for piece in rest.split(","))):
+        key, equals, value = (piece.strip() for piece in part.partition("="))
+        if key not in choices or not equals:
+            known = ", ".join(f"{key}=..." for key in choices) or f"nothing after {effect.name}: it has no choices"
+            raise InputError(f"--add {text}: {part!r}", expected=known)
+        choice[key] = _chosen(choices[key], value, text, data)
+    return Addition(effect, choice)
+
+
+def _chosen(parameter: Parameter, value: str, text: str, data: Measurements) -> Any:
+    """The value of a choice. A direction may be called by its axis, a set-up must be one of the data's."""
+    if parameter.kind == "text":
+        setups = sorted(set(data.setup.tolist()) - {""})
+        if parameter.name == "setup" and value not in setups:
+            raise InputError(f"--add {text}: the data have no set-up {value!r}", expected=f"one of {', '.join(setups)}")
+        return value
+    low, high = (int(bound) for bound in parameter.bounds)
+    if parameter.name == "direction" and value.upper() in AXES:
+        return AXES[value.upper()]
+    if not value.isdigit() or not low <= int(value) <= high:
+        raise InputError(f"--add {text}: {parameter.name} = {value!r}", expected=parameter.expected)
+    return int(value)

@@ -45,7 +45,7 @@ from toolpath_stiff.updating.portrait.alike import Alike, looks_the_same
 if TYPE_CHECKING:
     from toolpath_stiff.nc import Program
     from toolpath_stiff.units import Pose
-    from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
+    from toolpath_stiff.updating.comparison.residuals import LoopsDocument
 
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
@@ -326,7 +326,7 @@ def _loops(main: Judgement, fits: dict[str, Fit]) -> LoopsDocument:
     problem = main.problem
     if problem.predictor.data.beside is None:
         return {"by_loop": [], "readings": []}
-    from toolpath_stiff.updating.comparison.loop_readings import loops_document
+    from toolpath_stiff.updating.comparison.residuals import loops_document
 
     likeliest = max(main.probability, key=lambda name: main.probability[name], default=NONE)
     fit = fits.get(likeliest)

@@ -24,14 +24,14 @@ from toolpath_stiff.updating.diagnosis.words import (
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
 from toolpath_stiff.updating.inference.candidates import Component
 from toolpath_stiff.updating.inference.doubts import SuspectEntry
-from toolpath_stiff.updating.inference.drawn import DrawnEntry
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
+from toolpath_stiff.updating.inference.gates import DrawnEntry
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
-from toolpath_stiff.updating.portrait.document import PortraitEntry, SameEntry, alike_entry, portrait_entry
+from toolpath_stiff.updating.portrait.words import PortraitEntry, SameEntry, alike_entry, portrait_entry
 
 if TYPE_CHECKING:
-    from toolpath_stiff.updating.comparison.loop_readings import LoopsDocument
+    from toolpath_stiff.updating.comparison.residuals import LoopsDocument
 
 
 TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound

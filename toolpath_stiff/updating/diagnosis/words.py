@@ -11,9 +11,9 @@ from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 from toolpath_stiff.updating.inference.candidates import EXPECTED
-from toolpath_stiff.updating.inference.drawn import Drawn, seen_readings
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
 from toolpath_stiff.updating.inference.fits import errors_text
+from toolpath_stiff.updating.inference.gates import Drawn, seen_readings
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED
 from toolpath_stiff.updating.inference.repeats import OUTLIERS
 from toolpath_stiff.updating.portrait.words import alike_text

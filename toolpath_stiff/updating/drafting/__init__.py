@@ -2,7 +2,7 @@
 
 The file says what the portrait says, no more: terms that were read off the readings, at most three sizes, formulas and
 constants in the open. It records the readings that it was drawn from, so that no diagnosis takes it for confirmed by
-them (`inference.drawn`). The same readings and options give the same bytes.
+them (`inference.gates`). The same readings and options give the same bytes.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ posterior probabilities decide; only a name far ahead of all others is given as 
 
 adequate      nothing is missing that these data could show
 identified    one effect (or pair, or triple) explains the data, far likelier than any other
-described     the same, but its form was read off these very readings, and no others have confirmed it (`drawn`)
+described     the same, but its form was read off these very readings, and no others have confirmed it (`gates`)
 ambiguous     several explain them, and none is far likelier than the others
 unexplained   something is missing, and nothing in the catalogue accounts for it; or the readings do not look as if
               they were of this machine at all (`question`)
@@ -36,10 +36,17 @@ import numpy as np
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.updating.inference.candidates import EXPECTED
 from toolpath_stiff.updating.inference.doubts import noise_doubt
-from toolpath_stiff.updating.inference.drawn import Drawn, drawn
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.fits import refine
-from toolpath_stiff.updating.inference.gates import Forms, Gate, Simulator, absolute_gate, discrepancy_forms
+from toolpath_stiff.updating.inference.gates import (
+    Drawn,
+    Forms,
+    Gate,
+    Simulator,
+    absolute_gate,
+    discrepancy_forms,
+    drawn,
+)
 from toolpath_stiff.updating.inference.hypotheses import (
     Family,
     discrepancy_evidence,

@@ -23,8 +23,8 @@ from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect
 from toolpath_stiff.updating.inference.covariances import Precision
+from toolpath_stiff.updating.inference.numerics import Spline
 from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.inference.splines import Spline
 from toolpath_stiff.updating.measurements import Measurements
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated

@@ -13,7 +13,7 @@ from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.updating.inference.candidates import Table, candidates_of, table_of
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.gates import Forms, Structure, set_wild_aside
-from toolpath_stiff.updating.inference.tails import normal_below
+from toolpath_stiff.updating.inference.numerics import normal_below
 
 NOTHING = -1e9  # log evidence of what cannot be
 

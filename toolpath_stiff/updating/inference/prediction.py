@@ -22,7 +22,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
-from toolpath_stiff.stiffness.loop_response import law_products
+from toolpath_stiff.stiffness.exact import law_products
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
 from toolpath_stiff.updating.measurements import Measurements, measured_path, mechanical_stiffness, shown_by
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.updating.inference.covariances import Groups
-from toolpath_stiff.updating.inference.minima import bounded_minimum
+from toolpath_stiff.updating.inference.numerics import bounded_minimum
 from toolpath_stiff.updating.measurements import Measurements
 
 # Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their

@@ -40,14 +40,15 @@ from toolpath_stiff.updating.planning.gaps import (
     expectation,
     in_order,
     kind_of,
+    loops_between,
     pair_shares,
     plan_minutes,
     repeat_and_clamping,
     repeats_needed,
     same_place,
     why_of,
+    with_indicators,
 )
-from toolpath_stiff.updating.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.updating.planning.rivals import (
     Forecast,
     Rival,

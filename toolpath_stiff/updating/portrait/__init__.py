@@ -3,6 +3,10 @@
 Where no effect of the catalogue explains the readings, or where the best explanation leaves something, one to three
 terms of a dictionary of machine mechanics (`dictionary`, `terms`) are chosen (`selection`) and put in words (`words`).
 What else would look the same is said by probabilities over the whole dictionary, summed by link and by variable.
+
+The yardstick of a description is what a smooth unknown one reaches at points that it has not seen: the discrepancy as a
+Gaussian process with one of the forms of covariance of `inference.gates` (Kennedy and O'Hagan 2001, Bayesian
+calibration of computer models), its amplitude the likeliest; left-out points in closed form.
 """
 
 from __future__ import annotations
@@ -14,15 +18,16 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.updating.inference.covariances import Groups
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import held_out
-from toolpath_stiff.updating.inference.gates import Simulator
+from toolpath_stiff.updating.inference.gates import POINT_TO_POINT, Simulator, discrepancy_forms
+from toolpath_stiff.updating.inference.hypotheses import AMPLITUDES
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.portrait.choice import Chosen, choose
-from toolpath_stiff.updating.portrait.columns import Ground
+from toolpath_stiff.updating.portrait.dictionary import Ground
 from toolpath_stiff.updating.portrait.selection import Description, Selection, law_prior
-from toolpath_stiff.updating.portrait.smooth import smooth_rms
 from toolpath_stiff.updating.portrait.terms import Term
 
 HELD = 0.90  # probability that a set of links or variables adds up to
@@ -30,6 +35,7 @@ MOST_LINKS, MOST_VARIABLES, MOST_ALIKE = 4, 3, 4
 SHOWN = 0.03  # probability from which another term is told
 FLOOR_DRAWS = 40
 MOST_SEARCHED = 1000  # readings on which the dictionary is searched: more tell no more of which term to fit
+GENERAL = ("smooth over the workspace, different by direction", "linear over the workspace, different by direction")
 
 
 @dataclass(frozen=True)
@@ -216,3 +222,37 @@ def noise_floor(selection: Selection, description: Description) -> float:
         fit = replace(description.fit, residual=draw - jacobian @ moved, law=moved[:2])
         squares.append(float(np.mean(held_out(fit, points).residual ** 2)))
     return float(np.sqrt(np.mean(squares)))
+
+
+def smooth_rms(problem: Problem, fit: Fit, form: str) -> float:
+    """Rms of (modelled - measured) / measured at left-out points; nan with too few points.
+
+    Of the likeliest form: `form`, the one that stands out most, in words, or what is smooth over the workspace.
+    """
+    points = Groups.by(problem.predictor.data.point)
+    if points.count < 3:
+        return float("nan")
+    precision = fit.scatter.precision.beside(fit.jacobian.T, law_prior(fit))
+    best: tuple[float, FloatArray, float] | None = None
+    pull = precision.times(fit.residual)
+    forms = discrepancy_forms(problem.predictor)
+    for words in dict.fromkeys((form, *GENERAL)):
+        if words not in forms or words == POINT_TO_POINT:  # of which nothing is known from another point
+            continue
+        features = forms[words]
+        inner = precision.times(features.T) @ features
+        own, turn = np.linalg.eigh(inner)
+        turned = (turn.T @ (features.T @ pull)) ** 2
+        squared = AMPLITUDES[:, None] ** 2 * np.maximum(own, 0.0)
+        gains = 0.5 * (AMPLITUDES[:, None] ** 2 * turned / (1.0 + squared) - np.log1p(squared)).sum(axis=1)
+        at = int(np.argmax(gains))
+        if best is None or gains[at] > best[0]:
+            best = float(gains[at]), features, float(AMPLITUDES[at])
+    if best is None:
+        return float("nan")
+    _, features, amplitude = best
+    whole = precision.beside(amplitude * features.T, np.eye(features.shape[1]))
+    pulls, residual = whole.times(fit.residual), np.zeros(len(fit.residual))
+    for out in points.members():
+        residual[out] = np.linalg.solve(whole.block(out), pulls[out])
+    return float(np.sqrt(np.mean(np.expm1(-residual) ** 2)))

@@ -17,7 +17,7 @@ from toolpath_stiff.updating.inference.candidates import candidates_of
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.noise import Noise
 from toolpath_stiff.updating.portrait.choice import ROUGH, Weighed
-from toolpath_stiff.updating.portrait.columns import Ground
+from toolpath_stiff.updating.portrait.dictionary import Ground
 from toolpath_stiff.updating.portrait.selection import Selection
 from toolpath_stiff.updating.portrait.terms import CATALOGUE_LINKS, Term
 

@@ -1,4 +1,4 @@
-"""The dictionary: for every link of the load path its own compliance, times each shape of what it can depend on.
+"""The dictionary: for every link its own compliance, times each shape of what it can depend on; and its columns.
 
 Drawn up from the mechanics of a machine, not from any simulator: which forces a link carries says where its compliance
 shows, and a link depends on what it feels. A table feels where the work stands on it; a strut its length, its force and
@@ -6,27 +6,49 @@ the nut's place on the screw; a platform and a tool how they lean; instruments t
 
 A term's prior weight is even over links, over the variables of a link, over its places and directions, over shapes and
 over the constants of a shape, so that no link is preferred for having many terms.
+
+The columns are what terms do to readings: the shapes over the values that occur, and the compliance that a unit of a
+term adds.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.updating.portrait.columns import PLACE, Ground
-from toolpath_stiff.updating.portrait.terms import Action, Constants, Term
+from toolpath_stiff.stiffness.effects.contract import LoadPath
+from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.updating.portrait.terms import (
+    VARIABLES,
+    Action,
+    Constants,
+    Term,
+    carriers,
+    coupled,
+    coupling_share,
+    reading_share,
+    shape_values,
+    variable_values,
+)
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is
 ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
 SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
 NOTHING = 1e-4  # rms change of stiffness by the largest size below which a term does nothing to these readings
+Shapes = tuple[tuple[tuple[str, Constants], ...], FloatArray]  # shape and constants; (s, n) or (s, n, 6) values
+PLACE = ("x", "y", "z", "radius")
+BUMPS, MOST_EDGES = 5, 5
+SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
+MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
+PHASES = 3  # of half a turn; the other half is the other sign's
 
 
 @dataclass(frozen=True)
@@ -293,3 +315,235 @@ def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Con
             for side in (1.0, -1.0)
         ]
     return [(term.shape, term.at)]
+
+
+# -- shapes ------------------------------------------------------------------------------------------------------------
+
+
+def shapes_of(variable: str, values: FloatArray, signed: bool, lean: bool = False) -> list[tuple[str, Constants]]:
+    """Shapes over the values that a variable takes, with their constants; none where it does not vary.
+
+    `signed`: of what may change to both sides, where one side of each shape says it all; `lean`: of a signed tilt,
+    about which few poses say more than its side and its size.
+    """
+    if variable in ("constant", "direction", "setup"):
+        return [("offset", ())]
+    different = np.unique(np.round(values, 9))
+    if variable == "force sign":
+        return _signs(signed) if len(different) > 1 else []
+    if len(different) < 2 or different[-1] - different[0] <= 1e-9 * max(abs(different[-1]), 1e-9):
+        return []
+    sides = (1.0,) if signed else (1.0, -1.0)
+    low, high = float(different[0]), float(different[-1])
+    many, place = len(different), variable in (*PLACE, "strut length")
+    found: list[tuple[str, Constants]] = []
+    if variable in ("load", "strut force") and not (signed and many == 2):
+        found += _of_a_force(low, high, float(np.median(values)), many > 2)
+    found += _slopes(low, high, signed, many > 4)
+    if many == 2:
+        return found
+    found += _squares(low, high, place)
+    edges = [0.0] if lean else _edges(different, MOST_EDGES if place else 3)
+    found += [("threshold", (("edge", edge), ("side", side))) for edge in edges for side in sides]
+    if place and many > 4:
+        found += _bumps(low, high)
+    if (place or variable not in VARIABLES) and many > 8:
+        found += _periodic(variable, low, high - low, many, signed)
+    return found
+
+
+def _signs(signed: bool) -> list[tuple[str, Constants]]:
+    """Tension or compression alone."""
+    return [("sign", (("side", side),)) for side in ((1.0,) if signed else (1.0, -1.0))]
+
+
+def _of_a_force(low: float, high: float, reference: float, several: bool) -> list[tuple[str, Constants]]:
+    """Powers of a force, and what friction holds below some of it."""
+    powers: list[tuple[str, Constants]] = [
+        ("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)
+    ]
+    held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if several else [0.5 * low, 0.9 * low]
+    return [*powers, *(("threshold", (("beyond", force),)) for force in held)]
+
+
+def _squares(low: float, high: float, place: bool) -> list[tuple[str, Constants]]:
+    """Squares about the middle of the range, and of a place about the machine's axis."""
+    centres = [0.5 * (low + high)] + ([0.0] if low < 0.0 < high and place else [])
+    return [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
+
+
+def _bumps(low: float, high: float) -> list[tuple[str, Constants]]:
+    """Bumps over the range of a place, of two widths."""
+    return [
+        ("bump", (("centre", float(c)), ("width", (high - low) / parts)))
+        for c in np.linspace(low, high, BUMPS)
+        for parts in (4.0, 8.0)
+    ]
+
+
+def _slopes(low: float, high: float, signed: bool, within: bool) -> list[tuple[str, Constants]]:
+    """Straight lines over the range, and from its middle on."""
+    middle = 0.5 * (low + high)
+    if signed:
+        begins = (middle,) if within else ()
+        bent = [(("from", b), ("end", e)) for b in begins for e in (low, high)]
+        return [("slope", (("start", middle), ("end", high))), *(("threshold", at) for at in bent)]
+    lines = [(low, high), (high, low)] + ([(middle, high), (middle, low)] if within else [])
+    return [("slope", (("start", start), ("end", end))) for start, end in lines]
+
+
+def _edges(different: FloatArray, most: int) -> list[float]:
+    """Edges between values, and 0 where it lies among them."""
+    between = 0.5 * (different[1:] + different[:-1])
+    if len(between) > most:
+        between = between[np.unique(np.linspace(0, len(between) - 1, most + 2).round().astype(int)[1:-1])]
+    return [*between.tolist(), 0.0] if different[0] < 0.0 < different[-1] else between.tolist()
+
+
+def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -> list[tuple[str, Constants]]:
+    """Waves over the range: some turns of a place, down to a screw's lead in a strut's length."""
+    turns = np.arange(1.0, min(MOST_TURNS, many / 3.0) + 0.5)
+    if variable == "strut length":
+        # So close that between two neighbours a wave over the whole range loses a quarter of a turn at most.
+        turns = np.arange(1.0, min(span / SHORTEST_PITCH, many / 3.0), 0.5)
+    found: list[tuple[str, Constants]] = []
+    for turn in turns.tolist():
+        period = span / turn
+        phases = np.arange(PHASES if signed else 2 * PHASES) / (2.0 * PHASES)
+        found += [("periodic", (("period", period), ("crest", low + float(p) * period))) for p in phases]
+    return found
+
+
+def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
+    """The same term with constants about its own: steps of a grid's spacing times `finer`."""
+    at = term.constants
+    names = [name for name in at if name not in ("first", "second", "side", "power", "reference", "reach")]
+    if not names or term.shape == "sign":
+        return []
+    values = ground.values(term.variable, term.column)
+    low, high = float(values.min()), float(values.max())
+    step = finer * (high - low) / BUMPS
+    moves: dict[str, FloatArray] = {name: at[name] + step * np.linspace(-0.5, 0.5, 7) for name in names}
+    for name in {"width", "period"} & set(names):
+        spread = 0.7 if name == "width" else 0.25 * at["period"] / (high - low)
+        moves[name] = at[name] * np.exp(finer * np.linspace(-spread, spread, 7))
+    if "crest" in names:
+        moves["crest"] = at["crest"] + finer * at["period"] / (2 * PHASES) * np.linspace(-0.5, 0.5, 7)
+    if "end" in at:  # where it begins; its end is a matter of scale
+        begins = "from" if "from" in at else "start"
+        moves = {begins: np.clip(moves[begins], low - step, high + step)}
+        if begins == "start" and len(term.signs) > 1:
+            return []
+    found = []
+    for values_of in product(*moves.values()):
+        new = at | dict(zip(moves, (float(v) for v in values_of), strict=True))
+        if "width" in new and new["width"] < (high - low) / 30.0:
+            continue
+        if "end" in at and (new["end"] - new[begins]) * (at["end"] - at[begins]) <= 0.0:
+            continue
+        found.append(replace(term, at=tuple(new.items())))
+    return found if moves else []
+
+
+# -- columns -----------------------------------------------------------------------------------------------------------
+
+
+class Ground:
+    """What columns are made from: the readings as the links feel them.
+
+    Parameters
+    ----------
+    predictor
+        The model and n readings.
+    compliance, law
+        (n,) m/N of the model that a term is added to; (2,) logarithms of the factors on its strut law.
+    """
+
+    def __init__(self, predictor: Predictor, compliance: FloatArray, law: FloatArray) -> None:
+        data, path = predictor.data, predictor.full_path()
+        forces = predictor.strut_forces()
+        self.predictor, self.data, self.compliance = predictor, data, compliance
+        self.path: LoadPath = replace(path, strut_forces=forces * data.force[:, None], direction=data.direction)
+        self.forces = np.concatenate([forces, data.direction, np.zeros_like(data.direction)], axis=1)  # [f; w]
+        self.softness = 1.0 / scaled_law(predictor.machine.strut_law, law).stiffness(path.struts.lengths)
+        self._values: dict[tuple[str, str], FloatArray] = {}
+        self._shares: dict[tuple[Any, ...], FloatArray] = {}
+        self._shapes: dict[tuple[Any, ...], Shapes] = {}
+
+    def values(self, variable: str, column: str = "") -> FloatArray:
+        """(n,) or (n, 6) of a variable, SI; also the order of the readings (0 to 1) and further columns."""
+        key = (variable, column)
+        if key not in self._values:
+            if variable == "order":
+                found = np.linspace(0.0, 1.0, len(self.data))
+            elif variable in self.data.extra:
+                found = self.data.extra[variable]
+            else:
+                found = variable_values(variable, self.path, column)
+            self._values[key] = found
+        return self._values[key]
+
+    def known(self, variable: str) -> bool:
+        """Whether the readings say what a variable is."""
+        needed = {"time": "time_min", "temperature": "temperature_C", "load": "force_N", "strut force": "force_N"}
+        if variable in self.data.extra:
+            return bool(np.isfinite(self.data.extra[variable]).all())
+        return needed.get(variable, "") not in self.data.missing
+
+    def share(self, term: Term) -> FloatArray:
+        """(n,) or (n, 6) m/N that a term's link adds where its shape is 1, per unit of its size; worked out once."""
+        key = (term.link, term.action, term.direction, term.where, term.column, *term.at[:2])
+        if term.action not in ("coupling", "joint offset"):
+            key = key[:4]
+        if key not in self._shares:
+            self._shares[key] = self._share(term)
+        return self._shares[key]
+
+    def _share(self, term: Term) -> FloatArray:
+        path = self.path
+        plain = replace(term, variable="constant", shape="offset")
+        if term.action in ("strut", "strut factor"):
+            each = self.forces[:, :6] ** 2 * (self.softness if term.action == "strut factor" else 1.0)
+            if term.where is not None:
+                each = each * (np.arange(6) == term.where - 1)
+            return np.asarray(each)
+        if term.action == "coupling":
+            first, second = coupled(term)
+            return np.asarray(2.0 * self.forces[:, first] * self.forces[:, second] * coupling_share(plain, path))
+        if term.action == "joint offset":
+            strut, axis = (term.where or 1) - 1, "XYZ".index(term.direction)
+            at = 3 * (strut + 6 * (term.column == "platform")) + axis
+            return np.asarray(-self.compliance * self.predictor.joint_columns()[:, at])
+        if term.action in ("reading factor", "reading shift"):
+            own = reading_share(plain, path)
+            return np.asarray(own * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))
+        rows = carriers(term.link, term.action, term.direction, term.where, path)
+        return np.asarray((np.einsum("nkj,nj->nk", rows, self.forces) ** 2).sum(axis=1))
+
+    def shapes(self, variable: str, column: str, signed: bool, where: int | None) -> Shapes:
+        """All shapes of a variable over these readings, worked out once; of strut `where` where each has its own."""
+        values = self.values(variable, column)
+        own = where if values.ndim == 2 else None
+        key = (variable, column, signed, own)
+        if key not in self._shapes:
+            values = values if own is None else values[:, own - 1]
+            named = tuple(shapes_of(variable, values, signed, bool(column)))
+            rows = [shape_values(shape, values, dict(at), signed) for shape, at in named]
+            self._shapes[key] = named, np.stack(rows) if rows else np.zeros((0, *values.shape))
+        return self._shapes[key]
+
+    def columns(self, share: FloatArray, where: int | None, shapes: FloatArray) -> FloatArray:
+        """(s, n) m/N per unit of size, for shapes (s, n) or (s, n, 6); `share` (n,) or (n, 6) as of `share`."""
+        if share.ndim == 1:
+            return np.asarray(share * shapes)
+        if shapes.ndim == 3:
+            return np.asarray(np.einsum("ni,sni->sn", share, shapes))
+        return np.asarray((share.sum(axis=1) if where is None else share[:, where - 1]) * shapes)
+
+    def column(self, term: Term) -> FloatArray:
+        """(n,) m/N per unit (SI) of a term's size."""
+        values, share = self.values(term.variable, term.column), self.share(term)
+        if values.ndim == 2 and share.ndim == 1:
+            raise ValueError(f"{term.link} has no {term.variable} of its own")
+        shape = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+        return np.asarray(self.columns(share, None, shape[None])[0])

@@ -18,8 +18,7 @@ from toolpath_stiff.updating.inference.covariances import Precision, inverse_roo
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.gates import Simulator, set_wild_aside
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, scaled_inverse
-from toolpath_stiff.updating.portrait.columns import Ground, shapes_near
-from toolpath_stiff.updating.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of
+from toolpath_stiff.updating.portrait.dictionary import Dictionary, Entry, Ground, crossed, dictionary_of, shapes_near
 from toolpath_stiff.updating.portrait.terms import Term
 
 DRAWS = 200  # simulated campaigns

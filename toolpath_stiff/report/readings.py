@@ -1,4 +1,4 @@
-"""Residuals over the workspace, before and after, and measured against modelled; colours of directions."""
+"""Readings on pages: residuals over the workspace, before and after; indicators beside the tip; struts over time."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.report import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
 from toolpath_stiff.report.explanations import AS_GIVEN, best_explanation, figure_of, name_text, percent
 from toolpath_stiff.report.figure import (
     BLUE,
@@ -22,16 +24,18 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
+from toolpath_stiff.report.pages import bullets, markup, picture, section, table
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.updating.history import history_lines
 from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from toolpath_stiff.updating.comparison.residuals import LoopsDocument
+    from toolpath_stiff.updating.history import HistoryDocument, StrutEntry
     from toolpath_stiff.updating.measurements import Measurements
-
 
 RESIDUAL_MAP = "RdBu"  # red: measured softer than modelled, blue: stiffer
 DIRECTION_COLOURS = {"X": BLUE, "Y": SECOND_ORANGE, "Z": GREEN, "oblique": PURPLE}
@@ -40,6 +44,14 @@ MOST_LEVELS = 3  # rows of maps; more heights are put together
 SHOWN = 0.98  # share of the residuals that the colour scale holds
 BAND = 0.10  # drawn about measured = modelled
 MAP = 2.05  # inch
+MOST_LOOP_ROWS = 40  # on a page; all are in the document
+HISTORY_QUESTIONS = {
+    "history.png": (
+        "Did a strut change, and when?",
+        "Points: means of a date. Orange: a change, in the span in which a step lies (95 %), or along a drift.",
+    )
+}
+HISTORY_TITLE = "Struts measured alone, over their dates"
 
 
 @drawn
@@ -270,3 +282,159 @@ def _no_ticks() -> Any:
     from matplotlib.ticker import NullLocator
 
     return NullLocator()
+
+
+def loops_section(loops: LoopsDocument) -> list[Markup]:
+    """The section of a page; none without such readings."""
+    return [section("Indicators beside the tip", _table(loops))] if loops["by_loop"] else []
+
+
+def _table(loops: LoopsDocument) -> Markup:
+    """By loop, then reading by reading."""
+    head = ("loop", "readings", "read, nm/N", "modelled, nm/N", "off, nm/N", "standard deviations")
+    rows = [
+        (
+            "",
+            (
+                one["loop"],
+                str(one["readings"]),
+                f"{one['read_nm_per_N']:.2f}",
+                f"{one['model_nm_per_N']:.2f}",
+                f"{one['off_nm_per_N']:+.2f} +- {one['sd_nm_per_N']:.2f}",
+                f"{one['standard_deviations']:+.1f}",
+            ),
+        )
+        for one in loops["by_loop"]
+    ]
+    single = [
+        (
+            "",
+            (
+                f"{one['file']}:{one['line']}",
+                one["loop"],
+                one["direction"],
+                one["point"],
+                f"{one['read_nm_per_N']:.2f}",
+                f"{one['model_nm_per_N']:.2f}",
+                f"{one['standard_deviations']:+.1f}",
+            ),
+        )
+        for one in loops["readings"][:MOST_LOOP_ROWS]
+    ]
+    titles = ("line", "loop", "direction", "point", "read, nm/N", "modelled, nm/N", "standard deviations")
+    remark = (
+        "Displacement between the indicator's two points per load at the tip; of a strut alone, per force in it. By "
+        "loop in the mean, counted in the direction in which the struts of the machine file would move it."
+    )
+    return table(head, rows, range(1, 6)) + markup('<p class="muted">{}</p>', remark) + table(titles, single, (4, 5, 6))
+
+
+def loops_text(loops: LoopsDocument) -> list[str]:
+    """Lines for the terminal; none without such readings."""
+    if not loops["by_loop"]:
+        return []
+    return ["", "indicators beside the tip", *(f"  {plain(one['text'])}" for one in loops["by_loop"])]
+
+
+def dated(history: HistoryDocument) -> bool:
+    """Whether some strut was measured on several dates."""
+    return any(len(one["dates"]) > 1 for one in history["struts"])
+
+
+def _shown(history: HistoryDocument) -> bool:
+    return dated(history) or any(one["sides"] for one in history["struts"])
+
+
+def _figure_of(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
+
+
+def _rows(history: HistoryDocument) -> list[tuple[str, ...]]:
+    """Strut, readings, dates, stiffness, scatter, drift, tension, compression."""
+    return [
+        (
+            plain(one["strut"]),
+            str(one["readings"]),
+            str(len(one["dates"])),
+            f"{one['stiffness_N_per_mm']:,.0f}",
+            _figure_of(one["scatter_percent"]),
+            "-"
+            if one["drift_percent_per_year"] is None
+            else f"{one['drift_percent_per_year']:+.2f} +- {one['drift_sd_percent_per_year']:.2f}",
+            *(
+                ("-", "-")
+                if one["sides"] is None
+                else (f"{one['sides']['tension_N_per_mm']:,.0f}", f"{one['sides']['compression_N_per_mm']:,.0f}")
+            ),
+        )
+        for one in history["struts"]
+    ]
+
+
+HISTORY_HEAD = ("strut", "readings", "dates", "N/mm", "scatter %", "drift, % a year", "tension", "compression")
+
+
+def _remark(history: HistoryDocument) -> list[str]:
+    """How far readings scatter from date to date."""
+    if history["scatter_percent"] is None:
+        return []
+    return [f"scatter from date to date {history['scatter_percent']:.2g} %: {history['scatter_from']}"]
+
+
+def history_text(history: HistoryDocument) -> list[str]:
+    """Lines for the terminal; none without dates and without both signs of the force."""
+    if not _shown(history):
+        return []
+    rows = [HISTORY_HEAD, *_rows(history)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(HISTORY_HEAD))]
+    lines = [
+        "  " + "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    ]
+    said = [f"  {plain(line)}" for line in [*_remark(history), *history_lines(history)]]
+    return ["", HISTORY_TITLE.lower(), *lines, *said]
+
+
+def history_section(history: HistoryDocument) -> list[Markup]:
+    """The section of a page; none without dates and without both signs of the force."""
+    if not _shown(history):
+        return []
+    listed = table(HISTORY_HEAD, [("", row) for row in _rows(history)], range(1, len(HISTORY_HEAD)))
+    remark = markup('<p class="muted">{}</p>', "; ".join(_remark(history)))
+    pictures = {"history.png": history_png(history)} if dated(history) else {}
+    return [
+        section(HISTORY_TITLE, bullets([*history_lines(history)]) + listed + remark),
+        picture("history.png", pictures, HISTORY_QUESTIONS),
+    ]
+
+
+@drawn
+def history_png(history: HistoryDocument) -> Figure:
+    """PNG: stiffness of each strut over the date, the mean before and after a step, the span in which it lies."""
+    struts = [one for one in history["struts"] if len(one["dates"]) > 1]
+    with house_style():
+        figure = new_figure(9.0, 1.7 * len(struts) + 0.9)
+        panels = figure.subplots(len(struts), 1, squeeze=False, sharex=True).ravel()
+        for axes, one in zip(panels, struts, strict=True):
+            _strut(axes, one)
+        panels[-1].set_xlabel("date")
+        height = figure.get_size_inches()[1]
+        figure.suptitle(f"{HISTORY_TITLE}: N/mm", x=0.02, ha="left", weight="bold", color=INK)
+        figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.3 / height))
+        return figure
+
+
+def _strut(axes: Axes, one: StrutEntry) -> None:
+    """One strut: dates as points, changes in orange."""
+    from datetime import date
+
+    days = [date.fromisoformat(entry["date"]) for entry in one["dates"]]
+    axes.plot(days, [entry["stiffness_N_per_mm"] for entry in one["dates"]], "o", color=MUTED, markersize=4.0)  # type: ignore[arg-type]
+    for change in one["changes"]:
+        ends = [date.fromisoformat(change["after"]), date.fromisoformat(change["before"])]
+        levels = [change["from_N_per_mm"], change["to_N_per_mm"]]
+        if change["kind"] == "step":
+            axes.axvspan(ends[0], ends[1], color=SECOND_ORANGE, alpha=0.25, linewidth=0.0)  # type: ignore[arg-type]
+        axes.plot(ends, levels, color=SECOND_ORANGE, linewidth=1.6)  # type: ignore[arg-type]
+    axes.set_title(one["strut"], fontsize=9.0)
+    axes.tick_params(labelsize=8)
