@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -12,6 +13,14 @@ from typing import Any
 
 Record = dict[str, Any]
 Collect = Callable[[str, Callable[[Any], Record], Sequence[Any]], list[Record]]
+
+
+def add_run_arguments(parser: argparse.ArgumentParser, records: Path, out: Path) -> None:
+    """How many processes, where the records of the cases and the tables go."""
+    parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
+    parser.add_argument("--records", type=Path, default=records, help="JSON lines, one a case")
+    parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
+    parser.add_argument("--out", type=Path, default=out, help=f"markdown file to write (default: {out.name} beside)")
 
 
 @contextmanager

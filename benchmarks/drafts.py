@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.case_loop import Record, case_loop, document, read_records
+from benchmarks.case_loop import Record, add_run_arguments, case_loop, document, read_records
 from benchmarks.diagnosis_bars import Figure, share
 from benchmarks.diagnosis_cases import machine
 from benchmarks.diagnosis_tables import bars_table, summary
@@ -170,10 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--cases", type=int, default=16, help="drafts of unknowns (default: 16)")
     parser.add_argument("--noise-cases", type=int, default=8, help="drafts of noise (default: 8)")
-    parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
-    parser.add_argument("--records", type=Path, default=RECORDS, help="JSON lines, one a case")
-    parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
-    parser.add_argument("--out", type=Path, default=OUT, help=f"markdown file to write (default: {OUT.name} beside)")
+    add_run_arguments(parser, RECORDS, OUT)
     args = parser.parse_args(arguments)
     if args.table_only:
         records = read_records(args.records)

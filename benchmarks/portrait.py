@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.case_loop import Record, case_loop, document, read_records
+from benchmarks.case_loop import Record, add_run_arguments, case_loop, document, read_records
 from benchmarks.diagnosis_tables import bars_table, summary
 from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
 from benchmarks.portrait_cases import LAYOUTS, make_jobs, run
@@ -76,10 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--only", nargs="+", choices=list(UNKNOWNS), default=(), metavar="KIND", help="kinds of unknown"
     )
-    parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
-    parser.add_argument("--records", type=Path, default=RECORDS, help="JSON lines, one a case")
-    parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
-    parser.add_argument("--out", type=Path, default=OUT, help=f"markdown file to write (default: {OUT.name} beside)")
+    add_run_arguments(parser, RECORDS, OUT)
     args = parser.parse_args(arguments)
     if args.table_only:
         records = read_records(args.records)

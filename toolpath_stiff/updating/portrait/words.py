@@ -210,8 +210,8 @@ class VariableEntry(TypedDict):
     probability: float | None
 
 
-class TermEntry(TypedDict):
-    """A term of a description; `where` is a strut or a vertex, `interval` holds 95 %."""
+class SizedTermEntry(TypedDict):
+    """A term of the dictionary with its size; `where` is a strut or a vertex."""
 
     link: str
     where: int | None
@@ -220,9 +220,14 @@ class TermEntry(TypedDict):
     shape: str
     size: float | None
     unit: str
+    words: str
+
+
+class TermEntry(SizedTermEntry):
+    """A term of a description; `interval` holds 95 %."""
+
     interval: list[float | None]
     rms_percent: float | None
-    words: str
 
 
 class AlikeEntry(TermEntry):
@@ -231,18 +236,10 @@ class AlikeEntry(TermEntry):
     probability: float | None
 
 
-class SameTermEntry(TypedDict):
+class SameTermEntry(SizedTermEntry):
     """A term that fits as well as a named effect, with its share among those that do."""
 
-    link: str
-    where: int | None
-    direction: str
-    variable: str
-    shape: str
-    size: float | None
-    unit: str
     share: float | None
-    words: str
 
 
 class SameEntry(TypedDict):
