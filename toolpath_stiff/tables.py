@@ -172,7 +172,7 @@ def _table(grid: Grid, file: str, columns: Columns) -> Table:
     line, written = grid.rows[at]
     body, notes = grid.rows[at + 1 :], list(grid.notes)
     if at:
-        notes.append(f"{file}: what stands above the heading in line {line} is passed over")
+        notes.append(f"{file}: what stands above the heading in line {line} is not read as rows")
     units: list[str] = []
     if body and _is_unit_row(body[0][1], written):
         units = body[0][1]

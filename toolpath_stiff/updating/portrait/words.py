@@ -220,7 +220,6 @@ class SizedTermEntry(TypedDict):
     shape: str
     size: float | None
     unit: str
-    words: str
 
 
 class TermEntry(SizedTermEntry):
@@ -228,6 +227,7 @@ class TermEntry(SizedTermEntry):
 
     interval: list[float | None]
     rms_percent: float | None
+    words: str
 
 
 class AlikeEntry(TermEntry):
@@ -240,6 +240,7 @@ class SameTermEntry(SizedTermEntry):
     """A term that fits as well as a named effect, with its share among those that do."""
 
     share: float | None
+    words: str
 
 
 class SameEntry(TypedDict):
@@ -294,13 +295,7 @@ def alike_entry(name: str, alike: Alike) -> SameEntry:
         "variables": [{"variable": one, "probability": json_number(share, 3)} for one, share in alike.variables],
         "terms": [
             {
-                "link": term.link,
-                "where": term.where,
-                "direction": term.direction,
-                "variable": term.variable,
-                "shape": term.shape,
-                "size": json_number(term.size / term.si),
-                "unit": term.unit,
+                **_of_term(term),
                 "share": json_number(share, 3),
                 "words": term_words(term),
             }
@@ -309,8 +304,7 @@ def alike_entry(name: str, alike: Alike) -> SameEntry:
     }
 
 
-def _term(sized: Sized) -> TermEntry:
-    term = sized.term
+def _of_term(term: Term) -> SizedTermEntry:
     return {
         "link": term.link,
         "where": term.where,
@@ -319,6 +313,13 @@ def _term(sized: Sized) -> TermEntry:
         "shape": term.shape,
         "size": json_number(term.size / term.si),
         "unit": term.unit,
+    }
+
+
+def _term(sized: Sized) -> TermEntry:
+    term = sized.term
+    return {
+        **_of_term(term),
         "interval": [json_number(float(end)) for end in np.array(sized.interval) / term.si],
         "rms_percent": json_number(100.0 * sized.rms, 3),
         "words": term_words(term),
