@@ -124,6 +124,7 @@ def judged(
         "effects": truth["effects"],
         "verdict": found["verdict"],
         "plausible": found["plausible"],
+        "not_excluded": {one["effect"]: one["probability"] for one in found["not_excluded"]},
         "first": found["candidates"][0]["effect"],
         "probability": {name: round(weight, 4) for name, weight in diagnosis.main.probability.items() if weight > 5e-5},
         "gate": found["gates"]["baseline_probability"],

@@ -20,7 +20,7 @@ from toolpath_stiff.hints import Asked
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Conditions, Effect
 from toolpath_stiff.stiffness.model import build_model, setup_of
-from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, Judgement, judge
+from toolpath_stiff.updating.inference import FALSE_ALARM, NONE, Judgement, judge, unexcluded
 from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.doubts import (
     SlipSize,
@@ -31,7 +31,13 @@ from toolpath_stiff.updating.inference.doubts import (
 )
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import Baseline, HeldOut, held_out, of_readings, refine
-from toolpath_stiff.updating.inference.hypotheses import Confounding, Detectable, confounding, detectable_sizes
+from toolpath_stiff.updating.inference.hypotheses import (
+    Confounding,
+    Detectable,
+    Unexcluded,
+    confounding,
+    detectable_sizes,
+)
 from toolpath_stiff.updating.inference.noise import JOINT_ERROR, Noise, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
@@ -85,6 +91,8 @@ class Diagnosis:
         What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
     alike
         What else would look the same as the effect that is named (`alike_of`); None where nothing would, or none is.
+    unexcluded
+        Effects that the readings neither show nor exclude beside the likeliest explanation, at a size that matters.
     suspects
         Rows that look mistyped; `data` no longer holds those that are clear.
     slips
@@ -118,6 +126,7 @@ class Diagnosis:
     path: dict[str, Any] | None = None
     portrait: Portrait | None = None
     alike: Alike | None = None
+    unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
     slips: tuple[SlipSize, ...] = ()
     loops: LoopsDocument = field(default_factory=lambda: cast("LoopsDocument", {"by_loop": [], "readings": []}))
@@ -300,6 +309,7 @@ def _examined(
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
         files or tuple(dict.fromkeys(data.file.tolist())), seed, suspects=tuple(entries),
+        unexcluded=tuple(one for one in unexcluded(main) if one.effect.name not in plausible),
         slips=slips_that_show(main.problem, main.likeliest) if looked_at else (), loops=_loops(main, fits),
     )  # fmt: skip
 

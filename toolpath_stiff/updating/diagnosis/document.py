@@ -20,6 +20,7 @@ from toolpath_stiff.updating.diagnosis.words import (
     unconfirmed,
     verdict_text,
     why,
+    would_tell,
 )
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
 from toolpath_stiff.updating.inference.candidates import Component
@@ -197,6 +198,21 @@ class ConfoundingEntry(TypedDict):
     threshold: float
 
 
+class NotExcluded(TypedDict):
+    """An effect that may be there beside the likeliest explanation: up to which size, and what would tell."""
+
+    effect: str
+    title: str
+    parameter: str
+    unit: str
+    choice: dict[str, Any]
+    up_to: float | None
+    rms_percent: float | None
+    left_percent: float | None
+    probability: float | None
+    would_tell: str
+
+
 class CannotTest(TypedDict):
     """An effect and the columns that the data lack for it."""
 
@@ -229,6 +245,7 @@ class DiagnosisDocument(TypedDict):
     path: dict[str, Any] | None
     portrait: PortraitEntry | None
     looks_the_same: SameEntry | None
+    not_excluded: list[NotExcluded]
     assumptions: list[str]
     warnings: list[str]
     notes: list[str]
@@ -288,6 +305,21 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "looks_the_same": (
             None if diagnosis.alike is None else alike_entry(diagnosis.explanations[0], diagnosis.alike)
         ),
+        "not_excluded": [
+            {
+                "effect": one.effect.name,
+                "title": one.effect.title,
+                "parameter": one.parameter.name,
+                "unit": one.parameter.unit,
+                "choice": dict(one.candidate.choice),
+                "up_to": json_number(one.value / one.parameter.si, 3),
+                "rms_percent": json_number(100.0 * one.rms, 3),
+                "left_percent": json_number(100.0 * one.left, 2),
+                "probability": json_number(one.probability, 3),
+                "would_tell": would_tell(one),
+            }
+            for one in diagnosis.unexcluded
+        ],
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],

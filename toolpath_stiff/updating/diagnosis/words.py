@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from toolpath_stiff import defaults
@@ -10,27 +12,54 @@ from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
-from toolpath_stiff.updating.inference.candidates import EXPECTED
+from toolpath_stiff.updating.inference.candidates import EXPECTED, choice_text
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
 from toolpath_stiff.updating.inference.fits import errors_text
 from toolpath_stiff.updating.inference.gates import Drawn, seen_readings
-from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED
+from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, MATTERS, Unexcluded
 from toolpath_stiff.updating.inference.repeats import OUTLIERS
+from toolpath_stiff.updating.planning import INDICATORS
 from toolpath_stiff.updating.portrait.words import alike_text
 
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
+MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has all
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
     same = [] if diagnosis.alike is None else [alike_text(diagnosis.explanations[0], diagnosis.alike)]
-    return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(one)}." for one in doubts(diagnosis))])
+    beside = [beside_text(diagnosis.unexcluded)] if diagnosis.unexcluded else []
+    return " ".join([_verdict_text(diagnosis), *same, *beside, *(f"{_capital(one)}." for one in doubts(diagnosis))])
 
 
-def doubts(diagnosis: Diagnosis) -> list[str]:
-    """What may be wrong with the data instead of the machine: the stated noise, single rows."""
-    noise = dict.fromkeys(judgement.doubt for judgement in diagnosis.judgements.values() if judgement.doubt)
-    return [*noise, *(one["words"] for one in diagnosis.suspects)]
+def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
+    """What the readings neither show nor exclude beside what is said, and where an indicator would tell."""
+    told, more = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE
+    effects = [f"{one.effect.name} ({up_to(one)}, {100.0 * one.rms:.2g} % of the tip's stiffness)" for one in told]
+    effects += [f"{more} more"] if more > 0 else []
+    places = dict.fromkeys(indicator_for(one).split(":")[0] for one in told if indicator_for(one))
+    tells = f"; an indicator {' or '.join(places)} would tell" if places else ""
+    return f"The readings neither show nor exclude {joined(effects)}, which the fit takes up{tells}."
+
+
+def up_to(one: Unexcluded) -> str:
+    """The size up to which an effect is not excluded, with its unit and what it acts on; a stiffness goes down."""
+    chosen = [choice_text(key, value) for key, value in one.candidate.choice if value not in ("", 0)]
+    way = "down to" if np.isinf(one.parameter.neutral) else "up to"
+    size = f"{way} {float(f'{one.value / one.parameter.si:.3g}'):g} {one.parameter.unit}"
+    return ", ".join([size, *chosen])
+
+
+def indicator_for(one: Unexcluded) -> str:
+    """Where an indicator reads the effect's link; "" where none does."""
+    place = INDICATORS[one.effect.link]
+    return "" if place.startswith("none: ") else place
+
+
+def would_tell(one: Unexcluded) -> str:
+    """Where an indicator would show an effect, or what else to measure."""
+    place = indicator_for(one)
+    return f"an indicator {place}" if place else INDICATORS[one.effect.link].removeprefix("none: ")
 
 
 def _verdict_text(diagnosis: Diagnosis) -> str:
@@ -304,6 +333,7 @@ def assumptions(diagnosis: Diagnosis) -> list[str]:
         "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
         f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
         f"the plausible set holds {100 * HELD:g} %",
+        f"a further effect matters from {100 * MATTERS:g} % of the tip's stiffness on",
     ]
     if "force_N" in diagnosis.data.missing:
         found.append(f"load of every reading: {defaults.FORCE:g} N, assumed because force_N is missing")

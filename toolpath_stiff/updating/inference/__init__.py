@@ -49,7 +49,9 @@ from toolpath_stiff.updating.inference.gates import (
 )
 from toolpath_stiff.updating.inference.hypotheses import (
     Family,
+    Unexcluded,
     discrepancy_evidence,
+    not_excluded,
     probabilities,
     score_families,
     signatures,
@@ -498,6 +500,28 @@ def decide(gates: Gates, weighed: Probabilities) -> tuple[str, tuple[str, ...]]:
     if max(posterior.values()) >= NAMED and sum(weight > STANDS for weight in posterior.values()) == 1:
         return "identified", _smallest_set(posterior)
     return "ambiguous", _smallest_set(posterior, named=HELD)
+
+
+def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
+    """Effects that may be there beside the likeliest explanation at a size that matters, and are not plausible yet.
+
+    A further effect is as likely beforehand as one effect is beside none, a pair beside one of its effects, a triple
+    beside one of its pairs. Where the readings say nothing of it, it keeps that probability: a few per cent. So it is
+    in no set that holds the truth with 95 %, and a name stays a name.
+    """
+    name = next((name for name in judgement.explanations if name == NONE or name in judgement.fits), "")
+    if not name:
+        return ()
+    count = 0 if name == NONE else len(name.split(" + "))
+    families = judgement.families
+    odds = (
+        _prior(families, 1) / PRIOR_NONE
+        if not count
+        else _prior(families, min(count + 1, 3)) / _prior(families, min(count, 2))
+    )
+    fit = judgement.base if name == NONE else judgement.fits[name]
+    found = not_excluded(judgement.problem, families, fit, odds)
+    return tuple(one for one in found if one.effect.name not in judgement.plausible)
 
 
 def _smallest_set(posterior: dict[str, float], named: float = NAMED) -> tuple[str, ...]:

@@ -384,7 +384,7 @@ def _log_visible(lengths: FloatArray, longest: float) -> FloatArray:
     return np.asarray(-0.5 * (np.maximum(VISIBLE - lengths, 0.0) / FADES) ** 2)
 
 
-def _log_expected(rms: FloatArray) -> FloatArray:
+def log_expected(rms: FloatArray) -> FloatArray:
     """Log prior density of ln rms change, not normalised: flat between `EXPECTED`, normal tails."""
     logs = np.log(np.maximum(rms, 1e-9))
     low, high = np.log(EXPECTED[0]), np.log(EXPECTED[1])
@@ -392,7 +392,7 @@ def _log_expected(rms: FloatArray) -> FloatArray:
     return np.asarray(-0.5 * (beyond / TAIL) ** 2)
 
 
-def _log_usual(sizes: FloatArray, typical: tuple[float, float]) -> FloatArray:
+def log_usual(sizes: FloatArray, typical: tuple[float, float]) -> FloatArray:
     """Log weight for being far from the typical range: a tenth of it or ten times it counts half."""
     logs = np.log(np.maximum(np.abs(sizes), 1e-300))
     low = np.log(typical[0]) if typical[0] > 0.0 else -np.inf
@@ -437,7 +437,7 @@ class SizePrior:
             change = sight.change(table.delta(sizes))
             rms = np.sqrt(np.mean(change**2, axis=1))
             lengths[sign] = sight.length(change)
-            density[sign] = _log_expected(rms) + _log_usual(sizes[:, j], component.typical())
+            density[sign] = log_expected(rms) + log_usual(sizes[:, j], component.typical())
         longest = max(float(found.max()) for found in lengths.values())
         density = {sign: density[sign] + _log_visible(lengths[sign], longest) for sign in logs}
         mass = sum(_trapezoid(logs[sign], density[sign]) for sign in logs)
