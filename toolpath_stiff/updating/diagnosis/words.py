@@ -62,6 +62,12 @@ def would_tell(one: Unexcluded) -> str:
     return f"an indicator {place}" if place else INDICATORS[one.effect.link].removeprefix("none: ")
 
 
+def doubts(diagnosis: Diagnosis) -> list[str]:
+    """What may be wrong with the data instead of the machine: the stated noise, single rows."""
+    noise = dict.fromkeys(judgement.doubt for judgement in diagnosis.judgements.values() if judgement.doubt)
+    return [*noise, *(one["words"] for one in diagnosis.suspects)]
+
+
 def _verdict_text(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "adequate":
         return f"Nothing is missing that these data could show: what is left is scatter.{_not_excluded(diagnosis)}"
