@@ -31,14 +31,16 @@ OUT = Path(__file__).parent / "several.md"
 
 def effects_table(records: Sequence[Record]) -> list[str]:
     """How often each effect, as one of several, is in `plausible`, and how often it is named without being there."""
-    lines = ["| effect | hidden in | in `plausible` | shows alone | named falsely |", "| --- " + "| ---: " * 4 + "|"]
+    lines = ["| effect | hidden in | in `plausible` | in `not_excluded` | shows alone | named falsely |",
+             "| --- " + "| ---: " * 5 + "|"]  # fmt: skip
     mine = [r for r in records if r["group"] in ("pair", "three")]
     names = sorted({name for r in mine for name in r["truth"]})
     for name in names:
         with_it = [r for r in mine if name in r["truth"]]
         seen = sum(e["detectability"] >= JUST_SEEN for r in with_it for e in r["effects"] if e["effect"] == name)
         false = sum(false_name(r) and name in r["plausible"] and name not in r["truth"] for r in mine)
-        cells = (len(with_it), sum(name in r["plausible"] for r in with_it), seen, false)
+        held, listed = (sum(name in r[key] for r in with_it) for key in ("plausible", "not_excluded"))
+        cells = (len(with_it), held, listed, seen, false)
         lines.append(f"| {name} | " + " | ".join(map(str, cells)) + " |")
     return lines
 
@@ -82,7 +84,8 @@ def failures_table(records: Sequence[Record]) -> list[str]:
 def _missed(record: Record) -> str:
     """Each effect that is not in `plausible`, and how far it shows beside the others."""
     missed = [e for e in record["effects"] if e["effect"] not in record["plausible"]]
-    return ", ".join(f"{e['effect']} shows with {e['beside']:.1f}" for e in missed)
+    told = {e["effect"]: " (not excluded)" if e["effect"] in record["not_excluded"] else "" for e in missed}
+    return ", ".join(f"{e['effect']} shows with {e['beside']:.1f}{told[e['effect']]}" for e in missed)
 
 
 def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
@@ -108,8 +111,9 @@ _WHAT = (
     "off by 0.5 mm and 2 % wild readings unless more is said. Pairs change the stiffness by 10 and 5 % rms, three "
     "effects by 10, 7 and 5 %, less where a bound is nearer. An effect that does not show alone (detectability below "
     "3.9) cannot be found beside others either; one that does may still be taken up by the sizes of the others: how "
-    "far it shows beside them is given with each miss. Intervals of shares are Wilson's; a bar is cleared by the "
-    "figure."
+    "far it shows beside them is given with each miss, and whether the diagnosis says that it is not excluded "
+    "(`not_excluded`: that is no part of `plausible`, and of no bar). Intervals of shares are "
+    "Wilson's; a bar is cleared by the figure."
 )
 
 

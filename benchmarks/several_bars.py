@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from benchmarks.case_loop import Record
-from benchmarks.diagnosis_bars import JUST_SEEN, Figure, holds_truth, named, share
+from benchmarks.diagnosis_bars import JUST_SEEN, Figure, holds_truth, mean, named, share
 from benchmarks.several_cases import FACTORS, MANY_OUTLIERS, WAYS
 from toolpath_stiff.rig.slips import VISIBLE
 
@@ -26,6 +26,11 @@ def all_seen(record: Record) -> bool:
 def all_show(record: Record) -> bool:
     """Whether each hidden effect shows beside the others, whose sizes are free (`several_seen`)."""
     return all(effect["beside"] >= JUST_SEEN for effect in record["effects"])
+
+
+def held_or_listed(record: Record) -> bool:
+    """Whether all that was hidden is in `plausible`, or told as neither shown nor excluded."""
+    return set(record["truth"]) <= {*record["plausible"], *record["not_excluded"]}
 
 
 def strongest_right(record: Record, count: int = 2) -> bool:
@@ -104,6 +109,8 @@ def _pairs(records: Sequence[Record]) -> list[Figure]:
               [holds_truth(r) for r in records if all_seen(r)]),
         share(at, "the same, each beside the other, whose sizes are free",
               [holds_truth(r) for r in records if all_show(r)]),
+        share(at, "pairs: both in `plausible` or `not_excluded`", [held_or_listed(r) for r in records]),
+        *_listed(at, "pairs", records),
         share(at, "pairs: `identified`, both", [named(r) for r in records]),
         share(at, "pairs: `identified`, a name that is not hidden", [false_name(r) for r in records], at_most=0.04),
         share(at, "pairs: `identified`, one of them alone",
@@ -111,6 +118,16 @@ def _pairs(records: Sequence[Record]) -> list[Figure]:
         share(at, "pairs: `unexplained`", [r["verdict"] == "unexplained" for r in records]),
         share(at, "pairs: at most four names in `plausible`", [len(r["plausible"]) <= 4 for r in records]),
     ]  # fmt: skip
+
+
+def _listed(at: str, what: str, records: Sequence[Record]) -> list[Figure]:
+    """How many effects are told as not excluded, how often one of them is there, and how likely each was said to be."""
+    listed = [(name in r["truth"], chance) for r in records for name, chance in r["not_excluded"].items()]
+    return [
+        mean(at, f"{what}: effects in `not_excluded`", [float(len(r["not_excluded"])) for r in records]),
+        share(at, f"{what}: one that is listed there is hidden", [there for there, _ in listed]),
+        mean(at, f"{what}: probability (%) that is given with it", [100.0 * chance for _, chance in listed]),
+    ]
 
 
 def _three(records: Sequence[Record]) -> list[Figure]:
@@ -123,6 +140,8 @@ def _three(records: Sequence[Record]) -> list[Figure]:
         share(at, "the same, each beside the others, whose sizes are free",
               [strongest_right(r) for r in records if all_show(r)]),
         share(at, "three: all in `plausible`", [holds_truth(r) for r in records]),
+        share(at, "three: all in `plausible` or `not_excluded`", [held_or_listed(r) for r in records]),
+        *_listed(at, "three", records),
         share(at, "three: `identified`, a name that is not hidden", [false_name(r) for r in records], at_most=0.05),
         share(at, "three: `unexplained`", [r["verdict"] == "unexplained" for r in records]),
     ]  # fmt: skip
@@ -152,7 +171,9 @@ def _outliers(records: Sequence[Record]) -> list[Figure]:
                 Figure("tilted", f"10 % wild cost, {hidden}: {what}", f"{cost:+.1f} points", "",
                        f"at most {COST_OF_OUTLIERS:g}", cost <= COST_OF_OUTLIERS)
             )  # fmt: skip
-    return found
+    sound = [r for r in records if r["hidden"] == "none"]
+    one = [r for r in records if r["hidden"] == "one"]
+    return [*found, *_listed("tilted", "none hidden", sound), *_listed("tilted", "one hidden", one)]
 
 
 def _stated(records: Sequence[Record]) -> list[Figure]:

@@ -27,8 +27,8 @@ from toolpath_stiff.rig.hidden import HiddenMachine, readings
 def record(truth: dict[str, float], verdict: str, plausible: list[str], **more: Any) -> dict[str, Any]:
     effects = [{"effect": name, "size": size, "detectability": 9.0, "beside": 9.0} for name, size in truth.items()]
     return {"group": "pair", "layout": "tilted", "seed": 1, "hidden": "pair", "slip": "", "outliers": 0.02,
-            "truth": list(truth), "effects": effects, "verdict": verdict, "plausible": plausible, "suspects": [],
-            **more}  # fmt: skip
+            "truth": list(truth), "effects": effects, "verdict": verdict, "plausible": plausible, "not_excluded": {},
+            "suspects": [], **more}  # fmt: skip
 
 
 def test_a_part_of_the_truth_is_no_false_name_and_an_open_list_is_none_either() -> None:
@@ -113,6 +113,17 @@ def test_the_cost_of_wild_readings_is_a_difference_of_shares() -> None:
     records = [machine(0.02, "adequate")] * 4 + [machine(0.1, "adequate")] * 3 + [machine(0.1, "unexplained")]
     cost = next(figure for figure in figures(records) if "cost" in figure.what)
     assert (cost.value, cost.cleared) == ("+25.0 points", False)
+
+
+def test_what_is_listed_as_not_excluded_is_counted_beside_what_is_plausible() -> None:
+    pair = {"weak_strut": 0.1, "joint_compliance": 0.05}
+    listed = record(pair, "identified", ["weak_strut"], not_excluded={"joint_compliance": 0.02, "gauge_scale": 0.04})
+    found = {figure.what: figure.value for figure in figures([listed, record(pair, "unexplained", [])])}
+    assert found["pairs: both in `plausible`"].startswith("0.0 %")
+    assert found["pairs: both in `plausible` or `not_excluded`"].startswith("50.0 %")
+    assert found["pairs: effects in `not_excluded`"] == "1.00"
+    assert found["pairs: one that is listed there is hidden"] == "50.0 % (1 of 2)"
+    assert found["pairs: probability (%) that is given with it"] == "3.00"
 
 
 def test_the_document_does_not_depend_on_the_order_of_records_and_counts_broken_cases() -> None:

@@ -32,10 +32,11 @@ SLIPS = {
     "N_per_um": "a stiffness in N/um",
     "pose_10_mm": "a coordinate off by 10 mm",
     "pose_1_deg": "an angle off by 1 degree",
+    "pose_5_deg": "an angle off by 5 degrees",
 }
 N_PER_LBF = 4.4482216152605  # exact: 0.45359237 kg (international pound, 1959) times 9.80665 m/s2 (CGPM 1901)
 WRITTEN_PER_N_PER_MM = {"lbf_per_in": MM_PER_INCH / N_PER_LBF, "N_per_um": 1e-3}
-WRONG_MM, WRONG_DEG = 10.0, 1.0
+WRONG_BY = {"pose_10_mm": 10.0, "pose_1_deg": 1.0, "pose_5_deg": 5.0}  # mm or degrees
 SMALLEST_ANGLE, SMALLEST_COORDINATE = 3.0, 30.0  # degrees, mm: a wrong sign of less is hardly a mistake (assumed)
 TRIES = 200  # draws until the written pose is one that the machine can reach
 # Whitened length of a slip that is found with 80 % power at 5 % among all slips of all rows of a tilted campaign, some
@@ -162,7 +163,7 @@ def _mistype(wrong: dict[str, Any], nominal: Nominal, kind: str, rng: Generator)
     for _ in range(TRIES):
         row = int(rng.integers(len(clamps)))
         rows = np.flatnonzero(clamps == clamps[row]) if rng.random() < 0.5 else np.array([row])
-        angle = kind in ("sign_of_angle", "pose_1_deg")
+        angle = kind in ("sign_of_angle", "pose_1_deg", "pose_5_deg")
         group = names[3:5] if kind == "sign_of_angle" else names[3:] if angle else names[:2]
         group = names[:3] if kind == "pose_10_mm" else group
         name = str(rng.choice(group))
@@ -172,7 +173,7 @@ def _mistype(wrong: dict[str, Any], nominal: Nominal, kind: str, rng: Generator)
                 continue
             after = -before
         else:
-            after = round(before + float(rng.choice([-1.0, 1.0])) * (WRONG_DEG if angle else WRONG_MM), 3)
+            after = round(before + float(rng.choice([-1.0, 1.0])) * WRONG_BY[kind], 3)
         trial = dict(wrong) | {name: wrong[name].copy()}
         trial[name][rows] = after
         if _reached(trial, nominal, rows):

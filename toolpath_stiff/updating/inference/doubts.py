@@ -93,8 +93,9 @@ CLEAR = float(np.log(1000.0))  # log odds from which its rows are left out of th
 FAR_OFF = 16.0  # squared deviation of a row from which on it is looked at
 MOST_ROWS, MOST_CLAMPS, MOST_SLIPS = 12, 6, 3
 NEAR = 3.0  # standard deviations within which the mended rows must lie, root mean square
-STEP_MM, STEP_DEG = 10.0, 1.0
-MOST_STEPS = 10.0  # times these up to which a change is in proportion to the slip
+# A digit typed wrongly; mm and degrees, assumed. Each further one costs all others a little: more is tried by chance.
+STEPS_MM, STEPS_DEG = (10.0,), (1.0, 5.0)
+MOST_STEPS = 10.0  # times the first of these up to which a change is in proportion to the slip
 LBF_PER_IN = 25.4 / 4.4482216152605  # of 1 N/mm; the inch is 25.4 mm, the pound-force 4.448... N, both exactly
 # What a stiffness may have been written in -> written over true.
 UNITS = {"lbf/in": LBF_PER_IN, "N/um": 1e-3}
@@ -102,10 +103,10 @@ TINY = 1e-9
 SET_ASIDE = 1e2  # variance of ln k of a row that is left out
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 COORDINATES, ANGLES = ("x_mm", "y_mm", "z_mm"), ("a_deg", "b_deg", "c_deg")
-# Columns, field of the readings, usual slip, SI value of its unit, and that unit.
+# Columns, field of the readings, usual slips, SI value of its unit, and that unit.
 POSE_STEPS = (
-    (COORDINATES, "position", STEP_MM, float(m_from_mm(1.0)), "mm"),
-    (ANGLES, "angles", STEP_DEG, float(rad_from_deg(1.0)), "deg"),
+    (COORDINATES, "position", STEPS_MM, float(m_from_mm(1.0)), "mm"),
+    (ANGLES, "angles", STEPS_DEG, float(rad_from_deg(1.0)), "deg"),
 )
 
 
@@ -253,9 +254,9 @@ class SlipSize:
 def slips_that_show(problem: Problem, fit: Fit) -> tuple[SlipSize, ...]:
     """How large a slip of each coordinate and angle must be to stand out as `suspect_rows` asks.
 
-    That one looks for slips of 10 mm and 1 degree: where the size is larger, they pass unseen, and do as little harm.
-    Mending a slip of whitened length s gains s^2 / 2, in proportion to the square of its size, and has to pay for every
-    slip that is tried.
+    That one looks for slips of 10 mm, 1 and 5 degrees: where the size is larger, they pass unseen, and do as little
+    harm. Mending a slip of whitened length s gains s^2 / 2, in proportion to the square of its size, and has to pay for
+    every slip that is tried.
     """
     data = problem.predictor.data
     tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))
@@ -263,7 +264,7 @@ def slips_that_show(problem: Problem, fit: Fit) -> tuple[SlipSize, ...]:
     projected = problem.scatter.precision.beside(fit.jacobian.T, _prior(fit))
     blocks = [(rows, projected.block(rows)) for rows in Groups.by(data.clamp).members() if len(rows) > 1]
     found = []
-    for names, field, step, si, unit in POSE_STEPS:
+    for names, field, (step, *_), si, unit in POSE_STEPS:
         for k, name in enumerate(names):
             moved = getattr(data, field) + step * si * np.eye(3)[k]
             slip = _Slip.of(data, np.arange(len(data)), name, "", "", **{field: moved})
@@ -339,15 +340,15 @@ def _slips_of_row(data: Measurements, row: Rows) -> Iterator[_Slip]:
 
 
 def _slips_of_pose(data: Measurements, rows: Rows) -> Iterator[_Slip]:
-    """A coordinate or an angle with the wrong sign, or off by 10 mm or 1 degree; the same in all rows."""
-    for names, field, step, si, _ in POSE_STEPS:
+    """A coordinate or an angle with the wrong sign, or off by a usual slip; the same in all rows."""
+    for names, field, steps, si, _ in POSE_STEPS:
         values = getattr(data, field)[rows]
         for k, name in enumerate(names):
             if float(np.ptp(values[:, k])) > TINY:
                 continue
             stands = float(values[0, k]) / si
-            wrong_sign = [-stands] if abs(stands) > 0.5 * step and name != "z_mm" else []
-            for meant in (*wrong_sign, stands - step, stands + step):
+            wrong_sign = [-stands] if abs(stands) > 0.5 * steps[0] and name != "z_mm" else []
+            for meant in (*wrong_sign, *(stands + sign * step for step in steps for sign in (-1.0, 1.0))):
                 changed = values.copy()
                 changed[:, k] = meant * si
                 yield _Slip.of(data, rows, name, _number(stands), _number(meant), **{field: changed})

@@ -383,6 +383,7 @@ def _smallest(problem: Problem, table: Table, j: int, sign: float, wanted: float
 # readings fit by q(s) = min over x of |r + d(s) - J x|^2 + |law + x|^2 / LAW_PRIOR^2: law and sizes of the explanation
 # move along within their bounds. An effect is excluded at a size where q exceeds its least value by what a likelihood
 # ratio test of 95 % asks. Only one size of it is moved at a time, as for the sizes that would have been seen.
+# J stays as it is at the explanation: where the law has to move by 20 %, the size is right to some 15 %.
 
 # Rms change of ln stiffness from which an effect matters; assumed: at 5 % of its stiffness the tip's deflection is off
 # by less than the 10 % to which a cutting force is known.
