@@ -145,6 +145,19 @@ def test_where_nothing_is_missing_the_detectable_sizes_are_named():
     assert weak["detectable"] and 1.0 < weak["rms_percent"] < 10.0
 
 
+@pytest.mark.parametrize("verdict", CASES)
+def test_what_is_not_excluded_is_told_beside_the_verdict_and_changes_none(verdict):
+    told = found(verdict)
+    assert ("neither show nor exclude" in told["text"]) == bool(told["not_excluded"])
+    for one in told["not_excluded"]:
+        assert one["effect"] not in told["plausible"]
+        assert one["rms_percent"] >= 5.0 and 0.0 < one["probability"] < 0.3 and one["would_tell"]
+    if verdict == "unexplained":  # there is no explanation that anything could stand beside
+        assert told["not_excluded"] == []
+    if verdict == "identified":
+        assert "joint_compliance" in {one["effect"] for one in told["not_excluded"]}
+
+
 def test_the_same_data_and_seed_give_the_same_document(monkeypatch):
     data = campaign(*CASES["ambiguous"])[0]
     found("ambiguous")

@@ -210,6 +210,7 @@ def ambiguous(**chances: float) -> SimpleNamespace:
         judgements={"measured": main},
         suspects=(),
         alike=None,
+        unexcluded=(),
     )
 
 

@@ -24,6 +24,7 @@ from toolpath_stiff.updating.inference import (
     _smallest_set,
     _sparing,
     decide,
+    unexcluded,
 )
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
@@ -93,6 +94,10 @@ def test_42_readings_keep_what_they_cannot_tell_apart(name):
 def test_tilted_poses_two_loads_and_a_clock_name_the_rest(name):
     judgement = judged(7, "tilted", name, STRONG)
     assert (judgement.verdict, judgement.plausible) == ("identified", (name,))
+    # A compliance in series with the struts is not excluded beside it; what these readings would show is.
+    told = [one.effect.name for one in unexcluded(judgement)]
+    assert "joint_compliance" in told and len(told) <= 2
+    assert {"weak_strut", "strut_law", "gauge_scale", "thermal_drift"}.isdisjoint(told)
 
 
 def test_the_right_strut_is_named_with_the_right_stiffness():
@@ -107,8 +112,12 @@ def test_what_the_strut_law_mimics_is_not_claimed():
     """A compliance in series with every strut is a change of the law: no verdict but a large detectable size."""
     judgement = judged(7, "tilted", "joint_compliance", STRONG)
     assert judgement.verdict in ("adequate", "ambiguous")
-    if judgement.verdict == "ambiguous":
-        assert "joint_compliance" in judgement.plausible
+    told = {one.effect.name: one for one in unexcluded(judgement)}
+    assert "joint_compliance" in {*judgement.plausible, *told}
+    # Nor is it denied: the size that is hidden lies below the one from which on it is excluded.
+    hidden = campaign(7, "tilted", "joint_compliance", STRONG)[1]["effects"][0]["parameters"]["compliance"]
+    if "joint_compliance" in told:
+        assert told["joint_compliance"].value > hidden * 1e-9
 
 
 def test_a_strut_too_little_weak_to_be_seen_is_not_named():

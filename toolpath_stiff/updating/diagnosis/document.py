@@ -28,7 +28,7 @@ from toolpath_stiff.updating.inference.doubts import SuspectEntry
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.gates import DrawnEntry
-from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Family, averaged_interval
+from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Detectable, Family, Unexcluded, averaged_interval
 from toolpath_stiff.updating.portrait.words import PortraitEntry, SameEntry, alike_entry, portrait_entry
 
 if TYPE_CHECKING:
@@ -283,17 +283,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "by_noise": {name: _in_short(judgement) for name, judgement in diagnosis.judgements.items()},
         "noise": _noise(main),
         "gates": _gates(main),
-        "detectable": [
-            {
-                "effect": one.effect,
-                "parameter": one.parameter.name,
-                "unit": one.parameter.unit,
-                "size": json_number(one.value / one.parameter.si) if one.seen else None,
-                "rms_percent": json_number(100.0 * one.rms),
-                "detectable": one.seen,
-            }
-            for one in diagnosis.detectable
-        ],
+        "detectable": [_detectable(one) for one in diagnosis.detectable],
         "confounding": {
             "effects": list(diagnosis.confounding.names),
             "matrix": [[json_number(x, 3) for x in row] for row in diagnosis.confounding.matrix.tolist()],
@@ -305,21 +295,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "looks_the_same": (
             None if diagnosis.alike is None else alike_entry(diagnosis.explanations[0], diagnosis.alike)
         ),
-        "not_excluded": [
-            {
-                "effect": one.effect.name,
-                "title": one.effect.title,
-                "parameter": one.parameter.name,
-                "unit": one.parameter.unit,
-                "choice": dict(one.candidate.choice),
-                "up_to": json_number(one.value / one.parameter.si, 3),
-                "rms_percent": json_number(100.0 * one.rms, 3),
-                "left_percent": json_number(100.0 * one.left, 2),
-                "probability": json_number(one.probability, 3),
-                "would_tell": would_tell(one),
-            }
-            for one in diagnosis.unexcluded
-        ],
+        "not_excluded": [_not_excluded(one) for one in diagnosis.unexcluded],
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],
@@ -334,6 +310,32 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
         "readings": len(diagnosis.data),
         "loops": certain(diagnosis.loops),
         "command": diagnosis.command,
+    }
+
+
+def _not_excluded(one: Unexcluded) -> NotExcluded:
+    return {
+        "effect": one.effect.name,
+        "title": one.effect.title,
+        "parameter": one.parameter.name,
+        "unit": one.parameter.unit,
+        "choice": dict(one.candidate.choice),
+        "up_to": json_number(one.value / one.parameter.si, 2),
+        "rms_percent": json_number(100.0 * one.rms, 2),
+        "left_percent": json_number(100.0 * one.left, 2),
+        "probability": json_number(one.probability, 2),
+        "would_tell": would_tell(one),
+    }
+
+
+def _detectable(one: Detectable) -> DetectableEntry:
+    return {
+        "effect": one.effect,
+        "parameter": one.parameter.name,
+        "unit": one.parameter.unit,
+        "size": json_number(one.value / one.parameter.si) if one.seen else None,
+        "rms_percent": json_number(100.0 * one.rms),
+        "detectable": one.seen,
     }
 
 

@@ -46,7 +46,7 @@ def up_to(one: Unexcluded) -> str:
     """The size up to which an effect is not excluded, with its unit and what it acts on; a stiffness goes down."""
     chosen = [choice_text(key, value) for key, value in one.candidate.choice if value not in ("", 0)]
     way = "down to" if np.isinf(one.parameter.neutral) else "up to"
-    size = f"{way} {float(f'{one.value / one.parameter.si:.3g}'):g} {one.parameter.unit}"
+    size = f"{way} {float(f'{one.value / one.parameter.si:.2g}'):g} {one.parameter.unit}"
     return ", ".join([size, *chosen])
 
 
