@@ -35,6 +35,7 @@ CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
 FEEDS_OUT = ("G89", "G84", "G74")
 PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
+LEAST_SWEEP = 1e-10  # rad; an arc of less is a whole turn
 CORNER_ANGLE = 1e-6  # rad; a corner of less is none
 SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
 MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
@@ -130,10 +131,29 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
     last = math.atan2(end[1] - center[1], end[0] - center[0])
     sweep = (first - last if clockwise else last - first) % math.tau
     # The modulus of a tiny negative difference is almost a whole turn, and must be one.
-    if sweep < 1e-10:
+    if sweep < LEAST_SWEEP:
         sweep = math.tau
     sweep += math.tau * (turns - 1)
     return -sweep if clockwise else sweep
+
+
+def arc_sweeps(start: FloatArray, end: FloatArray, center: FloatArray, clockwise: BoolArray) -> FloatArray:
+    """(n,) `arc_sweep` of n arcs (n, 2) of one turn, digit for digit.
+
+    Examples
+    --------
+    >>> start, end, center = np.array([[10.0, 0.0]]), np.array([[0.0, 10.0]]), np.zeros((1, 2))
+    >>> np.degrees(arc_sweeps(start, end, center, np.array([True])))
+    array([-270.])
+    """
+    # `math`, as numpy's own arc tangent differs in the last digit between processors.
+    first, last = (
+        np.array(list(map(math.atan2, (point - center)[:, 1].tolist(), (point - center)[:, 0].tolist())))
+        for point in (start, end)
+    )
+    sweep = np.where(clockwise, first - last, last - first) % math.tau
+    sweep[sweep < LEAST_SWEEP] = math.tau
+    return np.asarray(np.where(clockwise, -sweep, sweep))
 
 
 def radii_clearly_agree(start: FloatArray, end: FloatArray, center: FloatArray, inch: bool) -> BoolArray:

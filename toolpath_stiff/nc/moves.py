@@ -6,6 +6,7 @@ This is what the reader hands on: geometry with its line, feed and tool; no mach
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -240,11 +241,37 @@ class Arc:
 
 
 @dataclass(frozen=True)
-class MovesInMm:
-    """Columns over n moves, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone).
+class Arcs:
+    """Columns over m arcs of some moves: their rows, ascending; the rest as of `Arc`."""
 
-    `arcs` are the arcs in order, `arc_rows` their rows.
-    """
+    rows: IntArray
+    center: FloatArray
+    normal: FloatArray
+    sweep: FloatArray
+
+    @staticmethod
+    def of(arcs: Mapping[int, Arc]) -> Arcs:
+        """Of arcs by their rows."""
+        import numpy as np
+
+        return Arcs(
+            rows=np.array(list(arcs), dtype=np.int64),
+            center=np.array([arc.center for arc in arcs.values()], dtype=float).reshape(-1, 3),
+            normal=np.array([arc.normal for arc in arcs.values()], dtype=float).reshape(-1, 3),
+            sweep=np.array([arc.sweep for arc in arcs.values()], dtype=float),
+        )
+
+    def by_row(self) -> dict[int, Arc]:
+        """One by one."""
+        columns = (self.rows.tolist(), self.center.tolist(), self.normal.tolist(), self.sweep.tolist())
+        return {
+            row: Arc((x, y, z), (i, j, k), sweep) for row, (x, y, z), (i, j, k), sweep in zip(*columns, strict=True)
+        }
+
+
+@dataclass(frozen=True)
+class MovesInMm:
+    """Columns over n moves, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone)."""
 
     line: IntArray
     motion: IntArray
@@ -255,8 +282,7 @@ class MovesInMm:
     tool: IntArray
     tool_length: FloatArray
     from_machine: BoolArray
-    arc_rows: list[int]
-    arcs: list[Arc]
+    arcs: Arcs
 
     def __len__(self) -> int:
         return len(self.line)
@@ -357,8 +383,7 @@ class Recorder:
             motion=np.array(self.motion, dtype=np.int64),
             start=np.array(self.start, dtype=float).reshape(n, 6),
             end=np.array(self.end, dtype=float).reshape(n, 6),
-            arc_rows=[row for row, arc in enumerate(self.arc) if arc is not None],
-            arcs=[arc for arc in self.arc if arc is not None],
+            arcs=Arcs.of({row: arc for row, arc in enumerate(self.arc) if arc is not None}),
             feed=np.array(self.feed, dtype=float),
             dwell=np.array(self.dwell, dtype=float),
             tool=np.array(self.tool, dtype=np.int64),
@@ -405,16 +430,16 @@ def _copy(part: MovesInMm, into: Moves) -> None:
     for mm, si in ((part.start, into.start), (part.end, into.end)):
         si[:, :3] = m_from_mm(mm[:, :3])
         si[:, 3:] = rad_from_deg(mm[:, 3:])
-    if part.arcs:
-        rows = np.array(part.arc_rows)
-        into.arc_sweep[rows] = [arc.sweep for arc in part.arcs]
-        into.arc_center[rows] = m_from_mm(np.array([arc.center for arc in part.arcs]))
-        into.arc_normal[rows] = [arc.normal for arc in part.arcs]
+    rows = part.arcs.rows
+    into.arc_sweep[rows] = part.arcs.sweep
+    into.arc_center[rows] = m_from_mm(part.arcs.center)
+    into.arc_normal[rows] = part.arcs.normal
     # The feed of a move of the rotary axes alone is in degrees per minute.
-    rotary = (into.start[:, :3] == into.end[:, :3]).all(axis=1)
-    rotary[part.arc_rows] = False
-    speed = np.where(rotary, rad_per_s_from_deg_per_min(part.feed), m_per_s_from_mm_per_min(part.feed))
-    into.feed[:] = np.where(part.motion == RAPID, math.nan, speed)
+    rotary = np.logical_and.reduce([into.start[:, axis] == into.end[:, axis] for axis in range(3)])
+    rotary[rows] = False
+    into.feed[:] = m_per_s_from_mm_per_min(part.feed)
+    into.feed[rotary] = rad_per_s_from_deg_per_min(part.feed[rotary])
+    into.feed[part.motion == RAPID] = math.nan
     into.line[:], into.motion[:], into.dwell[:] = part.line, part.motion, part.dwell
     into.tool[:], into.tool_length[:] = part.tool, m_from_mm(part.tool_length)
     into.from_machine[:] = part.from_machine
