@@ -240,7 +240,7 @@ def sample_moves(
 
 def _turn(moves: Moves) -> FloatArray:
     """(n,) rad, the largest turn of a rotary axis in each move."""
-    return np.asarray(np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0))
+    return np.asarray(np.maximum.reduce([np.abs(moves.end[:, axis] - moves.start[:, axis]) for axis in (3, 4, 5)]))
 
 
 def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> FloatArray:
@@ -288,19 +288,23 @@ def _sample_block(
 ) -> None:
     """Samples of some moves, into their rows. `columns` holds what is known of each move."""
     move = np.repeat(np.arange(len(moves)), counts)
-    first = np.cumsum(counts) - counts
-    u = (np.arange(len(move)) - first[move]) / columns["pieces"][move]
+    last = np.cumsum(counts) - 1
+    u = (np.arange(len(move)) - np.repeat(last + 1 - counts, counts)) / np.repeat(columns["pieces"], counts)
     into.position[:], into.tangent[:] = points_along(moves, move, u)
-    programmed = moves.start[move, 3:] + u[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
-    is_end = np.arange(len(move)) == (first + counts - 1)[move]
-    programmed[is_end] = moves.end[:, 3:]
+    first, turned = moves.start[:, 3:], moves.end[:, 3:] - moves.start[:, 3:]
+    programmed = np.repeat(first, counts, axis=0)
+    if turned.any():
+        programmed += u[:, None] * np.repeat(turned, counts, axis=0)
+        programmed[last] = moves.end[:, 3:]
     into.abc[:] = place_orientations(programmed, origin)
     into.move[:] = move + first_move
     for name in ("line", "motion", "tool", "tool_length", "feed"):
-        getattr(into, name)[:] = getattr(moves, name)[move]
-    into.s[:] = columns["length_before"][move] + u * columns["length"][move]
-    into.t[:] = columns["time_before"][move] + u * columns["duration"][move]
-    into.weight[:] = np.where((u == 0.0) | is_end, 0.5, 1.0) * columns["piece"][move]
+        getattr(into, name)[:] = np.repeat(getattr(moves, name), counts)
+    into.s[:] = np.repeat(columns["length_before"], counts) + u * np.repeat(columns["length"], counts)
+    into.t[:] = np.repeat(columns["time_before"], counts) + u * np.repeat(columns["duration"], counts)
+    into.weight[:] = np.repeat(columns["piece"], counts)
+    into.weight[u == 0.0] *= 0.5
+    into.weight[last] *= 0.5
 
 
 def _fastest_part(moves: Moves) -> FloatArray:

@@ -282,17 +282,22 @@ def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArra
     chord = end - start
     length = np.linalg.norm(chord, axis=1)
     direction = chord / np.where(length > 0.0, length, 1.0)[:, None]
-    position = start[move] + u[:, None] * chord[move]
-    tangent = direction[move]
+    tangent = direction.take(move, axis=0)
+    position = start.take(move, axis=0)  # of most samples in a program of short moves: they are ends
+    last = np.flatnonzero(u == 1.0)
+    position[last] = end[move[last]]
+    inner = np.flatnonzero((u != 0.0) & (u != 1.0))
+    of = move[inner]
+    position[inner] += u[inner, None] * chord[of]
     arcs = np.flatnonzero(moves.arc_sweep != 0.0)
     if len(arcs):
         frame = arc_frame(moves, arcs)
         which = np.full(len(moves), -1)
         which[arcs] = np.arange(len(arcs))
         rows = np.flatnonzero(moves.arc_sweep[move] != 0.0)
-        position[rows], tangent[rows] = _along_arcs(frame, moves.arc_sweep[arcs], which[move[rows]], u[rows])
-    position[u == 0.0] = start[move[u == 0.0]]
-    position[u == 1.0] = end[move[u == 1.0]]
+        along, tangent[rows] = _along_arcs(frame, moves.arc_sweep[arcs], which[move[rows]], u[rows])
+        between = (u[rows] != 0.0) & (u[rows] != 1.0)
+        position[rows[between]] = along[between]
     return position, tangent
 
 
