@@ -18,7 +18,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
-from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves
+from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves, held_once
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
 
@@ -235,7 +235,7 @@ def sample_moves(
         some = {name: column[block] for name, column in columns.items()}
         _sample_block(moves.take(block), counts[block], some, first_move, origin, samples.take(rows))
         first_move, first_sample = end, rows.stop
-    return samples
+    return replace(samples, tool=held_once(samples.tool), tool_length=held_once(samples.tool_length))
 
 
 def _turn(moves: Moves) -> FloatArray:
@@ -271,7 +271,7 @@ def _empty_samples(n: int) -> Samples:
         s=np.empty(n),
         t=np.empty(n),
         position=np.empty((n, 3)),
-        abc=np.empty((n, 3)),
+        abc=np.zeros((n, 3)),
         tangent=np.empty((n, 3)),
         weight=np.empty(n),
         feed=np.empty(n),
@@ -296,7 +296,9 @@ def _sample_block(
     if turned.any():
         programmed += u[:, None] * np.repeat(turned, counts, axis=0)
         programmed[last] = moves.end[:, 3:]
-    into.abc[:] = place_orientations(programmed, origin)
+    angles = place_orientations(programmed, origin)
+    if angles.any():  # pages of zeros that nobody writes to take no memory
+        into.abc[:] = angles
     into.move[:] = move + first_move
     for name in ("line", "motion", "tool", "tool_length", "feed"):
         getattr(into, name)[:] = np.repeat(getattr(moves, name), counts)

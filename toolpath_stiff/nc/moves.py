@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from toolpath_stiff.units import (
@@ -410,17 +410,25 @@ def _joined(parts: list[MovesInMm]) -> Moves:
         arc_center=np.zeros((n, 3)),
         arc_normal=np.zeros((n, 3)),
         feed=np.empty(n),
-        dwell=np.empty(n),
+        dwell=np.zeros(n),
         tool=np.empty(n, dtype=np.int64),
         tool_length=np.empty(n),
-        from_machine=np.empty((n, 2), dtype=bool),
+        from_machine=np.zeros((n, 2), dtype=bool),
     )
     first = 0
     while parts:
         part = parts.pop()
         _copy(part, moves.take(slice(first, first + len(part))))
         first += len(part)
-    return moves
+    return replace(moves, tool=held_once(moves.tool), tool_length=held_once(moves.tool_length))
+
+
+def held_once(column: NDArray[Any]) -> NDArray[Any]:
+    """A column (n,); of one value, nan counts as one, a read-only view of that: most programs have one tool."""
+    import numpy as np
+
+    alike = len(column) > 0 and np.array_equal(column, np.broadcast_to(column[0], column.shape), equal_nan=True)
+    return np.broadcast_to(column[0], column.shape) if alike else column
 
 
 def _copy(part: MovesInMm, into: Moves) -> None:
@@ -440,6 +448,8 @@ def _copy(part: MovesInMm, into: Moves) -> None:
     into.feed[:] = m_per_s_from_mm_per_min(part.feed)
     into.feed[rotary] = rad_per_s_from_deg_per_min(part.feed[rotary])
     into.feed[part.motion == RAPID] = math.nan
-    into.line[:], into.motion[:], into.dwell[:] = part.line, part.motion, part.dwell
+    into.line[:], into.motion[:] = part.line, part.motion
     into.tool[:], into.tool_length[:] = part.tool, m_from_mm(part.tool_length)
-    into.from_machine[:] = part.from_machine
+    for given, zeros in ((part.dwell, into.dwell), (part.from_machine, into.from_machine)):
+        if given.any():  # pages of zeros that nobody writes to take no memory
+            zeros[:] = given

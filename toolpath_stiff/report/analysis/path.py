@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.path import Samples
 
 
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
@@ -70,7 +71,7 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     points, strokes, lines = _coloured_lines(
         analysis, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)), show_plunges
     )
-    middle, span = _frame(mm_from_m(samples.position[samples.cutting]))
+    middle, span = _frame(*cutting_box(samples))
     figure, views, corner = _lay_out(span)
     places = analysis.weakest
     for axes, (across, up, title) in zip(
@@ -171,9 +172,17 @@ def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
     return np.asarray(line)
 
 
-def _frame(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def cutting_box(samples: Samples) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest (3,) of the positions of the cutting samples, mm."""
+    low, high = np.empty(3), np.empty(3)
+    for axis in range(3):  # one by one, as a copy of all positions is a tenth of what a long path takes
+        along = samples.position[samples.cutting, axis]
+        low[axis], high[axis] = mm_from_m(float(along.min())), mm_from_m(float(along.max()))
+    return low, high
+
+
+def _frame(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Middle and padded span of the views in mm, axis by axis."""
-    low, high = points.min(axis=0), points.max(axis=0)
     span = (high - low) * 1.12
     return (low + high) / 2.0, np.maximum(span, max(THINNEST * float(span.max()), 1.0))
 
