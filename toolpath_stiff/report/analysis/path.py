@@ -155,7 +155,7 @@ def _thinned(points: FloatArray, strokes: Sequence[tuple[IntArray, Any]], axes: 
     drawn = np.concatenate([rows for rows, _ in strokes[::-1]])
     shown = np.zeros(len(between), dtype=bool)
     shown[drawn[np.unique(between[drawn], return_index=True)[1]]] = True
-    return [(rows[shown[rows]], colour) for rows, colour in strokes]
+    return [(kept, colour) for rows, colour in strokes if len(kept := rows[shown[rows]])]
 
 
 def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
