@@ -129,11 +129,16 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
     """
     first = math.atan2(start[1] - center[1], start[0] - center[0])
     last = math.atan2(end[1] - center[1], end[0] - center[0])
+    sweep = turn_between(first, last, clockwise)
+    return sweep + math.copysign(math.tau * (turns - 1), sweep)
+
+
+def turn_between(first: float, last: float, clockwise: bool) -> float:
+    """Signed turn in rad from one polar angle to another, above 0 and up to a whole one in size."""
     sweep = (first - last if clockwise else last - first) % math.tau
     # The modulus of a tiny negative difference is almost a whole turn, and must be one.
     if sweep < LEAST_SWEEP:
         sweep = math.tau
-    sweep += math.tau * (turns - 1)
     return -sweep if clockwise else sweep
 
 
@@ -148,12 +153,9 @@ def arc_sweeps(start: FloatArray, end: FloatArray, center: FloatArray, clockwise
     """
     # `math`, as numpy's own arc tangent differs in the last digit between processors.
     first, last = (
-        np.array(list(map(math.atan2, (point - center)[:, 1].tolist(), (point - center)[:, 0].tolist())))
-        for point in (start, end)
+        map(math.atan2, (point - center)[:, 1].tolist(), (point - center)[:, 0].tolist()) for point in (start, end)
     )
-    sweep = np.where(clockwise, first - last, last - first) % math.tau
-    sweep[sweep < LEAST_SWEEP] = math.tau
-    return np.asarray(np.where(clockwise, -sweep, sweep))
+    return np.array(list(map(turn_between, first, last, clockwise.tolist())), dtype=float)
 
 
 def radii_clearly_agree(start: FloatArray, end: FloatArray, center: FloatArray, inch: bool) -> BoolArray:
