@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zlib
 from pathlib import Path
 
 import pytest
@@ -33,9 +34,8 @@ def test_a_run_leaves_its_own_files_alone_and_the_hashes_of_each(tmp_path):
     assert run(out, "a.csv", "b.json") == [out / "a.csv", out / "b.json"]
     assert set(tree(out)) == {"a.csv", "b.json", MANIFEST}
     recorded = json.loads((out / MANIFEST).read_text())
-    assert recorded["sha256"] == {
-        name: hashlib.sha256((out / name).read_bytes()).hexdigest() for name in ("a.csv", "b.json")
-    }
+    contents = {name: (out / name).read_bytes() for name in ("a.csv", "b.json")}
+    assert recorded["checksums"] == {name: f"{zlib.crc32(it):08x}-{len(it)}" for name, it in contents.items()}
     assert set(tree(tmp_path)) == {f"deep/out/{name}" for name in tree(out)}  # nothing temporary is left
 
 
@@ -57,6 +57,16 @@ def test_a_file_of_that_name_that_the_tool_did_not_write_is_refused_before_anyth
     assert tree(tmp_path) == before
 
 
+def test_a_record_of_an_earlier_version_counts_as_well(tmp_path):
+    for name in ("a", "kept", "old"):
+        (tmp_path / name).write_text(name)
+    hashes = {name: hashlib.sha256(name.encode()).hexdigest() for name in ("a", "kept", "old")}
+    (tmp_path / MANIFEST).write_text(json.dumps({"written_by": "tps x", "results_of": [], "sha256": hashes}))
+    (tmp_path / "kept").write_text("Kept")
+    run(tmp_path, "a", "b")
+    assert set(tree(tmp_path)) == {"a", "b", "kept", MANIFEST}
+
+
 def test_a_file_that_was_changed_since_is_the_user_s(tmp_path):
     """Readings filled into plan.csv are not lost to the next plan."""
     run(tmp_path, "plan.csv", "plan.json")
@@ -67,7 +77,7 @@ def test_a_file_that_was_changed_since_is_the_user_s(tmp_path):
     assert tree(tmp_path) == before
     run(tmp_path, "other.json")
     assert set(tree(tmp_path)) == {"plan.csv", "other.json", MANIFEST}
-    assert list(json.loads((tmp_path / MANIFEST).read_text())["sha256"]) == ["other.json"]
+    assert list(json.loads((tmp_path / MANIFEST).read_text())["checksums"]) == ["other.json"]
 
 
 def test_a_symbolic_link_is_not_the_tool_s_even_if_it_leads_to_the_same_bytes(tmp_path):
@@ -106,7 +116,8 @@ def test_results_of_another_file_of_the_same_name_stay(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"written_by": 1}', '{"written_by": "x", "results_of": [], "sha256": 3}', "[" * 100_000]
+    "text",
+    ["", "[]", "{}", '{"written_by": 1}', '{"written_by": "x", "results_of": [], "checksums": 3}', "[" * 100_000],
 )
 def test_a_manifest_that_is_none_is_one_clear_error(tmp_path, text):
     (tmp_path / MANIFEST).write_text(text)
@@ -226,7 +237,7 @@ def test_every_command_names_its_folder_after_its_data_and_keeps_to_the_rules(co
     with all_writes_by_files(shop):
         assert main([*arguments, "--no-plots"]) == 0
     out = shop / folder
-    assert set(json.loads((out / MANIFEST).read_text())["sha256"]) == {p.name for p in out.iterdir()} - {MANIFEST}
+    assert set(json.loads((out / MANIFEST).read_text())["checksums"]) == {p.name for p in out.iterdir()} - {MANIFEST}
     first = tree(out)
     # Another command's files go, a user's own stay, and one in the way is refused.
     other = shop / "other"

@@ -150,14 +150,15 @@ def _by_digits(columns: Columns, decimals: Decimals) -> bytes | None:
     """Rows as `csv_rows` has them; None where a number is infinite or too large, or a word is not plain ASCII."""
     parts = []
     for names, fresh in _runs(columns):
-        some = [columns[name] if fresh is None else columns[name][fresh] for name in names]
+        rows = None if fresh is None else np.flatnonzero(fresh)
+        some = [columns[name] if rows is None else columns[name].take(rows) for name in names]
         part = _joined([_cell(np.asarray(column), decimals[name]) for name, column in zip(names, some, strict=True)])
         if part is None:
             return None
         parts.append(part if fresh is None else part.take(np.cumsum(fresh) - 1, axis=0))
-    rows = np.concatenate(parts, axis=1)
-    rows[:, -1] = ord("\n")
-    return rows.tobytes().replace(b"\0", b"")
+    cells = np.concatenate(parts, axis=1)
+    cells[:, -1] = ord("\n")
+    return cells.tobytes().replace(b"\0", b"")
 
 
 def _runs(columns: Columns) -> Iterator[tuple[list[str], BoolArray | None]]:

@@ -18,7 +18,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
-from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves
+from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves, held_once
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, rad_from_deg
 
@@ -235,12 +235,12 @@ def sample_moves(
         some = {name: column[block] for name, column in columns.items()}
         _sample_block(moves.take(block), counts[block], some, first_move, origin, samples.take(rows))
         first_move, first_sample = end, rows.stop
-    return samples
+    return replace(samples, tool=held_once(samples.tool), tool_length=held_once(samples.tool_length))
 
 
 def _turn(moves: Moves) -> FloatArray:
     """(n,) rad, the largest turn of a rotary axis in each move."""
-    return np.asarray(np.abs(moves.end[:, 3:] - moves.start[:, 3:]).max(axis=1, initial=0.0))
+    return np.asarray(np.maximum.reduce([np.abs(moves.end[:, axis] - moves.start[:, axis]) for axis in (3, 4, 5)]))
 
 
 def _pieces(moves: Moves, length: FloatArray, turn: FloatArray, step: float) -> FloatArray:
@@ -271,7 +271,7 @@ def _empty_samples(n: int) -> Samples:
         s=np.empty(n),
         t=np.empty(n),
         position=np.empty((n, 3)),
-        abc=np.empty((n, 3)),
+        abc=np.zeros((n, 3)),
         tangent=np.empty((n, 3)),
         weight=np.empty(n),
         feed=np.empty(n),
@@ -288,19 +288,25 @@ def _sample_block(
 ) -> None:
     """Samples of some moves, into their rows. `columns` holds what is known of each move."""
     move = np.repeat(np.arange(len(moves)), counts)
-    first = np.cumsum(counts) - counts
-    u = (np.arange(len(move)) - first[move]) / columns["pieces"][move]
+    last = np.cumsum(counts) - 1
+    u = (np.arange(len(move)) - np.repeat(last + 1 - counts, counts)) / np.repeat(columns["pieces"], counts)
     into.position[:], into.tangent[:] = points_along(moves, move, u)
-    programmed = moves.start[move, 3:] + u[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
-    is_end = np.arange(len(move)) == (first + counts - 1)[move]
-    programmed[is_end] = moves.end[:, 3:]
-    into.abc[:] = place_orientations(programmed, origin)
+    first, turned = moves.start[:, 3:], moves.end[:, 3:] - moves.start[:, 3:]
+    programmed = np.repeat(first, counts, axis=0)
+    if turned.any():
+        programmed += u[:, None] * np.repeat(turned, counts, axis=0)
+        programmed[last] = moves.end[:, 3:]
+    angles = place_orientations(programmed, origin)
+    if angles.any():  # pages of zeros that nobody writes to take no memory
+        into.abc[:] = angles
     into.move[:] = move + first_move
     for name in ("line", "motion", "tool", "tool_length", "feed"):
-        getattr(into, name)[:] = getattr(moves, name)[move]
-    into.s[:] = columns["length_before"][move] + u * columns["length"][move]
-    into.t[:] = columns["time_before"][move] + u * columns["duration"][move]
-    into.weight[:] = np.where((u == 0.0) | is_end, 0.5, 1.0) * columns["piece"][move]
+        getattr(into, name)[:] = np.repeat(getattr(moves, name), counts)
+    into.s[:] = np.repeat(columns["length_before"], counts) + u * np.repeat(columns["length"], counts)
+    into.t[:] = np.repeat(columns["time_before"], counts) + u * np.repeat(columns["duration"], counts)
+    into.weight[:] = np.repeat(columns["piece"], counts)
+    into.weight[u == 0.0] *= 0.5
+    into.weight[last] *= 0.5
 
 
 def _fastest_part(moves: Moves) -> FloatArray:

@@ -1,9 +1,9 @@
 """A folder of results: the files of one run, written all or none.
 
-A small manifest (`.tps-files.json`) names the files that a run wrote, with their SHA-256. The next run clears those,
-and nothing else: a file that the tool did not write, or that was changed since, is somebody's own. It stays where the
-run has no file of that name, and where it has one, nothing is written at all. A folder without a manifest holds nothing
-of the tool's.
+A small manifest (`.tps-files.json`) names the files that a run wrote, with their checksums. The next run clears
+those, and nothing else: a file that the tool did not write, or that was changed since, is somebody's own. It stays
+where the run has no file of that name, and where it has one, nothing is written at all. A folder without a manifest
+holds nothing of the tool's.
 
 The new files are written into a folder beside it and flushed to the disk. Then the two folders are exchanged, which is
 one step: whatever stops a run, the folder holds the old files or the new. A folder that cannot be exchanged (it has
@@ -16,6 +16,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -27,6 +28,7 @@ from toolpath_stiff.files import (
     Content,
     beside,
     check_outputs,
+    checksum,
     exchange,
     free_name,
     locked,
@@ -37,6 +39,7 @@ from toolpath_stiff.files import (
 from toolpath_stiff.hints import both_names
 
 MANIFEST = ".tps-files.json"
+SHA256 = re.compile(r"[0-9a-f]{64}")  # what earlier versions recorded
 # In the temporary folder of a run: files that are being written; the same when all are there and nothing is left but
 # to move them to their places; what was moved out of their way.
 NEW, WHOLE, GONE = "new", "whole", "gone"
@@ -55,7 +58,8 @@ class Manifest:
     of
         What the results are of: names, or paths relative to the folder. Empty where the user named the folder.
     files
-        File name -> SHA-256 that it may have. Two of a run that was cut off between its renames: the old or the new.
+        File name -> checksums (`files.checksum`) that it may have; SHA-256 in records of earlier versions. Two of a
+        run that was cut off between its renames: the old or the new.
     """
 
     command: str = ""
@@ -65,7 +69,7 @@ class Manifest:
     def text(self) -> str:
         """As JSON; nothing in it depends on when or by whom it was written. Escaped, as names need not be UTF-8."""
         entries = {name: hashes[0] if len(hashes) == 1 else list(hashes) for name, hashes in self.files.items()}
-        document = {"written_by": f"tps {self.command}", "results_of": list(self.of), "sha256": entries}
+        document = {"written_by": f"tps {self.command}", "results_of": list(self.of), "checksums": entries}
         return json.dumps(document, indent=1) + "\n"
 
 
@@ -203,7 +207,7 @@ def read_manifest(folder: Path) -> Manifest:
         document = json.loads((folder / MANIFEST).read_bytes())
         listed = {
             str(name): tuple(hashes) if isinstance(hashes, list) else (str(hashes),)
-            for name, hashes in document["sha256"].items()
+            for name, hashes in document["checksums" if "checksums" in document else "sha256"].items()
             if Path(name).name == name  # never beyond the folder
         }
         return Manifest(str(document["written_by"]), tuple(map(str, document["results_of"])), listed)
@@ -223,8 +227,13 @@ def _is_ours(folder: Path, name: str, manifest: Manifest) -> bool:
     if path.is_symlink() or not path.is_file():
         return False
     try:
+        known = manifest.files[name]
+        if checksum(path) in known:
+            return True
+        if not any(map(SHA256.fullmatch, known)):
+            return False
         with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest() in manifest.files[name]
+            return hashlib.file_digest(stream, "sha256").hexdigest() in known
     except OSError as error:
         raise FileError(f"cannot read {str(path)!r}: {error.strerror}") from None
 

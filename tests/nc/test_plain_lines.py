@@ -212,7 +212,7 @@ def moved_by_a_rule(*rule):
         (frames, "shifted", lambda program, shift, offset: program + 2.0 * shift + offset + 1.0),
         (frames, "shifted_back", lambda control, shift, offset: control - offset - shift / 2.0),
         (geometry, "center_from_radius", lambda start, end, radius, clockwise: ((start[0] + end[0]) / 2.0, start[1])),
-        (geometry, "arc_sweep", lambda start, end, center, clockwise, turns: 0.25),
+        (geometry, "turn_between", lambda first, last, clockwise: 0.25),
         (points, "INCREMENT_MM", 0.5),
         (modes, "MM_PER_INCH", 20.0),
         (State, "feed_scale", property(lambda state: 3.0)),

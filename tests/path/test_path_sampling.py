@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.moves_factory import make_moves
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.geometry import move_lengths
-from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.moves import RAPID, held_once
 from toolpath_stiff.path import place, place_orientations, sample_moves
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
 
@@ -31,6 +31,14 @@ def test_full_circle_has_the_circumference_and_lies_on_the_circle():
     quarter = sample_moves(moves, step=2 * np.pi * radius / 4).position
     expected = radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [1, 0, 0]])
     np.testing.assert_allclose(quarter, expected, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("column", [[3, 3, 3], [np.nan] * 2, [0.1, np.nan], [1, 2], [7], []])
+def test_a_column_of_one_value_holds_it_once(column):
+    given = np.array(column)
+    held = held_once(given)
+    np.testing.assert_array_equal(held, given)
+    assert (held is not given) == (len(column) > 0 and len({str(value) for value in column}) == 1)
 
 
 def test_clockwise_arc_goes_the_other_way():

@@ -77,6 +77,22 @@ def test_a_very_long_path_keeps_its_shape_and_what_is_red(monkeypatch):
     assert (np.abs(pixels(thinned) - pixels(whole)).max(axis=2) > 0.3).mean() < 2e-4
 
 
+def test_what_lies_upon_another_segment_is_drawn_once_and_the_picture_stays(monkeypatch):
+    there_and_back = [{"end": (0.2 * (i % 2), 0.0, 0.0), "start": (0.2 * (1 - i % 2), 0.0, 0.0)} for i in range(1, 41)]
+    long = make_analysis(there_and_back)
+    whole = path_picture(long)
+    monkeypatch.setattr(path_module, "MOST_LINES", 100)
+    drawn = []
+    monkeypatch.setattr(
+        path_module, "add_strokes", lambda axes, strokes, *_, **__: drawn.append(sum(len(line) for line, _ in strokes))
+    )
+    path_picture(long)
+    assert max(drawn) < len(long.samples) / 5
+    monkeypatch.undo()
+    monkeypatch.setattr(path_module, "MOST_LINES", 100)
+    assert (np.abs(pixels(path_picture(long)) - pixels(whole)).max(axis=2) > 0.3).mean() < 2e-3
+
+
 def test_required_level_and_second_machine_change_the_profile(analysis):
     plain = profile_picture(analysis)
     orange = (0xDE, 0x6B, 0x12)

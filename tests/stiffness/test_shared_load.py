@@ -272,7 +272,6 @@ def test_loads_that_mean_the_softest_direction_mean_it_under_the_load():
     poses = evaluate_poses(model, *place, force=500.0)
     assert soft.stiffness == pytest.approx(poses.softest_stiffness, rel=1e-9)
     across = evaluate(model, *place, axis, load=Load("normal"), force=500.0)
-    assert np.einsum("ni,ni->n", across.direction, axis) == pytest.approx(np.zeros(4), abs=1e-9)
     assert across.substituted.all()
     turns = np.linspace(0.0, np.pi, 360, endpoint=False)
     for i in range(4):
@@ -281,4 +280,4 @@ def test_loads_that_mean_the_softest_direction_mean_it_under_the_load():
         around = np.cos(turns)[:, None] * one + np.sin(turns)[:, None] * two
         same = np.repeat(POSITION[i : i + 1], 360, axis=0), np.repeat(ROTATION[i : i + 1], 360, axis=0)
         tried = 1.0 / core.compliance_along(model, around, *same, force=500.0)
-        assert across.stiffness[i] <= tried.min() * (1.0 + 1e-6)
+        assert tried.min() * (1.0 - 1e-4) <= across.stiffness[i] <= tried.min() * (1.0 + 1e-6)  # and none beyond them

@@ -45,8 +45,6 @@ class PoseStiffness:
     ----------
     stiffness
         (n,) N/m along the load, displacement measured along it; nan where the pose is out of reach.
-    direction
-        (n, 3) unit vectors of the load.
     substituted
         (n,) the asked load direction does not exist there, the softest one stands in.
     strut_lengths
@@ -60,7 +58,6 @@ class PoseStiffness:
     """
 
     stiffness: FloatArray
-    direction: FloatArray
     substituted: BoolArray
     strut_lengths: FloatArray
     extrapolated: BoolArray
@@ -126,7 +123,6 @@ def evaluate(
     route = core.choose_route(model, int(np.count_nonzero(new)))  # by all poses, not by those of a block
     result = PoseStiffness(
         stiffness=np.empty(n),
-        direction=np.empty((n, 3)),
         substituted=np.zeros(n, dtype=bool),
         strut_lengths=np.empty((n, 6)),
         extrapolated=np.zeros(n, dtype=bool),
@@ -199,12 +195,11 @@ def _evaluate_fast(
         )
         stand, sure = gauge_of(machine).reach(there, lengths, determinant, turn, tool)
         extrapolated = machine.strut_law.room(lengths).min(axis=0) < 0.0
-        for into, (direction, known), along in zip(samples, directed, compliance, strict=True):
+        for into, (_, known), along in zip(samples, directed, compliance, strict=True):
             at = _part(into, some)
             certain = sure & good & known[some] & (along > 0.0) & (along < np.inf)
             along[~(stand.reachable & known[some])] = np.nan
             result.stiffness[at] = 1.0 / along
-            result.direction[at] = direction[some]
             result.strut_lengths[at] = lengths.T
             result.extrapolated[at] = extrapolated
             result.margin[at], result.limit[at], result.limit_value[at] = stand.margin, stand.limit, stand.value
@@ -270,7 +265,6 @@ def _evaluate_rows(
     stiffness = 1.0 / along
     _refuse_no_number(machine, tip, within & ~((stiffness > 0.0) & (stiffness < np.inf)))
     result.stiffness[rows] = stiffness
-    result.direction[rows] = direction
     result.substituted[rows] = substituted
     result.strut_lengths[rows] = struts.lengths
     result.extrapolated[rows] = machine.strut_law.extrapolates(struts.lengths).any(axis=1)

@@ -35,6 +35,7 @@ CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
 FEEDS_OUT = ("G89", "G84", "G74")
 PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
+LEAST_SWEEP = 1e-10  # rad; an arc of less is a whole turn
 CORNER_ANGLE = 1e-6  # rad; a corner of less is none
 SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
 MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
@@ -128,12 +129,33 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
     """
     first = math.atan2(start[1] - center[1], start[0] - center[0])
     last = math.atan2(end[1] - center[1], end[0] - center[0])
+    sweep = turn_between(first, last, clockwise)
+    return sweep + math.copysign(math.tau * (turns - 1), sweep)
+
+
+def turn_between(first: float, last: float, clockwise: bool) -> float:
+    """Signed turn in rad from one polar angle to another, above 0 and up to a whole one in size."""
     sweep = (first - last if clockwise else last - first) % math.tau
     # The modulus of a tiny negative difference is almost a whole turn, and must be one.
-    if sweep < 1e-10:
+    if sweep < LEAST_SWEEP:
         sweep = math.tau
-    sweep += math.tau * (turns - 1)
     return -sweep if clockwise else sweep
+
+
+def arc_sweeps(start: FloatArray, end: FloatArray, center: FloatArray, clockwise: BoolArray) -> FloatArray:
+    """(n,) `arc_sweep` of n arcs (n, 2) of one turn, digit for digit.
+
+    Examples
+    --------
+    >>> start, end, center = np.array([[10.0, 0.0]]), np.array([[0.0, 10.0]]), np.zeros((1, 2))
+    >>> np.degrees(arc_sweeps(start, end, center, np.array([True])))
+    array([-270.])
+    """
+    # `math`, as numpy's own arc tangent differs in the last digit between processors.
+    first, last = (
+        map(math.atan2, (point - center)[:, 1].tolist(), (point - center)[:, 0].tolist()) for point in (start, end)
+    )
+    return np.array(list(map(turn_between, first, last, clockwise.tolist())), dtype=float)
 
 
 def radii_clearly_agree(start: FloatArray, end: FloatArray, center: FloatArray, inch: bool) -> BoolArray:
@@ -262,17 +284,22 @@ def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArra
     chord = end - start
     length = np.linalg.norm(chord, axis=1)
     direction = chord / np.where(length > 0.0, length, 1.0)[:, None]
-    position = start[move] + u[:, None] * chord[move]
-    tangent = direction[move]
+    tangent = direction.take(move, axis=0)
+    position = start.take(move, axis=0)  # of most samples in a program of short moves: they are ends
+    last = np.flatnonzero(u == 1.0)
+    position[last] = end[move[last]]
+    inner = np.flatnonzero((u != 0.0) & (u != 1.0))
+    of = move[inner]
+    position[inner] += u[inner, None] * chord[of]
     arcs = np.flatnonzero(moves.arc_sweep != 0.0)
     if len(arcs):
         frame = arc_frame(moves, arcs)
         which = np.full(len(moves), -1)
         which[arcs] = np.arange(len(arcs))
         rows = np.flatnonzero(moves.arc_sweep[move] != 0.0)
-        position[rows], tangent[rows] = _along_arcs(frame, moves.arc_sweep[arcs], which[move[rows]], u[rows])
-    position[u == 0.0] = start[move[u == 0.0]]
-    position[u == 1.0] = end[move[u == 1.0]]
+        along, tangent[rows] = _along_arcs(frame, moves.arc_sweep[arcs], which[move[rows]], u[rows])
+        between = (u[rows] != 0.0) & (u[rows] != 1.0)
+        position[rows[between]] = along[between]
     return position, tangent
 
 

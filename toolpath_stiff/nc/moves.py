@@ -6,7 +6,8 @@ This is what the reader hands on: geometry with its line, feed and tool; no mach
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from toolpath_stiff.units import (
@@ -240,11 +241,37 @@ class Arc:
 
 
 @dataclass(frozen=True)
-class MovesInMm:
-    """Columns over n moves, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone).
+class Arcs:
+    """Columns over m arcs of some moves: their rows, ascending; the rest as of `Arc`."""
 
-    `arcs` are the arcs in order, `arc_rows` their rows.
-    """
+    rows: IntArray
+    center: FloatArray
+    normal: FloatArray
+    sweep: FloatArray
+
+    @staticmethod
+    def of(arcs: Mapping[int, Arc]) -> Arcs:
+        """Of arcs by their rows."""
+        import numpy as np
+
+        return Arcs(
+            rows=np.array(list(arcs), dtype=np.int64),
+            center=np.array([arc.center for arc in arcs.values()], dtype=float).reshape(-1, 3),
+            normal=np.array([arc.normal for arc in arcs.values()], dtype=float).reshape(-1, 3),
+            sweep=np.array([arc.sweep for arc in arcs.values()], dtype=float),
+        )
+
+    def by_row(self) -> dict[int, Arc]:
+        """One by one."""
+        columns = (self.rows.tolist(), self.center.tolist(), self.normal.tolist(), self.sweep.tolist())
+        return {
+            row: Arc((x, y, z), (i, j, k), sweep) for row, (x, y, z), (i, j, k), sweep in zip(*columns, strict=True)
+        }
+
+
+@dataclass(frozen=True)
+class MovesInMm:
+    """Columns over n moves, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone)."""
 
     line: IntArray
     motion: IntArray
@@ -255,8 +282,7 @@ class MovesInMm:
     tool: IntArray
     tool_length: FloatArray
     from_machine: BoolArray
-    arc_rows: list[int]
-    arcs: list[Arc]
+    arcs: Arcs
 
     def __len__(self) -> int:
         return len(self.line)
@@ -357,8 +383,7 @@ class Recorder:
             motion=np.array(self.motion, dtype=np.int64),
             start=np.array(self.start, dtype=float).reshape(n, 6),
             end=np.array(self.end, dtype=float).reshape(n, 6),
-            arc_rows=[row for row, arc in enumerate(self.arc) if arc is not None],
-            arcs=[arc for arc in self.arc if arc is not None],
+            arcs=Arcs.of({row: arc for row, arc in enumerate(self.arc) if arc is not None}),
             feed=np.array(self.feed, dtype=float),
             dwell=np.array(self.dwell, dtype=float),
             tool=np.array(self.tool, dtype=np.int64),
@@ -385,17 +410,25 @@ def _joined(parts: list[MovesInMm]) -> Moves:
         arc_center=np.zeros((n, 3)),
         arc_normal=np.zeros((n, 3)),
         feed=np.empty(n),
-        dwell=np.empty(n),
+        dwell=np.zeros(n),
         tool=np.empty(n, dtype=np.int64),
         tool_length=np.empty(n),
-        from_machine=np.empty((n, 2), dtype=bool),
+        from_machine=np.zeros((n, 2), dtype=bool),
     )
     first = 0
     while parts:
         part = parts.pop()
         _copy(part, moves.take(slice(first, first + len(part))))
         first += len(part)
-    return moves
+    return replace(moves, tool=held_once(moves.tool), tool_length=held_once(moves.tool_length))
+
+
+def held_once(column: NDArray[Any]) -> NDArray[Any]:
+    """A column (n,); of one value, nan counts as one, a read-only view of that: most programs have one tool."""
+    import numpy as np
+
+    alike = len(column) > 0 and np.array_equal(column, np.broadcast_to(column[0], column.shape), equal_nan=True)
+    return np.broadcast_to(column[0], column.shape) if alike else column
 
 
 def _copy(part: MovesInMm, into: Moves) -> None:
@@ -405,16 +438,18 @@ def _copy(part: MovesInMm, into: Moves) -> None:
     for mm, si in ((part.start, into.start), (part.end, into.end)):
         si[:, :3] = m_from_mm(mm[:, :3])
         si[:, 3:] = rad_from_deg(mm[:, 3:])
-    if part.arcs:
-        rows = np.array(part.arc_rows)
-        into.arc_sweep[rows] = [arc.sweep for arc in part.arcs]
-        into.arc_center[rows] = m_from_mm(np.array([arc.center for arc in part.arcs]))
-        into.arc_normal[rows] = [arc.normal for arc in part.arcs]
+    rows = part.arcs.rows
+    into.arc_sweep[rows] = part.arcs.sweep
+    into.arc_center[rows] = m_from_mm(part.arcs.center)
+    into.arc_normal[rows] = part.arcs.normal
     # The feed of a move of the rotary axes alone is in degrees per minute.
-    rotary = (into.start[:, :3] == into.end[:, :3]).all(axis=1)
-    rotary[part.arc_rows] = False
-    speed = np.where(rotary, rad_per_s_from_deg_per_min(part.feed), m_per_s_from_mm_per_min(part.feed))
-    into.feed[:] = np.where(part.motion == RAPID, math.nan, speed)
-    into.line[:], into.motion[:], into.dwell[:] = part.line, part.motion, part.dwell
+    rotary = np.logical_and.reduce([into.start[:, axis] == into.end[:, axis] for axis in range(3)])
+    rotary[rows] = False
+    into.feed[:] = m_per_s_from_mm_per_min(part.feed)
+    into.feed[rotary] = rad_per_s_from_deg_per_min(part.feed[rotary])
+    into.feed[part.motion == RAPID] = math.nan
+    into.line[:], into.motion[:] = part.line, part.motion
     into.tool[:], into.tool_length[:] = part.tool, m_from_mm(part.tool_length)
-    into.from_machine[:] = part.from_machine
+    for given, zeros in ((part.dwell, into.dwell), (part.from_machine, into.from_machine)):
+        if given.any():  # pages of zeros that nobody writes to take no memory
+            zeros[:] = given

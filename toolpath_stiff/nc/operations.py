@@ -76,8 +76,9 @@ def headings(lines: Sequence[str]) -> list[Heading]:
     found: list[Heading] = []
     block: list[str] = []
     first = last = -1
-    for number, text in enumerate(lines, 1):
-        if ("(" not in text and ";" not in text) or not BEGINS.match(text):
+    commented = [(number, text) for number, text in enumerate(lines, 1) if "(" in text or ";" in text]
+    for number, text in commented:
+        if not BEGINS.match(text):
             continue
         code, comment = split_comments(text)
         if not NO_WORDS.fullmatch(code):

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ from toolpath_stiff.nc.codes.points import (
     watches_points,
 )
 from toolpath_stiff.nc.codes.registry import CODES
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, MovesInMm, Recorder
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arcs, MovesInMm, Recorder
 from toolpath_stiff.nc.plain_words import (
     BARE,
     FIRST_F,
@@ -196,11 +197,11 @@ class _Lines:
         return self._leave(control if moving[done].any() else None)
 
     def _record(
-        self, at: int, start: FloatArray, end: FloatArray, found: dict[int, Arc], moving: BoolArray, arc: BoolArray
+        self, at: int, start: FloatArray, end: FloatArray, found: Arcs, moving: BoolArray, arc: BoolArray
     ) -> None:
         """Hand over the moves of the lines that are done, those that go anywhere."""
         state = self.state
-        kept = moving & ((start != end).any(axis=1) | arc)
+        kept = moving & (np.logical_or.reduce([start[:, axis] != end[:, axis] for axis in range(6)]) | arc)
         feed = self._feeds(start, end, found, moving)
         rows = np.flatnonzero(kept)
         motion = np.where(arc, ARC, np.where(self.mode[: self.end] == MODES["G1"], FEED, RAPID))[rows]
@@ -211,8 +212,7 @@ class _Lines:
                 motion=motion,
                 start=start[rows],
                 end=end[rows],
-                arc_rows=[int(place[row]) for row in found],
-                arcs=list(found.values()),
+                arcs=replace(found, rows=place[found.rows]),
                 feed=np.where(motion == RAPID, math.nan, feed[rows]),
                 dwell=np.zeros(len(rows)),
                 tool=np.full(len(rows), state.tool),
@@ -323,10 +323,10 @@ class _Lines:
         still = np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start))
         return start, np.where(still, start, end)
 
-    def _arcs(self, rows: IntArray, control: FloatArray) -> dict[int, Arc]:
+    def _arcs(self, rows: IntArray, control: FloatArray) -> Arcs:
         """The arcs of some lines; the first that is not right ends the run."""
         if not len(rows):
-            return {}
+            return Arcs.of({})
         state = self.state
         first, second, normal = geometry.PLANES[state.plane]
         letters = (
@@ -351,8 +351,7 @@ class _Lines:
                 [frames.axis_to_setup(axis, frames.axis_to_control(axis, found[:, axis])) for axis in range(3)], axis=1
             )
         vector = frames.turn_direction(geometry.normal_of(state.plane))
-        done = zip(rows.tolist(), centers.tolist(), sweeps.tolist(), strict=False)
-        return {row: Arc((x, y, z), vector, sweep) for row, (x, y, z), sweep in done}
+        return Arcs(rows[: len(sweeps)], centers, np.tile(vector, (len(sweeps), 1)), sweeps)
 
     def _all_arcs(self, rows: IntArray, start: FloatArray, words: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(m, 2) centres and (m,) sweeps of the first m of some lines; what is wrong with the next one ends the run.
@@ -364,9 +363,7 @@ class _Lines:
         end = np.stack([x, y], axis=1) * scale
         end = np.where(np.isnan(end), start, end if state.absolute else start + end)
         center = start + np.stack([np.where(np.isnan(i), 0.0, i), np.where(np.isnan(j), 0.0, j)], axis=1) * scale
-        clockwise = (self.mode[rows] == CLOCKWISE).tolist()
-        arcs = zip(start.tolist(), end.tolist(), center.tolist(), clockwise, strict=True)
-        sweep = np.array([geometry.arc_sweep(here, there, middle, way, 1) for here, there, middle, way in arcs])
+        sweep = geometry.arc_sweeps(start, end, center, self.mode[rows] == CLOCKWISE)
         about = ~(np.isnan(i) & np.isnan(j)) & np.isnan(radius) & ~(np.abs(off_plane) > 0.0)
         clear = about & geometry.radii_clearly_agree(start, end, center, state.inch)
         for row in np.flatnonzero(~clear).tolist():
@@ -411,16 +408,17 @@ class _Lines:
 
     # -- feeds -----------------------------------------------------------------------------------------------------
 
-    def _feeds(self, start: FloatArray, end: FloatArray, found: dict[int, Arc], moving: BoolArray) -> FloatArray:
+    def _feeds(self, start: FloatArray, end: FloatArray, found: Arcs, moving: BoolArray) -> FloatArray:
         """Feed of each line's move (`modes.feed_of_move`); rapids are none."""
         feed: FloatArray = self.feed[: self.end].copy()
         if self.state.feed_mode == "G94":
-            standing = (start[:, :3] == end[:, :3]).all(axis=1)
-            standing[list(found)] = False
+            standing = np.logical_and.reduce([start[:, axis] == end[:, axis] for axis in range(3)])
+            standing[found.rows] = False
             feed[standing] = rotary_feed(self.state, feed[standing])
             return feed
+        arcs = found.by_row()
         for row in np.flatnonzero(moving & (self.mode[: self.end] != MODES["G0"])).tolist():
-            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), found.get(row))
+            feed[row] *= length_of_move(start[row].tolist(), end[row].tolist(), arcs.get(row))
         return feed
 
     def _leave(self, control: FloatArray | None) -> int:
@@ -500,8 +498,7 @@ def drill(state: State, hole: slice, line: int, places: FloatArray) -> None:
             motion=np.tile(np.array(recorder.motion[hole], dtype=np.int64), count),
             start=starts.reshape(-1, 6),
             end=ends.reshape(-1, 6),
-            arc_rows=[],
-            arcs=[],
+            arcs=Arcs.of({}),
             feed=repeated(recorder.feed),
             dwell=repeated(recorder.dwell),
             tool=np.full(count * rows, state.tool),

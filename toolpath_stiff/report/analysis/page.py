@@ -33,7 +33,7 @@ from toolpath_stiff.report import (
     shortened,
     span_of,
 )
-from toolpath_stiff.report.analysis.path import legend_extend, scale_limits
+from toolpath_stiff.report.analysis.path import cutting_box, legend_extend, scale_limits
 from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.report.pages import bullets, markup, render_pieces, table
 from toolpath_stiff.report.profile import extremes_by_column, profile_curve
@@ -303,7 +303,6 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
     samples, at = analysis.samples.take(rows), analysis.at
     points = mm_from_m(samples.position)
     frame = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
-    box = mm_from_m(analysis.samples.position[analysis.samples.cutting])
     stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(at.stiffness[rows]))
     margin, margin_range = _fractions(at.margin[rows])
     kind = samples.motion + OUT_OF_REACH * ~at.reachable[rows] + PLUNGE * analysis.set_aside[rows]
@@ -315,7 +314,7 @@ def page_data(analysis: Analysis, required: float | None, other: Analysis | None
         "samples": len(analysis.samples),
         "motions": MOTION_NAMES,
         "frame": frame.tolist(),
-        "box": np.stack([box.min(axis=0), box.max(axis=0)], axis=1).tolist(),
+        "box": np.stack(cutting_box(analysis.samples), axis=1).tolist(),
         "position": _base64(_quantised(points, frame[:, 0], frame[:, 1], 65535)),
         "stiffness": stiffness,
         "stiffness_range": stiffness_range,

@@ -35,16 +35,20 @@ from toolpath_stiff.report.painting import (
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from toolpath_stiff.analysis import Analysis
+    from toolpath_stiff.path import Samples
 
 
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views
 MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
+MOST_LINES = 100_000  # segments drawn in every view; beyond, those that lie upon others are left out
 UNREACHABLE, PLUNGE = -1, CLASSES  # without a colour of the scale; a lower class wins where segments are joined
 STROKE = 1.5  # points
 TITLE = 6.0  # points above a view
@@ -64,10 +68,10 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     from matplotlib import colormaps
 
     samples, limits = analysis.samples, scale_limits(analysis, show_plunges)
-    strokes, lines = _coloured_lines(
+    points, strokes, lines = _coloured_lines(
         analysis, limits, colormaps[COLOUR_MAP](np.linspace(0.0, 1.0, CLASSES)), show_plunges
     )
-    middle, span = _frame(mm_from_m(samples.position[samples.cutting]))
+    middle, span = _frame(*cutting_box(samples))
     figure, views, corner = _lay_out(span)
     places = analysis.weakest
     for axes, (across, up, title) in zip(
@@ -76,7 +80,9 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
         box = axes.get_position()
         add_words(figure, box.x0, box.y1 + TITLE / POINTS / figure.get_figheight(), title, size=11.0, weight="bold")
         _set_up(axes, across, up, middle, span)
-        add_strokes(axes, [(xyz[:, [across, up]], colour) for xyz, colour in strokes], STROKE, zorder=3)
+        seen = points[:, [across, up]]
+        shown = _thinned(seen, strokes, axes) if len(points) > MOST_LINES else strokes
+        add_strokes(axes, [(_polyline(seen, rows), colour) for rows, colour in shown], STROKE, zorder=3)
         for xyz, style in lines:
             axes.plot(xyz[:, across], xyz[:, up], **style)
         spots = [(float(x), float(y)) for x, y in mm_from_m(samples.position[places][:, [across, up]])]
@@ -88,11 +94,11 @@ def path_picture(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
 
 def _coloured_lines(
     analysis: Analysis, limits: tuple[float, float], colours: FloatArray, show_plunges: bool
-) -> tuple[list[tuple[FloatArray, Any]], list[tuple[FloatArray, dict[str, Any]]]]:
-    """Points and colour of one line for each class of segments, in drawing order; points and style of the others."""
+) -> tuple[FloatArray, list[tuple[IntArray, Any]], list[tuple[FloatArray, dict[str, Any]]]]:
+    """Points of the path; segments and colour of each class, in drawing order; points and style of the other lines."""
     # A corner is two samples at one point: one of them is enough, and the line through it stays one line.
     samples, stiffness = analysis.samples, analysis.at.stiffness
-    moved = np.flatnonzero((samples.position[1:] != samples.position[:-1]).any(axis=1))
+    moved = np.flatnonzero(np.logical_or.reduce([axis[1:] != axis[:-1] for axis in samples.position.T]))
     points = mm_from_m(samples.position[np.append(moved, moved[-1] + 1 if len(moved) else 0)])
     rapid = ~samples.cutting[moved + 1]
     classes = segment_classes(n_per_mm_from_n_per_m(0.5 * (stiffness[moved] + stiffness[moved + 1])), limits)
@@ -101,7 +107,7 @@ def _coloured_lines(
     if len(points) > MOST_POINTS:
         points, rapid, classes = _merged(points, rapid, classes)
     strokes = [
-        (_polyline(points, rows), colours[which])
+        (rows, colours[which])
         for which in range(CLASSES - 1, -1, -1)
         if len(rows := np.flatnonzero(~rapid & (classes == which)))
     ]
@@ -120,7 +126,7 @@ def _coloured_lines(
             (ends, {"color": PLUNGE_SLATE, "linestyle": "none", "marker": ".", "markersize": 6, "zorder": 3.5})
         )
     add(~rapid & (classes == UNREACHABLE), color=UNREACHABLE_RED, linewidth=2.2, zorder=4)
-    return strokes, found
+    return points, strokes, found
 
 
 def _merged(points: FloatArray, rapid: BoolArray, classes: IntArray) -> tuple[FloatArray, BoolArray, IntArray]:
@@ -136,8 +142,24 @@ def _merged(points: FloatArray, rapid: BoolArray, classes: IntArray) -> tuple[Fl
     return np.concatenate([points[first], points[-1:]]), rapid[first], np.minimum.reduceat(classes, first)
 
 
+def _thinned(points: FloatArray, strokes: Sequence[tuple[IntArray, Any]], axes: Axes) -> list[tuple[IntArray, Any]]:
+    """Strokes without the segments that others are drawn over: of some between the same two spots the last stays.
+
+    `points` (n, 2) are those of a view. Seen from the side, the passes over a surface lie upon each other, and line by
+    line they take longer to draw than to compute. A spot is half a pixel wide.
+    """
+    at = np.floor(2.0 * axes.transData.transform(points)).astype(np.int64)
+    at -= at.min(axis=0)
+    spot = at[:, 0] * (at[:, 1].max() + 1) + at[:, 1]
+    between = np.minimum(spot[1:], spot[:-1]) * (spot.max() + 1) + np.maximum(spot[1:], spot[:-1])
+    drawn = np.concatenate([rows for rows, _ in strokes[::-1]])
+    shown = np.zeros(len(between), dtype=bool)
+    shown[drawn[np.unique(between[drawn], return_index=True)[1]]] = True
+    return [(kept, colour) for rows, colour in strokes if len(kept := rows[shown[rows]])]
+
+
 def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
-    """(m, 3) one line through the segments (i, i + 1), broken by nan where they do not join."""
+    """(m, d) one line through the segments (i, i + 1), broken by nan where they do not join."""
     breaks = np.flatnonzero(np.diff(segments) != 1) + 1
     order = np.concatenate([[0], breaks, [len(segments)]])
     runs = order[1:] - order[:-1]
@@ -150,9 +172,17 @@ def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
     return np.asarray(line)
 
 
-def _frame(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def cutting_box(samples: Samples) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest (3,) of the positions of the cutting samples, mm."""
+    low, high = np.empty(3), np.empty(3)
+    for axis in range(3):  # one by one, as a copy of all positions is a tenth of what a long path takes
+        along = samples.position[samples.cutting, axis]
+        low[axis], high[axis] = mm_from_m(float(along.min())), mm_from_m(float(along.max()))
+    return low, high
+
+
+def _frame(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Middle and padded span of the views in mm, axis by axis."""
-    low, high = points.min(axis=0), points.max(axis=0)
     span = (high - low) * 1.12
     return (low + high) / 2.0, np.maximum(span, max(THINNEST * float(span.max()), 1.0))
 
