@@ -30,8 +30,9 @@ def rotation_matrices(abc: ArrayLike) -> FloatArray:
     [0.0, 1.0]
     """
     angles = np.asarray(abc, dtype=float)
-    ca, cb, cc = np.moveaxis(np.cos(angles), -1, 0)
-    sa, sb, sc = np.moveaxis(np.sin(angles), -1, 0)
+    cosine, sine = np.cos(angles), np.sin(angles)
+    ca, cb, cc = cosine[..., 0], cosine[..., 1], cosine[..., 2]  # much faster than `moveaxis` for a single pose
+    sa, sb, sc = sine[..., 0], sine[..., 1], sine[..., 2]
     rotation = np.empty((*angles.shape[:-1], 3, 3))
     rotation[..., 0, 0] = cc * cb
     rotation[..., 0, 1] = cc * sb * sa - sc * ca

@@ -46,9 +46,9 @@ class Turn:
         self.turn: FloatArray = _clean(old.T @ new)
         shift = np.array(placement[:3]) - np.array(original[:3])
         self.shift = shift if not any(original[3:]) else old.T @ shift
-        self._yaw = np.radians(original[5] - placement[5])
+        self._yaw = rotation_about_z(np.radians(original[5] - placement[5]))
         self.turns = not np.array_equal(self.turn, np.eye(3))
-        still = _clean(self.turn @ rotation_about_z(self._yaw))
+        still = _clean(self.turn @ self._yaw)
         self._never_yaws = np.array_equal(still, np.eye(3))  # a turn about the vertical alone
         self._rows = [[float(v) for v in row] for row in self.turn]
         self._shift = [float(v) for v in self.shift]
@@ -62,7 +62,7 @@ class Turn:
 
     def rotations(self, abc: FloatArray) -> FloatArray:
         """(n, 3, 3) rotations R_new of programmed roll, pitch, yaw (n, 3) in degrees."""
-        return self.turn @ rotation_matrices(np.radians(abc)) @ rotation_about_z(self._yaw)
+        return self.turn @ rotation_matrices(np.radians(abc)) @ self._yaw
 
     def angles(self, abc: Sequence[float], near: Sequence[float]) -> list[float]:
         """Rotary words a, b, c in degrees; of the many that are the same rotation, those next to `near`."""

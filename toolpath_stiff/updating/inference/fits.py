@@ -115,6 +115,11 @@ def _normal_equations(
     return information, gradient
 
 
+def _equations_of(fit: Fit) -> tuple[FloatArray, FloatArray]:
+    """Those of the last step of a fit."""
+    return _normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter, fit.law_free)
+
+
 def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
     return np.asarray(scaled_inverse(information) @ gradient)
 
@@ -216,7 +221,7 @@ ROUNDS = 5  # searches for wild readings
 
 def base_fit(problem: Problem, law_free: bool) -> Fit:
     """The model without any further effect."""
-    return _settled(problem, (), (), (), np.zeros(2), law_free)
+    return _settled(problem, fit_effects(problem, (), (), (), np.zeros(2), problem.scatter, law_free))
 
 
 def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], law_free: bool) -> Fit:
@@ -233,14 +238,25 @@ def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], l
     law_free
         Whether the strut law is fitted along.
     """
-    fits = []
-    for candidate in candidates:
-        together = (*before.candidates, candidate)
-        free = tuple(range(sum(len(c.components) for c in together)))
-        for share in STARTS:
-            start = np.array([_start(component, share) for component in candidate.components])
-            fits.append(_settled(problem, together, (*before.sizes, start), free, before.law, law_free))
-    return _without_zeros(max(fits, key=lambda fit: fit.log_posterior))
+    tried = [fit for candidate in candidates for fit in _from_starts(problem, before, candidate, law_free)]
+    best, settled = max(tried, key=lambda one: one[0].log_posterior)
+    return _without_zeros(best if settled else _settled(problem, best))
+
+
+def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: bool) -> Iterator[tuple[Fit, bool]]:
+    """The fits that a candidate comes to from its starts, and whether each is settled already."""
+    together = (*before.candidates, candidate)
+    free = tuple(range(sum(len(c.components) for c in together)))
+    seen: list[FloatArray] = []
+    for share in STARTS:
+        start = np.array([_start(component, share) for component in candidate.components])
+        fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
+        place = np.concatenate([fit.law, *fit.sizes])
+        widths = 1.0 / np.sqrt(np.maximum(np.diag(_equations_of(fit)[0]), 1e-300))
+        # Two starts mostly end in one place, and go on from there alike.
+        if not any((np.abs(place - other) < TOLERANCE * widths).all() for other in seen):
+            yield _nearly_settled(problem, fit)
+        seen.append(place)
 
 
 def _start(component: Component, share: float) -> float:
@@ -250,24 +266,48 @@ def _start(component: Component, share: float) -> float:
     return sign * min(share * (known if np.isfinite(known) else 1.0), reach)
 
 
-def _settled(
-    problem: Problem,
-    candidates: Sequence[Candidate],
-    sizes: Sequence[FloatArray],
-    free: Sequence[int],
-    law: FloatArray,
-    law_free: bool,
-) -> Fit:
-    """The fit with the readings taken for wild that it finds wild itself, and continued where it was still moving."""
-    fit = fit_effects(problem, candidates, sizes, free, law, problem.scatter, law_free)
+def _nearly_settled(problem: Problem, fit: Fit) -> tuple[Fit, bool]:
+    """As `_settled`, and True; or False, and the fit from which it has one step to go that would not show.
+
+    That step moves a likelihood by less than 1e-6: only the likeliest of several fits needs to make it.
+    """
     for _ in range(ROUNDS):
-        scatter = problem.scatter.with_wild(fit.residual)
-        again = fit_effects(problem, candidates, fit.sizes, free, fit.law, scatter, law_free)
-        done = set(scatter.wild) == set(fit.scatter.wild) and again.log_posterior < fit.log_posterior + 1e-4
-        fit = again
+        scatter = problem.scatter.with_wild(fit.residual, known=fit.scatter)
+        if scatter is fit.scatter and _gain_to_come(problem, fit) < TOLERANCE**2:
+            return fit, False
+        fit, done = _again(problem, fit)
+        if done:
+            break
+    return fit, True
+
+
+def _gain_to_come(problem: Problem, fit: Fit) -> float:
+    """Twice what one more step adds to the log posterior; sizes that it pulls beyond their bounds stay there."""
+    information, gradient = _equations_of(fit)
+    search = _Search(problem, fit.candidates, fit.free, fit.law_free)
+    flat = np.concatenate([fit.law, *fit.sizes])
+    low, high = (
+        np.concatenate([np.full(2, at), limit]) for at, limit in zip((-np.inf, np.inf), search.limits(), strict=True)
+    )
+    kept = ~((flat <= low) & (gradient <= 0.0) | (flat >= high) & (gradient >= 0.0))
+    return float(gradient[kept] @ scaled_inverse(information[np.ix_(kept, kept)]) @ gradient[kept])
+
+
+def _settled(problem: Problem, fit: Fit) -> Fit:
+    """The fit with the readings taken for wild that it finds wild itself, and continued where it was still moving."""
+    for _ in range(ROUNDS):
+        fit, done = _again(problem, fit)
         if done:
             break
     return fit
+
+
+def _again(problem: Problem, fit: Fit) -> tuple[Fit, bool]:
+    """The fit continued with the readings that it finds wild, and whether that changes nothing any more."""
+    scatter = problem.scatter.with_wild(fit.residual)
+    again = fit_effects(problem, fit.candidates, fit.sizes, fit.free, fit.law, scatter, fit.law_free)
+    done = set(scatter.wild) == set(fit.scatter.wild) and again.log_posterior < fit.log_posterior + 1e-4
+    return again, done
 
 
 def _without_zeros(fit: Fit) -> Fit:
