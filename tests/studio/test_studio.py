@@ -225,7 +225,9 @@ class Tab:
     """A tab that notes what it may not have: messages of the console, errors, requests to another host."""
 
     def __init__(self, browser, address: str, **options) -> None:
-        self.page = browser.new_context(**{"viewport": {"width": 1400, "height": 900}, **options}).new_page()
+        # Without motion: while the work lasts, a turning sign would be painted sixty times a second.
+        quiet = {"viewport": {"width": 1400, "height": 900}, "reduced_motion": "reduce"}
+        self.page = browser.new_context(**{**quiet, **options}).new_page()
         self.page.set_default_timeout(PATIENCE)
         self.faults: list[str] = []
         self.page.on("console", lambda message: self.faults.append(f"console: {message.text}"))
