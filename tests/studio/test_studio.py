@@ -261,6 +261,14 @@ class Tab:
             self.page.wait_for_timeout(100)
         raise AssertionError(f"never: {script}")
 
+    def box(self, selector: str) -> dict[str, float]:
+        """Where an element stands; asked again where the page was just being drawn anew."""
+        for _ in range(PATIENCE // 100):
+            if found := self.page.locator(selector).bounding_box():
+                return found
+            self.page.wait_for_timeout(100)
+        raise AssertionError(f"nowhere: {selector}")
+
     def close(self) -> None:
         self.page.context.close()
 
@@ -291,7 +299,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     assert tab.number("#g-refitted") == pytest.approx(command["baseline"]["mean_abs_error_percent"], abs=0.005)
     assert tab.number("#g-floor") == pytest.approx(command["baseline"]["noise_floor_percent"], abs=0.005)
     # Set a reading aside in the machine, and take it back.
-    box = page.locator("#scene .overlay").bounding_box()
+    box = tab.box("#scene .overlay")
     spot = page.evaluate("() => { const s = window.tpsStudio.spots(); return s[s.length - 1]; }")
     page.mouse.move(box["x"] + spot[0], box["y"] + spot[1])
     tab.until("document.querySelector('#status').textContent.includes('measured')")
@@ -307,7 +315,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     page.select_option("#weak_strut-strut", "4")
     tab.until("document.querySelector('#weak_strut-strut').value === '4'")
     settled(running)
-    slider = page.locator("#weak_strut-factor").bounding_box()
+    slider = tab.box("#weak_strut-factor")
     page.mouse.move(slider["x"] + 5, slider["y"] + slider["height"] / 2)
     page.mouse.down()
     page.mouse.move(slider["x"] + 0.4 * slider["width"], slider["y"] + slider["height"] / 2, steps=3)
@@ -340,7 +348,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     case = tps.Case.open(running.folder)
     assert tab.number("#p-mean") == pytest.approx(state["program"]["summary"]["mean_N_per_mm"], abs=0.5)
     tab.go("placement")
-    box = page.locator("#drag").bounding_box()
+    box = tab.box("#drag")
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
     page.mouse.move(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2 - 20, steps=4)
