@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import write_atomically
@@ -105,19 +106,31 @@ def polyline(moves: Moves) -> np.ndarray:
 
 
 def farthest(one: np.ndarray, two: np.ndarray) -> float:
-    """How far the ends of the segments of one path are from the other, at most."""
-    start, along = two[:, 0].T, (two[:, 1] - two[:, 0]).T
-    squared = np.maximum((along**2).sum(axis=0), 1e-30)
+    """How far the ends of the segments of one path are from the other, at most.
+
+    A few segments near each point bound its distance; the points of the largest bounds are held against all segments,
+    until no bound is larger than the distance found.
+    """
     points = one.reshape(-1, 6)[:: max(1, len(one) // 5000)]
-    worst = 0.0
-    for some in np.array_split(points, -(-len(points) * len(two) // AT_ONCE)):
-        offsets = [some[:, [k]] - start[k] for k in range(6)]
-        share = np.clip(sum(offset * along[k] for k, offset in enumerate(offsets)) / squared, 0.0, 1.0)
-        apart = np.zeros_like(share)
-        for k, offset in enumerate(offsets):
-            np.maximum(apart, np.abs(share * along[k] - offset), out=apart)
-        worst = max(worst, float(apart.min(axis=1).max()))
+    start, along = two[:, 0].T, (two[:, 1] - two[:, 0]).T
+    near = cKDTree((start + along / 2).T).query(points, k=range(1, 1 + min(8, len(two))))[1]
+    bound = _apart(points, start[:, near], along[:, near]).min(axis=1)
+    order, worst = np.argsort(-bound, kind="stable"), 0.0
+    for some in np.array_split(order, -(-len(points) * len(two) // AT_ONCE)):
+        if len(some) and bound[some[0]] > worst:
+            worst = max(worst, float(_apart(points[some], start, along).min(axis=1).max()))
     return worst
+
+
+def _apart(points: np.ndarray, start: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """How far points (m, 6) are from segments (6, n), or each from its own (6, m, n): the largest of six, (m, n)."""
+    squared = np.maximum((along**2).sum(axis=0), 1e-30)
+    offsets = [points[:, [k]] - start[k] for k in range(6)]
+    share = np.clip(sum(offset * along[k] for k, offset in enumerate(offsets)) / squared, 0.0, 1.0)
+    apart = np.zeros_like(share)
+    for k, offset in enumerate(offsets):
+        np.maximum(apart, np.abs(share * along[k] - offset), out=apart)
+    return apart
 
 
 def difference(one: Program, two: Program) -> float:

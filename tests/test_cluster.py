@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from importlib.util import find_spec
 
 import pytest
 
@@ -12,7 +13,8 @@ from tests.test_cli_analyze import PART, _nist
 from tests.test_cli_batch import BROKEN, QUICK, files_of, rows_of
 from toolpath_stiff.cli.main import main
 
-distributed = pytest.importorskip("distributed")
+# Loaded by the tests that need it, as collecting is done by every process.
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="distributed is not installed")
 
 # Kills the process that sees the tool at Z 850 mm, but never the one that runs the tests.
 DEADLY = '''
@@ -39,6 +41,7 @@ def cluster():
     import multiprocessing
 
     import dask
+    import distributed
 
     # Workers begin with the libraries loaded, as two start and three more are started where others died.
     multiprocessing.set_forkserver_preload(
@@ -85,7 +88,9 @@ def test_a_cluster_gives_the_same_bytes_and_the_same_words(cluster, shop, capsys
 
 
 def test_the_function_takes_the_executor_of_a_client(cluster, shop):
-    with distributed.Client(cluster, set_as_default=False) as client:
+    from distributed import Client
+
+    with Client(cluster, set_as_default=False) as client:
         done = tps.analyze_many("nist", ["jobs"], "o", executor=client.get_executor(), plots=False, step_mm=20)
         again = tps.analyze_many("nist", ["jobs"], "o", executor=client.get_executor(), plots=False, step_mm=20)
     assert [one.status for one in done.outcomes] == ["done", "done", "failed"]

@@ -67,6 +67,9 @@ RIG_SHOWN_BY = ("api", "cli")  # a case starts, measures and reveals exercises, 
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "pyarrow", "pygcode")
 
 
+tree = cache(ast.parse)  # each module is parsed once
+
+
 @cache
 def imports(source: str, package: str) -> tuple[str, ...]:
     """Every absolute module name that the source imports, inside functions too; relative ones are resolved."""
@@ -74,7 +77,7 @@ def imports(source: str, package: str) -> tuple[str, ...]:
 
 
 def _imports(source: str, package: str) -> Iterator[str]:
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree(source)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -196,7 +199,7 @@ MOST_LINES = 60  # of a function, its docstring apart
 
 
 def lines_of_functions(source: str) -> Iterator[tuple[str, int]]:
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree(source)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             first = node.body[0]
             said = first.end_lineno - first.lineno + 1 if ast.get_docstring(node) is not None else 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import shutil
 import subprocess
 
 import pytest
@@ -16,11 +17,17 @@ TABLE = {"x_nm_per_N": 2.0, "y_nm_per_N": 2.0, "z_nm_per_N": 2.0, "rocking_nrad_
 SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n"
 
 
+@pytest.fixture(scope="module")
+def started(tmp_path_factory):
+    """The folder of a case with an exercise; tests work on copies."""
+    folder = tmp_path_factory.mktemp("started") / "case"
+    tps.Case.open(folder).start_exercise(SEED)
+    return folder
+
+
 @pytest.fixture
-def case(tmp_path):
-    found = tps.Case.open(tmp_path / "case")
-    found.start_exercise(SEED)
-    return found
+def case(started, tmp_path):
+    return tps.Case.open(shutil.copytree(started, tmp_path / "case"))
 
 
 def rows(case):
