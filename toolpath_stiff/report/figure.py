@@ -212,7 +212,7 @@ def drawing(figure: Figure) -> Drawing:
     One drawing makes both: laying out axes and words takes most of the time.
     """
     _rasterize(figure)
-    renderer = Both(*figure.bbox.size)
+    renderer = Both(*figure.canvas.get_width_height())
     figure.patch.draw(renderer.pixels)  # a page has its own ground
     figure.patch.set_visible(False)
     figure.draw(renderer)  # type: ignore[arg-type]
@@ -237,9 +237,7 @@ class Both:
     """
 
     def __init__(self, width: float, height: float) -> None:
-        from matplotlib.backends.backend_agg import RendererAgg
-
-        self.pixels = RendererAgg(width, height, DPI)
+        self.pixels = _pixels(width, height, DPI)
         self.vectors = Vectors(width, height)
         self.beside: Vectors | Marks = self.vectors
 
@@ -254,7 +252,7 @@ class Both:
         self.beside = Marks(self.vectors)
 
     def stop_rasterizing(self) -> None:
-        """The end of this."""
+        """From here on they are vectors again."""
         if isinstance(self.beside, Marks):
             self.beside.finish()
         self.beside = self.vectors
@@ -269,8 +267,8 @@ class Vectors:
         from matplotlib.backends.backend_svg import RendererSVG
 
         self._text = io.StringIO()
-        self._svg = RendererSVG(width, height, self._text, image_dpi=int(POINTS))
-        self._fonts: dict[Any, Any] = {}
+        kind: Any = RendererSVG
+        self._svg = kind(width, height, self._text, image_dpi=int(POINTS))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._svg, name)
@@ -348,11 +346,10 @@ class Marks:
         ends = (0.0, 0.0, self._vectors.width, self._vectors.height) if clip is None else clip.extents
         place = (*(int(np.floor(end)) for end in ends[:2]), *(int(np.ceil(end)) for end in ends[2:]))
         if place != self._place:
-            from matplotlib.backends.backend_agg import RendererAgg
-
             self.finish()
             self._place = place
-            self._canvas = RendererAgg(*(self.FINER * np.subtract(place[2:], place[:2])), SHARP)
+            across, up = place[2] - place[0], place[3] - place[1]
+            self._canvas = _pixels(self.FINER * across, self.FINER * up, SHARP)
         return _copied(gc, width=self.FINER * gc.get_linewidth(), clip=clip and self._there().transform_bbox(clip))
 
     def _there(self) -> Any:
@@ -382,6 +379,13 @@ class Marks:
         self._canvas, self._place = None, ()
 
 
+def _pixels(width: float, height: float, dpi: int) -> Any:
+    from matplotlib.backends.backend_agg import RendererAgg
+
+    kind: Any = RendererAgg
+    return kind(width, height, dpi)
+
+
 def _scaled(factor: float) -> Any:
     from matplotlib.transforms import Affine2D
 
@@ -392,7 +396,8 @@ def _copied(gc: Any, *, width: float | None = None, clip: Any = None, dashes: An
     """A context with other lines, or clipped elsewhere."""
     from matplotlib.backend_bases import GraphicsContextBase
 
-    copy = GraphicsContextBase()
+    kind: Any = GraphicsContextBase
+    copy = kind()
     copy.copy_properties(gc)
     if dashes is not None:
         copy.set_dashes(*dashes)
@@ -410,6 +415,8 @@ def _svg_text(text: str, width: float, height: float) -> str:
     size = f'viewBox="0 0 {DPI * width:g} {DPI * height:g}" style="--natural:{DPI * width:.0f}px"'
     opening = f'<svg {size} xmlns:xlink="http://www.w3.org/1999/xlink" aria-hidden="true">'
     text = re.sub(r"<svg [^>]*>", opening, text, count=1)
+    units = 'patternUnits="userSpaceOnUse"'  # of a hatch, which matplotlib gives in points
+    text = text.replace(units, f'{units} patternTransform="scale({DPI / POINTS:.4g})"')
     text = re.sub(r"#[0-9a-f]{6}\b", lambda match: _page_colour(match[0]), text)
     return re.sub(r"\s*\n\s*", "\n", text).strip()
 
