@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -131,6 +132,9 @@ def analyze(args: argparse.Namespace) -> int:
     from toolpath_stiff.defaults import job_count, one_thread
 
     one_thread()  # before numpy is loaded
+    if len(args.programs) == 1 and os.path.isfile(args.programs[0]) and not args.cluster:  # noqa: PTH113  (false for a name that none can have)
+        job_count(args.jobs, 1)
+        return _run_single(args, args.programs[0])  # without loading what lists many
     from toolpath_stiff.report.batch.programs import find_programs
 
     found, counts = find_programs(args.programs)

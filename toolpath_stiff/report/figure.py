@@ -8,6 +8,7 @@ are. Letters are outlines, so that nothing moves with the fonts of whoever reads
 
 from __future__ import annotations
 
+import base64
 import io
 import re
 import struct
@@ -19,6 +20,7 @@ from functools import cache, update_wrapper
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
@@ -56,6 +58,8 @@ STYLE: dict[Any, Any] = {
     "xtick.color": MUTED,
     "ytick.color": MUTED,
     "agg.path.chunksize": 20000,
+    "svg.hashsalt": "tps",  # the same picture gives the same text
+    "svg.fonttype": "path",
     "path.snap": False,  # lines along an axis would jump to whole pixels and leave gaps in a dense pattern
 }
 
@@ -99,22 +103,26 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """The figure as PNG, without metadata.
-
-    An opaque picture of lines: no alpha, no filter, and a quick level of deflate; a third of the time of the general
-    writer, which tries every filter on every row, for as many bytes. ISO/IEC 15948, "Portable Network Graphics".
-    """
+    """The figure as PNG, without metadata."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())
-    height, width, _ = pixels.shape
-    rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # the first byte of a row names its filter
-    for channel in range(3):  # much faster than three bytes at a time
-        rows[:, 1 + channel :: 3] = pixels[:, :, channel]
-    header = struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)
-    size = struct.pack(">2IB", *(2 * [round(DPI / m_from_mm(MM_PER_INCH))]), 1)
+    return _png(np.asarray(canvas.buffer_rgba())[:, :, :3], DPI)
+
+
+def _png(pixels: NDArray[np.uint8], dpi: int) -> bytes:
+    """Rows of pixels, of three channels or with alpha as the fourth, as PNG.
+
+    No filter, and a quick level of deflate; a third of the time of the general writer, which tries every filter on
+    every row, for as many bytes. ISO/IEC 15948, "Portable Network Graphics".
+    """
+    height, width, channels = pixels.shape
+    rows = np.zeros((height, 1 + channels * width), dtype=np.uint8)  # the first byte of a row names its filter
+    for channel in range(channels):  # much faster than all bytes of a pixel at a time
+        rows[:, 1 + channel :: channels] = pixels[:, :, channel]
+    header = struct.pack(">2I5B", width, height, 8, 2 if channels == 3 else 6, 0, 0, 0)
+    size = struct.pack(">2IB", *(2 * [round(dpi / m_from_mm(MM_PER_INCH))]), 1)
     chunks = {b"IHDR": header, b"pHYs": size, b"IDAT": zlib.compress(rows.data, DEFLATE), b"IEND": b""}
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, content) for kind, content in chunks.items())
 
@@ -199,28 +207,216 @@ class Drawing(bytes):
 
 
 def drawing(figure: Figure) -> Drawing:
-    """The figure as it is written to a file and as it stands in a page. Within `house_style`."""
-    found = Drawing(png_bytes(figure))
-    found.svg = svg_text(figure)
+    """The figure as it is written to a file and as it stands in a page. Within `house_style`.
+
+    One drawing makes both: laying out axes and words takes most of the time.
+    """
+    _rasterize(figure)
+    renderer = Both(*figure.canvas.get_width_height())
+    figure.patch.draw(renderer.pixels)  # a page has its own ground
+    figure.patch.set_visible(False)
+    figure.draw(renderer)  # type: ignore[arg-type]
+    figure.patch.set_visible(True)
+    found = Drawing(_png(np.asarray(renderer.pixels.buffer_rgba())[:, :, :3], DPI))
+    found.svg = _svg_text(renderer.vectors.text(), *figure.get_size_inches())
     return found
 
 
-def svg_text(figure: Figure) -> str:
-    """The figure as an SVG element in the page's colours; the same figure gives the same text."""
-    import matplotlib as mpl
+def _twice(name: str) -> Callable[..., None]:
+    def draw(renderer: Both, *arguments: Any, **named: Any) -> None:
+        getattr(renderer.pixels, name)(*arguments, **named)
+        getattr(renderer.beside, name)(*arguments, **named)
 
-    heavy = _rasterized(figure)
-    buffer = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "tps", "svg.fonttype": "path", "svg.image_inline": True}):
-        nothing: dict[str, Any] = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-        figure.savefig(buffer, format="svg", facecolor="none", dpi=SHARP if heavy else DPI, metadata=nothing)
-    text = buffer.getvalue()
+    return draw
+
+
+class Both:
+    """A renderer of matplotlib that draws pixels and vectors in the same coordinates, pixels of the PNG.
+
+    It answers as the renderer of the pixels does, as matplotlib's own `MixedModeRenderer` stands for another.
+    """
+
+    def __init__(self, width: float, height: float) -> None:
+        self.pixels = _pixels(width, height, DPI)
+        self.vectors = Vectors(width, height)
+        self.beside: Vectors | Marks = self.vectors
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.pixels, name)
+
+    draw_path, draw_markers, draw_path_collection = map(_twice, ("draw_path", "draw_markers", "draw_path_collection"))
+    draw_quad_mesh, draw_image, draw_text = map(_twice, ("draw_quad_mesh", "draw_image", "draw_text"))
+
+    def start_rasterizing(self) -> None:
+        """From here on marks are put into the vectors as an image."""
+        self.beside = Marks(self.vectors)
+
+    def stop_rasterizing(self) -> None:
+        """From here on they are vectors again."""
+        if isinstance(self.beside, Marks):
+            self.beside.finish()
+        self.beside = self.vectors
+
+
+class Vectors:
+    """SVG of the same size; what matplotlib gives in points (dashes, letters, lines of a collection) grows to it."""
+
+    GROWTH = DPI / POINTS
+
+    def __init__(self, width: float, height: float) -> None:
+        from matplotlib.backends.backend_svg import RendererSVG
+
+        self._text = io.StringIO()
+        kind: Any = RendererSVG
+        self._svg = kind(width, height, self._text, image_dpi=int(POINTS))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._svg, name)
+
+    def text(self) -> str:
+        """The end of the drawing, and all of it."""
+        self._svg.finalize()
+        return self._text.getvalue()
+
+    def draw_path(self, gc: Any, *others: Any) -> None:
+        """A path."""
+        self._svg.draw_path(self._pen(gc), *others)
+
+    def draw_markers(self, gc: Any, *others: Any) -> None:
+        """Markers along a path."""
+        self._svg.draw_markers(self._pen(gc), *others)
+
+    def _pen(self, gc: Any) -> Any:
+        offset, dashes = gc.get_dashes()
+        return gc if dashes is None else _copied(gc, dashes=self._grown((offset, dashes)))
+
+    def _grown(self, style: tuple[float, Any]) -> tuple[float, Any]:
+        offset, dashes = style
+        return self.GROWTH * offset, None if dashes is None else [self.GROWTH * dash for dash in dashes]
+
+    def draw_path_collection(self, gc: Any, *others: Any, **named: Any) -> None:
+        """Paths at places, with colours and lines of their own."""
+        before, widths, styles, after = others[:7], others[7], others[8], others[9:]
+        wide = [self.GROWTH * width for width in widths]
+        self._svg.draw_path_collection(gc, *before, wide, [self._grown(style) for style in styles], *after, **named)
+
+    def draw_text(self, gc: Any, x: float, y: float, words: str, font: Any, *others: Any, **named: Any) -> None:
+        """A line of words."""
+        larger = font.copy()
+        larger.set_size(self.GROWTH * font.get_size_in_points())
+        self._svg.draw_text(gc, x, y, words, larger, *others, **named)
+
+
+class Marks:
+    """What has many marks, put into the vectors as an image for each axes, sharper than the PNG."""
+
+    FINER = SHARP / DPI
+
+    def __init__(self, vectors: Vectors) -> None:
+        self._vectors = vectors
+        self._canvas: Any = None
+        self._place: tuple[int, ...] = ()  # of the canvas in the picture: left, low, right, high
+
+    def draw_path(self, gc: Any, path: Any, transform: Any, face: Any = None) -> None:
+        """A path."""
+        pen = self._pen(gc)
+        self._canvas.draw_path(pen, path, transform + self._there(), face)
+
+    def draw_markers(self, gc: Any, marker: Any, size: Any, path: Any, transform: Any, face: Any = None) -> None:
+        """Markers along a path."""
+        pen = self._pen(gc)
+        at = size + _scaled(self.FINER), path, transform + self._there()
+        self._canvas.draw_markers(pen, marker, *at, face)
+
+    def draw_path_collection(self, gc: Any, *others: Any, **named: Any) -> None:
+        """Paths at places, with colours and lines of their own."""
+        pen, (master, paths, transforms, offsets, place), others = self._pen(gc), others[:5], others[5:]
+        larger, there = (master + _scaled(self.FINER)).frozen(), place + self._there()
+        self._canvas.draw_path_collection(pen, larger, paths, transforms, offsets, there, *others, **named)
+
+    def draw_quad_mesh(self, gc: Any, master: Any, *others: Any) -> None:
+        """Cells, across and up so many, at places."""
+        pen, (across, up, corners, offsets, place), others = self._pen(gc), others[:5], others[5:]
+        larger, there = (master + _scaled(self.FINER)).frozen(), place + self._there()
+        self._canvas.draw_quad_mesh(pen, larger, across, up, corners, offsets, there, *others)
+
+    def _pen(self, gc: Any) -> Any:
+        """The context on the canvas of the axes that clip what is drawn."""
+        clip = gc.get_clip_rectangle()
+        ends = (0.0, 0.0, self._vectors.width, self._vectors.height) if clip is None else clip.extents
+        place = (*(int(np.floor(end)) for end in ends[:2]), *(int(np.ceil(end)) for end in ends[2:]))
+        if place != self._place:
+            self.finish()
+            self._place = place
+            across, up = place[2] - place[0], place[3] - place[1]
+            self._canvas = _pixels(self.FINER * across, self.FINER * up, SHARP)
+        return _copied(gc, width=self.FINER * gc.get_linewidth(), clip=clip and self._there().transform_bbox(clip))
+
+    def _there(self) -> Any:
+        """From the picture to the canvas."""
+        from matplotlib.transforms import Affine2D
+
+        return Affine2D().translate(-self._place[0], -self._place[1]).scale(self.FINER)
+
+    def finish(self) -> None:
+        """Put the image in."""
+        if self._canvas is None:
+            return
+        pixels = np.asarray(self._canvas.buffer_rgba())
+        rows, columns = (np.flatnonzero(pixels[:, :, 3].any(axis=axis)) for axis in (1, 0))
+        if len(rows):
+            seen = pixels[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+            corner = self._place[0], self._vectors.height - self._place[3]
+            box = {
+                "x": corner[0] + columns[0] / self.FINER,
+                "y": corner[1] + rows[0] / self.FINER,
+                "width": seen.shape[1] / self.FINER,
+                "height": seen.shape[0] / self.FINER,
+            }
+            image = "data:image/png;base64," + base64.b64encode(_png(seen, SHARP)).decode("ascii")
+            text = {name: f"{value:g}" for name, value in box.items()}
+            self._vectors.writer.element("image", attrib={**text, "xlink:href": image})
+        self._canvas, self._place = None, ()
+
+
+def _pixels(width: float, height: float, dpi: int) -> Any:
+    from matplotlib.backends.backend_agg import RendererAgg
+
+    kind: Any = RendererAgg
+    return kind(width, height, dpi)
+
+
+def _scaled(factor: float) -> Any:
+    from matplotlib.transforms import Affine2D
+
+    return Affine2D().scale(factor)
+
+
+def _copied(gc: Any, *, width: float | None = None, clip: Any = None, dashes: Any = None) -> Any:
+    """A context with other lines, or clipped elsewhere."""
+    from matplotlib.backend_bases import GraphicsContextBase
+
+    kind: Any = GraphicsContextBase
+    copy = kind()
+    copy.copy_properties(gc)
+    if dashes is not None:
+        copy.set_dashes(*dashes)
+    if width is not None:
+        copy.set_linewidth(width)
+        copy.set_clip_rectangle(clip)
+        copy.set_clip_path(None)
+    return copy
+
+
+def _svg_text(text: str, width: float, height: float) -> str:
+    """An SVG as an element of a page in its colours, `width` and `height` in inches; the same gives the same."""
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>|<style .*?</style>|<!--.*?-->", "", text, flags=re.S)
-    width, height = (POINTS * inch for inch in figure.get_size_inches())
-    size = f'viewBox="0 0 {width:g} {height:g}" style="--natural:{DPI * width / POINTS:.0f}px"'
+    size = f'viewBox="0 0 {DPI * width:g} {DPI * height:g}" style="--natural:{DPI * width:.0f}px"'
     opening = f'<svg {size} xmlns:xlink="http://www.w3.org/1999/xlink" aria-hidden="true">'
     text = re.sub(r"<svg [^>]*>", opening, text, count=1)
+    units = 'patternUnits="userSpaceOnUse"'  # of a hatch, which matplotlib gives in points
+    text = text.replace(units, f'{units} patternTransform="scale({DPI / POINTS:.4g})"')
     text = re.sub(r"#[0-9a-f]{6}\b", lambda match: _page_colour(match[0]), text)
     return re.sub(r"\s*\n\s*", "\n", text).strip()
 
@@ -230,15 +426,13 @@ def _page_colour(colour: str) -> str:
     return f"var(--{name})" if name else colour
 
 
-def _rasterized(figure: Figure) -> bool:
-    """Mark what has many marks to be put in as an image, where there are too many in all; whether that is so."""
+def _rasterize(figure: Figure) -> None:
+    """Mark what has many marks to be put in as an image, where there are too many in all."""
     marks: list[tuple[Artist, int]] = []
     for axes in figure.axes:
         marks += [(line, np.size(line.get_xdata())) for line in axes.lines]
         marks += [(one, max(np.shape(one.get_offsets())[0], len(one.get_paths()))) for one in axes.collections]
-    if sum(count for _, count in marks) <= MOST_MARKS:
-        return False
-    for artist, count in marks:
-        if count > FEW_MARKS:
-            artist.set_rasterized(True)
-    return True
+    if sum(count for _, count in marks) > MOST_MARKS:
+        for artist, count in marks:
+            if count > FEW_MARKS:
+                artist.set_rasterized(True)

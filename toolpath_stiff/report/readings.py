@@ -25,6 +25,7 @@ from toolpath_stiff.report.figure import (
     new_figure,
 )
 from toolpath_stiff.report.pages import bullets, markup, picture, section, table
+from toolpath_stiff.report.painting import add_scales, painted_axes
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.history import history_lines
 from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent
@@ -127,13 +128,15 @@ def _half(figure: Figure, data: Measurements, residual: FloatArray, left: float,
     for i, level in enumerate(np.unique(levels)):
         for j, direction in enumerate(d for d in DIRECTION_COLOURS if (directions == d).any()):
             bottom = height - 1.35 - MAP * (i + 1) + 0.1
-            axes = figure.add_axes(
-                ((left + MAP * j) / width, bottom / height, (MAP - 0.15) / width, (MAP - 0.3) / height)
+            axes = painted_axes(
+                figure, ((left + MAP * j) / width, bottom / height, (MAP - 0.15) / width, (MAP - 0.3) / height)
             )
+            add_scales(axes, sides=())
             points = _map(axes, data, residual, (levels == level) & (directions == direction), limit)
             axes.set_title(direction if i == 0 else "", size=9.5, color=MUTED)
             if left < 1.0 and j == 0:  # of the first half
-                axes.set_ylabel(_level_text(data, levels == level), size=9)
+                text = _level_text(data, levels == level)
+                axes.text(-0.04, 0.5, text, transform=axes.transAxes, rotation=90, ha="right", va="center", size=9)
     return points
 
 
@@ -203,8 +206,6 @@ def _map(axes: Axes, data: Measurements, residual: FloatArray, chosen: NDArray[n
     axes.set_xlim(centre[0] - 1.2 * reach, centre[0] + 1.2 * reach)
     axes.set_ylim(centre[1] - 1.2 * reach, centre[1] + 1.2 * reach)
     axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
     return drawn
 
 
