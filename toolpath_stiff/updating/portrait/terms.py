@@ -18,9 +18,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.machine.kinematics import joint_angles
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
+from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
 
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
 VARIABLES = (
@@ -36,14 +38,17 @@ DIRECTIONS = ("X", "Y", "Z", "horizontal", "radial", "axial", "along the struts"
 #   tilting         the moment of the tip's force about the middle of the platform joints turns it; rad per N m
 #   vertex          the forces of the two struts that share a vertex move that vertex; m/N
 #   strut           in series with each strut; m/N
+#   frame pin,      a joint gives along one pin of its cross, which stands radially or tangentially about the machine's
+#   platform pin    axis, or about the platform's; in series with its strut; m/N
+#   turning         joints resist turning, at both ends of the strut; N m/rad, parallel to the struts
 #   strut factor    a share of the strut's own compliance by the strut law
 #   coupling        the force of one strut stretches another, by a share of the mean of both struts' compliances
 #   joint offset    a joint stands off its place, and the control does not know; m
 #   reading factor  the deflection is read too large by a share
 #   reading shift   the deflection is read too large by a displacement; m
 Action = Literal[
-    "give", "rocking", "tilting", "vertex", "strut", "strut factor", "coupling", "joint offset", "reading factor",
-    "reading shift",
+    "give", "rocking", "tilting", "vertex", "strut", "frame pin", "platform pin", "turning", "strut factor", "coupling",
+    "joint offset", "reading factor", "reading shift",
 ]  # fmt: skip
 # Action -> unit, its SI value, bounds and usual sizes in that unit; assumed: what a machine that still mills can have.
 UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = {
@@ -52,6 +57,9 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
     "tilting": ("nrad/N/m", 1e-9, (0.0, 5000.0), (1.0, 300.0)),
     "vertex": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
     "strut": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
+    "frame pin": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
+    "platform pin": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
+    "turning": ("kN m/rad", 1e3, (0.0, 5000.0), (5.0, 550.0)),
     "strut factor": ("%", 0.01, (-50.0, 400.0), (-20.0, 40.0)),
     "coupling": ("%", 0.01, (-50.0, 50.0), (-20.0, 20.0)),
     "joint offset": ("mm", 1e-3, (-30.0, 30.0), (-3.0, 3.0)),
@@ -59,6 +67,9 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
     "reading shift": ("um", 1e-6, (-200.0, 200.0), (-10.0, 10.0)),
 }
 ASSUMED = "described from readings; usual sizes are engineering experience, no source"
+PINS = ("frame pin", "platform pin")
+IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
+SWINGS = ("frame joint", "platform joint")
 AXES = {"X": 0, "Y": 1, "Z": 2}
 Constants = tuple[tuple[str, float], ...]
 IDLE = 1e-3  # N in a strut: below, a power of the force would diverge, and the strut adds nothing that shows
@@ -80,11 +91,11 @@ class Term:
         Constants in SI, by name. Of the shape: `slope` has `start` (where it is 0) and `end` (where it is 1), or
         `power` and `reference`; `square` has `centre` and `reach`; `bump` has `centre` and `width`; `threshold` has
         `edge` and `side` (1: above it, -1: below), or `from` (where it begins) and `end` (where it is 1), or
-        `beyond`, a force that friction holds; `periodic` has `period` and `crest`; `sign` has `side`. Of a
+        `beyond`, a force that friction holds, or `within`, a force beyond which play is used up; `periodic` has `period` and `crest`; `sign` has `side`. Of a
         `coupling`: `first` and `second`, numbers of struts.
     column
-        Name of the set-up; of `tilt`, "" for the angle from Z, "X" or "Y" for the lean towards that axis; of a
-        `joint offset`, "frame" or "platform".
+        Name of the set-up; of `tilt`, "" for the angle from Z, "X" or "Y" for the lean towards that axis, one of
+        `SWINGS` for how far each of these joints has swung from its place at the neutral pose; of a `joint offset`, "frame" or "platform".
     size
         In SI.
     """
@@ -158,6 +169,8 @@ def variable_values(variable: str, path: LoadPath, column: str = "") -> FloatArr
         return np.hypot(position[:, 0], position[:, 1])
     if variable == "tilt":
         axis = path.rotation[:, :, 2]
+        if column in SWINGS:
+            return joint_angles(path.machine, path.struts, path.rotation)[SWINGS.index(column)]
         if column:
             return np.arcsin(np.clip(axis[:, AXES[column]], -1.0, 1.0))
         return np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2])
@@ -194,6 +207,8 @@ def shape_values(shape: str, values: FloatArray, at: Mapping[str, float], signed
         return np.asarray(np.exp(-0.5 * ((values - at["centre"]) / at["width"]) ** 2))
     if shape == "threshold" and "beyond" in at:  # Coulomb friction holds up to the edge: (v - edge) / v of a force v
         return np.maximum(1.0 - at["beyond"] / np.maximum(values, IDLE), 0.0)
+    if shape == "threshold" and "within" in at:  # play that a force uses up gives no more: min(v, edge) / v
+        return np.minimum(at["within"] / np.maximum(values, IDLE), 1.0)
     if shape == "threshold" and "from" in at:  # nothing up to there, then a straight line
         return np.asarray(np.maximum((values - at["from"]) / (at["end"] - at["from"]), 0.0))
     if shape == "threshold":
@@ -273,14 +288,25 @@ def _vertex_carriers(link: str, direction: str, where: int | None, path: LoadPat
     return np.stack(found, axis=1)
 
 
+def along_pins(action: str, direction: str, path: LoadPath) -> FloatArray:
+    """(n, 6) share of each strut's force that is along the pin of its joint."""
+    joints = path.machine.frame_joints if action == "frame pin" else path.machine.platform_joints
+    x, y = joints[:, :2].T / np.linalg.norm(joints[:, :2], axis=1)
+    pins = np.stack([x, y, 0.0 * x] if direction == "radial" else [-y, x, 0.0 * x], axis=1)
+    turned = pins if action == "frame pin" else pins @ np.swapaxes(path.rotation, 1, 2)
+    return np.asarray((path.struts.directions * turned).sum(axis=-1))
+
+
 def strut_share(term: Term, path: LoadPath) -> FloatArray:
-    """(n, 6) m/N that a `strut` or `strut factor` adds to each strut per unit of its size."""
+    """(n, 6) of each strut per unit of a size: compliance of what is in series with it, stiffness of `turning`."""
     shape = shaped(term, path)
     each = np.array(np.broadcast_to(shape[:, None] if shape.ndim == 1 else shape, (len(path), 6)), dtype=float)
     if term.where is not None:
         each[:, np.arange(6) != term.where - 1] = 0.0
     if term.action == "strut factor":
         each = np.asarray(each / path.machine.strut_law.stiffness(path.struts.lengths))
+    if term.action in PINS:
+        each = np.asarray(each * along_pins(term.action, term.direction, path) ** 2)
     return each
 
 
@@ -345,6 +371,17 @@ class _Strut(TermEffect):
         return np.asarray(p["size"] * strut_share(self.term, path))
 
 
+class _Turning(TermEffect):
+    def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """Rotational springs at both ends of each strut."""
+        if p["size"] == 0.0 or not _seen(self.term, path):
+            return None
+        rotations = end_rotations(path)
+        weighted = (p["size"] * strut_share(self.term, path))[:, :, None, None] * rotations
+        flat = (len(path), 36, 6)
+        return np.asarray(np.swapaxes(rotations.reshape(flat), 1, 2) @ weighted.reshape(flat))
+
+
 class _Offset(TermEffect):
     unknown_to_control = True
 
@@ -401,7 +438,7 @@ def effect_of(term: Term) -> Effect:
         raise ValueError(f"no effect sees the variable {term.variable!r}")
     unit, si, bounds, typical = UNITS[term.action]
     kinds: dict[str, type[TermEffect]] = {
-        "coupling": _Coupling, "strut": _Strut, "strut factor": _Strut, "joint offset": _Offset,
+        "coupling": _Coupling, **dict.fromkeys(IN_SERIES, _Strut), "turning": _Turning, "joint offset": _Offset,
         "reading factor": _Reading, "reading shift": _Reading,
     }  # fmt: skip
     needs = [NEEDS[term.variable]] if term.variable in NEEDS else []
@@ -415,7 +452,7 @@ def effect_of(term: Term) -> Effect:
         "name": f"term: {term.key}",
         "title": term.key,
         "link": link,
-        "equation": "c += size s(v) sum_k (h_k . [f; w])^2",
+        "equation": "c += size s(v) sum_k (h_k . [f; w])^2; of turning: K += size s(v) sum_k B_k^T B_k",
         "source": ASSUMED,
         "parameters": (Parameter("size", unit, si, bounds, typical, ASSUMED, meaning=f"size of {term.key}"),),
         "needs": tuple(needs),

@@ -11,7 +11,7 @@ from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import RAD_PER_DEG, json_number
 from toolpath_stiff.updating.portrait import Portrait, Sized
 from toolpath_stiff.updating.portrait.alike import Alike
-from toolpath_stiff.updating.portrait.terms import Term
+from toolpath_stiff.updating.portrait.terms import PINS, SWINGS, Term
 
 __all__ = [
     "PortraitEntry",
@@ -48,6 +48,7 @@ GIVES = {
 ROCKS = {
     "X": "rocks about Y", "Y": "rocks about X", "all": "rocks about X and Y", "tangential": "turns about Z",
 }  # fmt: skip
+PINNED = {"radial": "radially", "tangential": "tangentially"}
 TIPS = {"X": "tips about the platform's Y", "Y": "tips about the platform's X", "radial": "tips"}
 MOST_SAID = 3  # terms in a sentence on what else would look the same; a document has more
 
@@ -73,6 +74,11 @@ def _cause(term: Term) -> str:
         return f"strut {term.where} is {side}" if term.where else f"the struts are {side}"
     if term.action == "strut":
         return f"the joints of strut {term.where} give way" if term.where else "the joints of the struts give way"
+    if term.action == "turning":
+        return f"the joints of strut {term.where} resist turning" if term.where else "the joints resist turning"
+    if term.action in PINS:
+        which = f"joint of strut {term.where} gives" if term.where else "joints of the struts give"
+        return f"the {term.action.removesuffix(' pin')} {which} way along a pin that stands {PINNED[term.direction]}"
     if term.action == "vertex":
         which = f"{term.link} vertex {term.where} gives" if term.where else f"the vertices of the {term.link} give"
         return f"{which} way {GIVES[term.direction]}"
@@ -98,7 +104,7 @@ def _with(term: Term) -> str:
     at = term.constants
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     if term.variable == "tilt" and term.column:
-        name = f"the lean towards {term.column}"
+        name = f"the swing of the {term.column}s" if term.column in SWINGS else f"the lean towards {term.column}"
 
     def shown(value: float) -> str:
         return f"{float(f'{value / si:.3g}'):g} {unit}".rstrip()
@@ -132,6 +138,8 @@ def _threshold_words(term: Term, name: str, shown: Callable[[float], str]) -> st
     if "from" in at:
         side = "above" if at["end"] > at["from"] else "below"
         return f" where {name} is {side} {shown(at['from'])}, in full at {shown(at['end'])}"
+    if "within" in at:
+        return f" until {name} reaches {shown(at['within'])}, and no further"
     if "beyond" in at:
         return f" as far as {name} is above {shown(at['beyond'])}, which friction holds"
     return f" where {name} is {'above' if at['side'] > 0.0 else 'below'} {shown(at['edge'])}"
