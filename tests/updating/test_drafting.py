@@ -60,6 +60,12 @@ TERMS = [
     Term("instrument", "all", "time", "slope", "reading factor", at=(("start", 0.0), ("end", 7200.0))),
     Term("instrument", "reading", "load", "slope", "reading shift", at=(("start", 0.0), ("end", 2000.0))),
     Term("table", "horizontal", "temperature", "slope", "give", at=(("start", 20.0), ("end", 21.5))),
+    Term("joints", "all", "load", "slope", "turning", at=FALLING),
+    Term("joints", "all", "tilt", "square", "turning", at=(("centre", 0.0), ("reach", 0.6)), column="platform joint"),
+    Term("joints", "all", "constant", "offset", "turning", where=2),
+    Term("joints", "radial", "constant", "offset", "platform pin"),
+    Term("joints", "tangential", "strut force", "threshold", "frame pin", where=4, at=(("within", 200.0),)),
+    Term("joints", STRUT, "tilt", "slope", "strut", at=(("start", 0.1), ("end", 0.5)), column="frame joint"),
 ]  # fmt: skip
 WORDS = "a long clause without an end, " * 5 + 'the "table" of C:\\new gives way """here"""'
 
@@ -117,7 +123,7 @@ def compare_with_term(term, some_path, tmp_path, acts=True):
     parameter = drafted.parameters[0]
     size = (0.6 if acts else 0.02) * parameter.typical[1] * parameter.si
     p, q = {parameter.name: size}, {"size": size}
-    for hook in ("strut_compliance", "load_compliance"):
+    for hook in ("strut_compliance", "load_compliance", "parallel_stiffness"):
         mine, theirs = (getattr(one, hook)(some_path, values) for one, values in ((drafted, p), (own, q)))
         assert (mine is None) == (theirs is None)
         if theirs is not None:
