@@ -36,11 +36,14 @@ from toolpath_stiff.updating.portrait.terms import (
     VARIABLES,
     Action,
     Constants,
+    Factor,
     Term,
     along_pins,
     carriers,
     coupled,
     coupling_share,
+    factor_values,
+    multiplied,
     reading_share,
     shape_values,
     variable_values,
@@ -83,10 +86,13 @@ class Local:
         """Whether it is one of several places or channels: a joint, a vertex, the readings along one axis."""
         return self.where is not None or (self.link == "instrument" and self.direction != "reading")
 
-    def term(self, variable: str, shape: str, at: Constants, column: str = "") -> Term:
-        """With a variable and a shape."""
+    def term(
+        self, variable: str, shape: str, at: Constants, column: str = "", times: Factor | None = None
+    ) -> Term:
+        """With a variable and a shape, and a second one where there is one."""
+        column = column or self.column
         return Term(
-            self.link, self.direction, variable, shape, self.action, self.where, (*self.at, *at), column or self.column
+            self.link, self.direction, variable, shape, self.action, self.where, (*self.at, *at), column, times=times
         )
 
 
@@ -171,11 +177,12 @@ class Entry:
     shape: str
     at: Constants
     log_prior: float
+    times: Factor | None = None
 
     @property
     def term(self) -> Term:
         """The term."""
-        return self.local.term(self.variable, self.shape, self.at, self.column)
+        return self.local.term(self.variable, self.shape, self.at, self.column, self.times)
 
 
 @dataclass(frozen=True)
@@ -303,11 +310,39 @@ def crossed(term: Term, ground: Ground) -> list[Entry]:
             continue
         if term.column in SWINGS and local.link != "joints":
             continue
+        if term.times is not None and not _may_feel(local, term.times):
+            continue
         signed = len(local.term("constant", "offset", ()).signs) > 1
         log = prior.place(local, term.variable)
         found += [
-            Entry(local, term.variable, term.column, shape, at, log) for shape, at in _translated(term, signed, ground)
+            Entry(local, term.variable, term.column, shape, at, log, term.times)
+            for shape, at in _translated(term, signed, ground)
         ]
+    return found
+
+
+def _may_feel(local: Local, factor: Factor) -> bool:
+    """Whether a link may depend on a second variable."""
+    if factor.column in SWINGS and local.link != "joints":
+        return False
+    return factor.variable in (*local.variables, *local.crossed)
+
+
+def products(term: Term, ground: Ground) -> list[Term]:
+    """The same term times every shape of every other variable that its link may depend on, itself not negative."""
+    if term.times is not None or term.action in ("coupling", "joint offset"):
+        return []
+    place = (term.link, term.action, term.direction, term.where)
+    (local,) = (one for one in locals_of(ground.data.extra) if (one.link, one.action, one.direction, one.where) == place)
+    found = []
+    for variable in dict.fromkeys((*local.variables, *local.crossed)):
+        if variable in (*ONCE, term.variable):
+            continue
+        for column in columns_of(variable, ground, local.link == "joints"):
+            named = ground.shapes(variable, column, False, local.where)[0]
+            found += [
+                replace(term, times=Factor(variable, shape, at, column)) for shape, at in named if shape != "periodic"
+            ]
     return found
 
 
@@ -522,7 +557,7 @@ class Ground:
 
     def _share(self, term: Term) -> FloatArray:
         path = self.path
-        plain = replace(term, variable="constant", shape="offset")
+        plain = replace(term, variable="constant", shape="offset", times=None)
         if term.action in (*IN_SERIES, "turning"):
             each = self.forces[:, :6] ** 2
             if term.action == "turning":
@@ -591,8 +626,15 @@ class Ground:
         """(n,) m/N by which what a term adds grows with its size; its `column` unless it is not linear in it."""
         if not term.size or term.action != "turning":
             return self.column(term)
+        return self._turned_by(_each(self.shape(term), term), term.size)[1]
+
+    def shape(self, term: Term) -> FloatArray:
+        """(n,) or (n, 6) of what a term depends on."""
         values = self.values(term.variable, term.column)
-        return self._turned_by(_each(shape_values(term.shape, values, term.constants, False), term), term.size)[1]
+        first = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+        if term.times is None:
+            return first
+        return multiplied(first, factor_values(term.times, self.values(term.times.variable, term.times.column)))
 
     def shapes(self, variable: str, column: str, signed: bool, where: int | None) -> Shapes:
         """All shapes of a variable over these readings, worked out once; of strut `where` where each has its own."""
@@ -618,11 +660,17 @@ class Ground:
 
     def column(self, term: Term) -> FloatArray:
         """(n,) m/N per unit (SI) of a term's size."""
-        values, share = self.values(term.variable, term.column), self.share(term)
-        if values.ndim == 2 and share.ndim == 1:
-            raise ValueError(f"{term.link} has no {term.variable} of its own")
-        shape = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+        share = self.share(term)
+        if share.ndim == 1 and any(self.values(*one).ndim == 2 for one in _asked(term)):
+            raise ValueError(f"{term.link} has no {' or '.join(term.variables)} of its own")
+        shape = self.shape(term)
         return self.columns(term, share, shape[None])[0]
+
+
+def _asked(term: Term) -> list[tuple[str, str]]:
+    """Variables with their columns."""
+    own = [(term.variable, term.column)]
+    return own if term.times is None else [*own, (term.times.variable, term.times.column)]
 
 
 def _each(shape: FloatArray, term: Term) -> FloatArray:

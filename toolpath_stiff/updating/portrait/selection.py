@@ -18,8 +18,16 @@ from toolpath_stiff.updating.inference.covariances import Precision, inverse_roo
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.gates import Simulator, set_wild_aside
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, scaled_inverse
-from toolpath_stiff.updating.portrait.dictionary import Dictionary, Entry, Ground, crossed, dictionary_of, shapes_near
-from toolpath_stiff.updating.portrait.terms import Term
+from toolpath_stiff.updating.portrait.dictionary import (
+    Dictionary,
+    Entry,
+    Ground,
+    crossed,
+    dictionary_of,
+    products,
+    shapes_near,
+)
+from toolpath_stiff.updating.portrait.terms import Factor, Term
 
 DRAWS = 200  # simulated campaigns
 JOINS = 0.02  # probability by chance below which a further term is taken for something
@@ -312,6 +320,27 @@ class Selection:
             if better.posterior > grown.posterior:
                 grown = better
         return grown
+
+    def multiplied(self, before: Description, whole: Description, k: int) -> Description | None:
+        """The k-th term of a whole, which `before` lacks, times the best shape of a second variable; None without."""
+        others = self.scattered(before, whole)
+        terms = products(whole.terms[k], self.ground)
+        if not terms:
+            return None
+        found = self.together(others, terms)
+        best = self.extended(before, terms[int(np.argmax(found.posterior))])
+        second = best.terms[-1].second
+        assert second is not None
+        for finer in (1.0, 0.4):
+            near = shapes_near(second, self.ground, finer)
+            if not near:
+                return best
+            factors = [replace(best.terms[-1], times=Factor(t.variable, t.shape, t.at, t.column)) for t in near]
+            found = self.together(others, factors)
+            better = self.extended(before, factors[int(np.argmax(found.posterior))])
+            if better.posterior > best.posterior:
+                best, second = better, near[int(np.argmax(found.posterior))]
+        return best
 
     def without(self, description: Description, k: int) -> Description:
         """A description less one of its terms, refitted."""

@@ -76,6 +76,16 @@ IDLE = 1e-3  # N in a strut: below, a power of the force would diverge, and the 
 
 
 @dataclass(frozen=True)
+class Factor:
+    """A further variable that a term depends on, times the first: shape and so on as of `Term`."""
+
+    variable: str
+    shape: str
+    at: Constants = ()
+    column: str = ""
+
+
+@dataclass(frozen=True)
 class Term:
     """One term of a description.
 
@@ -98,6 +108,8 @@ class Term:
         `SWINGS` for how far each of these joints has swung from its place at the neutral pose; of a `joint offset`, "frame" or "platform".
     size
         In SI.
+    times
+        A second variable with its shape: c(v, w) = size * s(v) * t(w).
     """
 
     link: str
@@ -109,6 +121,7 @@ class Term:
     at: Constants = ()
     column: str = ""
     size: float = field(default=0.0, compare=False)
+    times: Factor | None = None
 
     @property
     def unit(self) -> str:
@@ -132,8 +145,21 @@ class Term:
 
     @property
     def acts(self) -> bool:
-        """Whether an effect can see its variable: the order of readings and further columns it cannot."""
-        return self.variable in VARIABLES and self.variable != "order"
+        """Whether an effect can see its variables: the order of readings and further columns it cannot."""
+        return all(one in VARIABLES and one != "order" for one in self.variables)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """One or two."""
+        return (self.variable,) if self.times is None else (self.variable, self.times.variable)
+
+    @property
+    def second(self) -> Term | None:
+        """The same with its second variable as the only one."""
+        if self.times is None:
+            return None
+        one = self.times
+        return replace(self, variable=one.variable, shape=one.shape, at=one.at, column=one.column, times=None)
 
     @property
     def constants(self) -> dict[str, float]:
@@ -145,7 +171,10 @@ class Term:
         """A name that no other term has: its words, and its constants to six digits."""
         numbers = [f"{name}={value:.6g}" for name, value in self.at]
         named = [self.link, str(self.where or ""), self.action, self.direction, self.variable, self.column, self.shape]
-        return " ".join(part for part in (*named, *numbers) if part)
+        own = " ".join(part for part in (*named, *numbers) if part)
+        if self.second is None:
+            return own
+        return f"{own} times {self.second.key.removeprefix(f'{self.link} ')}"
 
     def sized(self, size: float) -> Term:
         """The same with a size (SI)."""
@@ -224,7 +253,23 @@ def shaped(term: Term, path: LoadPath) -> FloatArray:
     What varies from strut to strut belongs to a single strut where the term has one.
     """
     values = variable_values(term.variable, path, term.column)
-    return np.asarray(shape_values(term.shape, values, term.constants, len(term.signs) > 1))
+    first = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+    if term.times is None:
+        return first
+    return multiplied(first, factor_values(term.times, variable_values(term.times.variable, path, term.times.column)))
+
+
+def factor_values(factor: Factor, values: FloatArray) -> FloatArray:
+    """t(w) of a second variable, not below 0."""
+    return shape_values(factor.shape, values, dict(factor.at), False)
+
+
+def multiplied(first: FloatArray, second: FloatArray) -> FloatArray:
+    """The product of two shapes, (n,) or of each strut (n, 6)."""
+    if first.ndim == second.ndim:
+        return np.asarray(first * second)
+    wide, narrow = (first, second) if first.ndim == 2 else (second, first)
+    return np.asarray(wide * narrow[:, None])
 
 
 # -- links -------------------------------------------------------------------------------------------------------------
@@ -405,9 +450,8 @@ class _Reading(TermEffect):
 def _seen(term: Term, path: LoadPath) -> bool:
     """Whether these poses say what the term varies with."""
     needed = {"time": path.time, "temperature": path.temperature, "setup": path.setup}
-    if term.variable in ("strut force", "force sign"):
-        return path.strut_forces is not None
-    return term.variable not in needed or needed[term.variable] is not None
+    needed |= dict.fromkeys(OF_FORCES, path.strut_forces)
+    return all(one not in needed or needed[one] is not None for one in term.variables)
 
 
 NEEDS = {
@@ -417,6 +461,7 @@ NEEDS = {
     "temperature": "temperature_C",
     "setup": "setup",
 }
+OF_FORCES = ("strut force", "force sign")
 CATALOGUE_LINKS = {"one strut": "struts"}
 
 
@@ -435,13 +480,13 @@ def effect_of(term: Term) -> Effect:
     'size_nm_per_N'
     """
     if not term.acts:
-        raise ValueError(f"no effect sees the variable {term.variable!r}")
+        raise ValueError(f"no effect sees the variable {' times '.join(term.variables)!r}")
     unit, si, bounds, typical = UNITS[term.action]
     kinds: dict[str, type[TermEffect]] = {
         "coupling": _Coupling, **dict.fromkeys(IN_SERIES, _Strut), "turning": _Turning, "joint offset": _Offset,
         "reading factor": _Reading, "reading shift": _Reading,
     }  # fmt: skip
-    needs = [NEEDS[term.variable]] if term.variable in NEEDS else []
+    needs = list(dict.fromkeys(NEEDS[one] for one in term.variables if one in NEEDS))
     if term.action in ("reading factor", "reading shift"):
         needs += ["direction"] if term.direction in AXES else []
         needs += ["force_N"] if term.action == "reading shift" and "force_N" not in needs else []
@@ -456,7 +501,7 @@ def effect_of(term: Term) -> Effect:
         "source": ASSUMED,
         "parameters": (Parameter("size", unit, si, bounds, typical, ASSUMED, meaning=f"size of {term.key}"),),
         "needs": tuple(needs),
-        "load_dependent": term.variable in ("strut force", "force sign"),
+        "load_dependent": not set(OF_FORCES).isdisjoint(term.variables),
     }
     made = type("TermOfPortrait", (kinds.get(term.action, _Form),), attributes)
     found: Effect = made()

@@ -55,7 +55,10 @@ MOST_SAID = 3  # terms in a sentence on what else would look the same; a documen
 
 def term_words(term: Term) -> str:
     """What gives way and what it varies with: a clause, without its size."""
-    return f"{_cause(term)}{_with(term)}"
+    said = f"{_cause(term)}{_with(term, len(term.signs) > 1)}"
+    if term.second is None:
+        return said
+    return f"{said}, and this {_with(term.second, signed=False).removeprefix(',').strip()}"
 
 
 def _cause(term: Term) -> str:
@@ -93,8 +96,8 @@ def _cause(term: Term) -> str:
     return f"the {term.link} gives way {along}"
 
 
-def _with(term: Term) -> str:
-    """What it varies with and how, after its cause."""
+def _with(term: Term, signed: bool) -> str:
+    """What it varies with and how, after its cause; `signed`: to both sides."""
     if term.variable in ("constant", "direction"):
         return ""
     if term.variable == "setup":
@@ -110,7 +113,7 @@ def _with(term: Term) -> str:
         return f"{float(f'{value / si:.3g}'):g} {unit}".rstrip()
 
     if term.shape == "slope":
-        return _slope_words(term, name, shown)
+        return _slope_words(term, name, shown, signed)
     if term.shape == "square":
         return f", with the square of {name} from {shown(at['centre'])}, in full {shown(at['reach'])} from there"
     if term.shape == "bump":
@@ -120,13 +123,13 @@ def _with(term: Term) -> str:
     return _threshold_words(term, name, shown)
 
 
-def _slope_words(term: Term, name: str, shown: Callable[[float], str]) -> str:
+def _slope_words(term: Term, name: str, shown: Callable[[float], str], signed: bool) -> str:
     """A straight line or a power of a variable, in words."""
     at = term.constants
     if "power" in at:
         fading = "less" if at["power"] < 0.0 else "more"
         return f", {fading} with {name} (power {at['power']:.2g}, the size given at {shown(at['reference'])})"
-    if len(term.signs) > 1:
+    if signed:
         return f" in a straight line with {name}, nothing at {shown(at['start'])} and in full at {shown(at['end'])}"
     side = "above" if at["end"] > at["start"] else "below"
     return f" where {name} is {side} {shown(at['start'])}, in full at {shown(at['end'])}"
