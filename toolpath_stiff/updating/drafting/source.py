@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.units import RAD_PER_DEG
@@ -211,13 +211,13 @@ def _constants_in_words(term: Term) -> str:
 # -- shapes ------------------------------------------------------------------------------------------------------------
 
 
-def _shape(term: Term) -> tuple[str, str]:
-    """The share of the size as an expression and as a formula."""
+def _shape(term: Term, signed: bool | None = None) -> tuple[str, str]:
+    """The share of the size as an expression and as a formula, without its second variable; `signed`: to both sides."""
     v = _variable_name(term)
     if not v:
         return "np.ones(len(path))", ""
     above = term.constants.get("side", 1.0) > 0.0
-    signed = len(term.signs) > 1
+    signed = len(term.signs) > 1 if signed is None else signed
     if term.shape == "slope" and "power" in term.constants:
         return f"(np.maximum({v}, 1e-3) / reference) ** power", f"({v} / reference)^power"
     if term.shape == "slope":
@@ -328,6 +328,23 @@ _LAW = "path.machine.strut_law.stiffness(path.struts.lengths{})"
 
 
 def _piece(term: Term, words: str, name: str) -> Piece:
+    first = _of_one(replace(term, times=None), words, name)
+    if term.second is None:
+        return first
+    second, share = term.second, f"{name}_share(path)"
+    own, said = _shape(second, signed=False)
+    each = second.variable in EACH_STRUT or second.column in SWINGS
+    wide = term.action in IN_SERIES or term.action == "turning"
+    if wide and not each:
+        own = f"{_grouped(own)}[:, None]"
+    what = f"{'(n, 6)' if each else '(n, 1)' if wide else '(n,)'}: by what that is multiplied."
+    function = _function(f"{name}_factor", what, _share_lines(second), own)
+    lines = tuple(line.replace(share, f"{share} * {name}_factor(path)") for line in first.statements)
+    formula = f"{first.formula}; times {said or 'whether it is on'}{_constants_in_words(second)}"
+    return replace(first, term=term, functions=f"{first.functions}\n\n\n{function}", statements=lines, formula=formula)
+
+
+def _of_one(term: Term, words: str, name: str) -> Piece:
     if term.action in IN_SERIES:
         return _strut_piece(term, words, name)
     if term.action == "turning":
