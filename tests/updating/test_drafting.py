@@ -25,7 +25,7 @@ LINE, RAMP = (("start", -0.11), ("end", 0.17)), (("start", 0.71), ("end", 1.13))
 ABOVE, BELOW = (("edge", 0.02), ("side", 1.0)), (("edge", 0.013), ("side", -1.0))
 FALLING = (("power", -1.0 / 3.0), ("reference", 500.0))
 STRUT = "along the struts"
-HERE = Factor("setup", "offset", column="it's \"here\"")
+HERE = Factor("setup", "offset", column='it\'s "here"')
 SWUNG = Factor("tilt", "square", (("centre", 0.0), ("reach", 0.6)), "platform joint")
 TERMS = [
     Term("table", "Y", "y", "slope", "give", at=LINE),

@@ -162,8 +162,8 @@ def _variable_lines(term: Term) -> list[str]:
     if term.variable == "setup":
         return [f"on = (path.setup == {term.column!r}).astype(float)  # 1 in this set-up"]
     if term.column in SWINGS:
-        which = SWINGS.index(term.column)
-        return [f"# (n, 6) rad, swing of the {term.column}s from their place at rest", f"swing = {JOINT_ANGLES}[{which}]"]
+        said = f"# (n, 6) rad, swing of the {term.column}s from their place at rest"
+        return [said, f"swing = {JOINT_ANGLES}[{SWINGS.index(term.column)}]"]
     if term.variable == "tilt" and term.column:
         axis = AXES.index(term.column)
         return [f"tilt = np.arcsin(np.clip(path.rotation[:, {axis}, 2], -1.0, 1.0))  # rad, towards {term.column}"]

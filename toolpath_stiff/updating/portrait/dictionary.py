@@ -86,9 +86,7 @@ class Local:
         """Whether it is one of several places or channels: a joint, a vertex, the readings along one axis."""
         return self.where is not None or (self.link == "instrument" and self.direction != "reading")
 
-    def term(
-        self, variable: str, shape: str, at: Constants, column: str = "", times: Factor | None = None
-    ) -> Term:
+    def term(self, variable: str, shape: str, at: Constants, column: str = "", times: Factor | None = None) -> Term:
         """With a variable and a shape, and a second one where there is one."""
         column = column or self.column
         return Term(
@@ -146,8 +144,8 @@ def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
         own = ("strut force", "force sign")
         variables = ("constant", "load", "temperature", *own) if where else (*whole, *own, "tilt")
         yield Local("joints", "strut", "along the struts", where, variables, crossed=(*whole, *own, "tilt"))
-        own = ("constant",) if where else ("constant", "load", "tilt")
-        yield Local("joints", "turning", "all", where, own, crossed=(*whole, "tilt"))
+        turning = ("constant",) if where else ("constant", "load", "tilt")
+        yield Local("joints", "turning", "all", where, turning, crossed=(*whole, "tilt"))
         for action, direction in product(PINS, ("radial", "tangential")):
             yield Local("joints", action, direction, where, ("constant",), crossed=variables)
     for axis in "XYZ":
@@ -333,7 +331,8 @@ def products(term: Term, ground: Ground) -> list[Term]:
     if term.times is not None or term.action in ("coupling", "joint offset"):
         return []
     place = (term.link, term.action, term.direction, term.where)
-    (local,) = (one for one in locals_of(ground.data.extra) if (one.link, one.action, one.direction, one.where) == place)
+    every = locals_of(ground.data.extra)
+    (local,) = (one for one in every if (one.link, one.action, one.direction, one.where) == place)
     found = []
     for variable in dict.fromkeys((*local.variables, *local.crossed)):
         if variable in (*ONCE, term.variable):
@@ -664,7 +663,7 @@ class Ground:
         if share.ndim == 1 and any(self.values(*one).ndim == 2 for one in _asked(term)):
             raise ValueError(f"{term.link} has no {' or '.join(term.variables)} of its own")
         shape = self.shape(term)
-        return self.columns(term, share, shape[None])[0]
+        return np.asarray(self.columns(term, share, shape[None])[0])
 
 
 def _asked(term: Term) -> list[tuple[str, str]]:

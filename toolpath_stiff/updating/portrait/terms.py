@@ -67,7 +67,7 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
     "reading shift": ("um", 1e-6, (-200.0, 200.0), (-10.0, 10.0)),
 }
 ASSUMED = "described from readings; usual sizes are engineering experience, no source"
-PINS = ("frame pin", "platform pin")
+PINS: tuple[Action, ...] = ("frame pin", "platform pin")
 IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
 SWINGS = ("frame joint", "platform joint")
 AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -101,11 +101,12 @@ class Term:
         Constants in SI, by name. Of the shape: `slope` has `start` (where it is 0) and `end` (where it is 1), or
         `power` and `reference`; `square` has `centre` and `reach`; `bump` has `centre` and `width`; `threshold` has
         `edge` and `side` (1: above it, -1: below), or `from` (where it begins) and `end` (where it is 1), or
-        `beyond`, a force that friction holds, or `within`, a force beyond which play is used up; `periodic` has `period` and `crest`; `sign` has `side`. Of a
-        `coupling`: `first` and `second`, numbers of struts.
+        `beyond`, a force that friction holds, or `within`, a force beyond which play is used up; `periodic` has
+        `period` and `crest`; `sign` has `side`. Of a `coupling`: `first` and `second`, numbers of struts.
     column
         Name of the set-up; of `tilt`, "" for the angle from Z, "X" or "Y" for the lean towards that axis, one of
-        `SWINGS` for how far each of these joints has swung from its place at the neutral pose; of a `joint offset`, "frame" or "platform".
+        `SWINGS` for how far each of these joints has swung from its place at the neutral pose; of a `joint offset`,
+        "frame" or "platform".
     size
         In SI.
     times
