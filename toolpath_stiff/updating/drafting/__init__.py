@@ -152,9 +152,9 @@ def _nothing_to_describe(diagnosis: Diagnosis) -> str:
     if diagnosis.portrait is None:
         word = "explains" if diagnosis.verdict == "identified" else "may explain"
         return f"{names} {word} these readings and leaves nothing that stands out: there is nothing to describe."
-    unseen = [one.term.variable for one in diagnosis.portrait.terms if not one.term.acts]
-    if len(unseen) == len(diagnosis.portrait.terms):
-        with_what = joined(list(dict.fromkeys(unseen)))
+    terms = [one.term for one in diagnosis.portrait.terms]
+    if not any(term.acts for term in terms):
+        with_what = joined(list(dict.fromkeys(name for term in terms for name in term.unseen)))
         return f"What is missing varies with {with_what}, which no effect of a machine sees: nothing is drafted."
     return ""
 

@@ -146,8 +146,13 @@ class Term:
 
     @property
     def acts(self) -> bool:
-        """Whether an effect can see its variables: the order of readings and further columns it cannot."""
-        return all(one in VARIABLES and one != "order" for one in self.variables)
+        """Whether an effect can see its variables."""
+        return not self.unseen
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Variables that no effect sees: the order of readings and further columns."""
+        return tuple(one for one in self.variables if one not in VARIABLES or one == "order")
 
     @property
     def variables(self) -> tuple[str, ...]:

@@ -222,12 +222,13 @@ class VariableEntry(TypedDict):
 
 
 class SizedTermEntry(TypedDict):
-    """A term of the dictionary with its size; `where` is a strut or a vertex."""
+    """A term of the dictionary with its size; `where` is a strut or a vertex, `second_variable` null without one."""
 
     link: str
     where: int | None
     direction: str
     variable: str
+    second_variable: str | None
     shape: str
     size: float | None
     unit: str
@@ -321,6 +322,7 @@ def _of_term(term: Term) -> SizedTermEntry:
         "where": term.where,
         "direction": term.direction,
         "variable": term.variable,
+        "second_variable": None if term.times is None else term.times.variable,
         "shape": term.shape,
         "size": json_number(term.size / term.si),
         "unit": term.unit,
