@@ -445,7 +445,7 @@ STRUT_KINDS: dict[str, Kind] = {
         "joints softer the further they swing", ALL, "tilt,radius,strut length,z", SOFT, act=joint_swing
     ),
     "cardan_fork": kind(
-        "joints softer along one pin of their cross", ALL, "constant,tilt,radius,strut length,z", SOFT, act=cardan_fork
+        "joints softer along one pin of their cross", ALL, "constant,tilt,radius,strut length", SOFT, act=cardan_fork
     ),
     "joint_binding": kind(
         "joints that resist turning near the end of their swing", "joints,struts,platform",
