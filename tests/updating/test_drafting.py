@@ -16,7 +16,7 @@ from toolpath_stiff.stiffness.effects.trial import try_effect
 from toolpath_stiff.stiffness.model import build_model, load_path
 from toolpath_stiff.updating.drafting import Description, Origin, draft_source, effect_names
 from toolpath_stiff.updating.portrait.dictionary import Ground, dictionary_of
-from toolpath_stiff.updating.portrait.terms import Term, effect_of
+from toolpath_stiff.updating.portrait.terms import Factor, Term, effect_of
 
 ORIGIN = Origin(
     ("data.csv",), "24" * 32, 12, "nist", ("0123456789",) * 12, "tps effects draft data.csv", ("a", "b", "c")
@@ -25,6 +25,8 @@ LINE, RAMP = (("start", -0.11), ("end", 0.17)), (("start", 0.71), ("end", 1.13))
 ABOVE, BELOW = (("edge", 0.02), ("side", 1.0)), (("edge", 0.013), ("side", -1.0))
 FALLING = (("power", -1.0 / 3.0), ("reference", 500.0))
 STRUT = "along the struts"
+HERE = Factor("setup", "offset", column='it\'s "here"')
+SWUNG = Factor("tilt", "square", (("centre", 0.0), ("reach", 0.6)), "platform joint")
 TERMS = [
     Term("table", "Y", "y", "slope", "give", at=LINE),
     Term("table", "all", "constant", "offset", "give"),
@@ -60,6 +62,17 @@ TERMS = [
     Term("instrument", "all", "time", "slope", "reading factor", at=(("start", 0.0), ("end", 7200.0))),
     Term("instrument", "reading", "load", "slope", "reading shift", at=(("start", 0.0), ("end", 2000.0))),
     Term("table", "horizontal", "temperature", "slope", "give", at=(("start", 20.0), ("end", 21.5))),
+    Term("joints", "all", "load", "slope", "turning", at=FALLING),
+    Term("joints", "all", "tilt", "square", "turning", at=(("centre", 0.0), ("reach", 0.6)), column="platform joint"),
+    Term("joints", "all", "constant", "offset", "turning", where=2),
+    Term("joints", "radial", "constant", "offset", "platform pin"),
+    Term("joints", "tangential", "strut force", "threshold", "frame pin", where=4, at=(("within", 200.0),)),
+    Term("table", "horizontal", "load", "threshold", "give", at=(("beyond", 500.0),), times=HERE),
+    Term("instrument", "Y", "y", "slope", "reading factor", at=LINE, times=Factor("load", "slope", FALLING)),
+    Term("joints", STRUT, "time", "slope", "strut", at=(("start", 0.0), ("end", 9.0)), times=SWUNG),
+    Term("one strut", STRUT, "strut length", "slope", "strut factor", 3, RAMP, times=HERE),
+    Term("joints", "all", "load", "slope", "turning", at=FALLING, times=SWUNG),
+    Term("joints", STRUT, "tilt", "slope", "strut", at=(("start", 0.1), ("end", 0.5)), column="frame joint"),
 ]  # fmt: skip
 WORDS = "a long clause without an end, " * 5 + 'the "table" of C:\\new gives way """here"""'
 
@@ -117,7 +130,7 @@ def compare_with_term(term, some_path, tmp_path, acts=True):
     parameter = drafted.parameters[0]
     size = (0.6 if acts else 0.02) * parameter.typical[1] * parameter.si
     p, q = {parameter.name: size}, {"size": size}
-    for hook in ("strut_compliance", "load_compliance"):
+    for hook in ("strut_compliance", "load_compliance", "parallel_stiffness"):
         mine, theirs = (getattr(one, hook)(some_path, values) for one, values in ((drafted, p), (own, q)))
         assert (mine is None) == (theirs is None)
         if theirs is not None:

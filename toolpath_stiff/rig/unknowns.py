@@ -437,14 +437,15 @@ def _wave(rng: Generator) -> dict[str, Any]:
 
 # What can be told at the tip: joints and struts are in series, so an effect of all joints may be called either; so is
 # that of one strut, its joints and its drive. A strut's length follows height, radius and tilt of the pose, so what
-# varies with a swing may be called by any pose variable that swings the joints.
+# varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
+# there, and shows as the strut swings about it.
 ONE, ALL = "one strut,joints", "joints,struts"
 STRUT_KINDS: dict[str, Kind] = {
     "joint_swing": kind(
         "joints softer the further they swing", ALL, "tilt,radius,strut length,z", SOFT, act=joint_swing
     ),
     "cardan_fork": kind(
-        "joints softer along one pin of their cross", ALL, "tilt,radius,strut length,z", SOFT, act=cardan_fork
+        "joints softer along one pin of their cross", ALL, "constant,tilt,radius,strut length", SOFT, act=cardan_fork
     ),
     "joint_binding": kind(
         "joints that resist turning near the end of their swing", "joints,struts,platform",

@@ -45,17 +45,22 @@ class JointMomentStiffness(Effect):
         """Stiffness of all twelve rotational springs about the tip."""
         if p["stiffness"] == 0.0:
             return None
-        axis = path.struts.directions
-        move = np.concatenate([np.broadcast_to(np.eye(3), (len(path), 6, 3, 3)), -_cross(path.struts.arms)], axis=-1)
-        against_frame = _cross(axis) @ move / path.struts.lengths[..., None, None]
-        against_platform = against_frame.copy()
-        against_platform[..., 3:] -= np.eye(3) - axis[..., :, None] * axis[..., None, :]
-        rotations = np.concatenate([against_frame, against_platform], axis=2).reshape(len(path), 36, 6)
+        rotations = end_rotations(path).reshape(len(path), 36, 6)
         return np.asarray(p["stiffness"] * np.swapaxes(rotations, 1, 2) @ rotations)
 
     def finding(self, p: Mapping[str, Any]) -> str:
         """What is off, to which side, by how much."""
         return f"the joints resist turning by about {about(p['stiffness'] / 1e3)} kN m/rad at each end of each strut"
+
+
+def end_rotations(path: LoadPath) -> FloatArray:
+    """(n, 6, 6, 6) B of each strut: its rotation against the frame and against the platform, 3 each, of a tip twist."""
+    axis = path.struts.directions
+    move = np.concatenate([np.broadcast_to(np.eye(3), (len(path), 6, 3, 3)), -_cross(path.struts.arms)], axis=-1)
+    against_frame = _cross(axis) @ move / path.struts.lengths[..., None, None]
+    against_platform = against_frame.copy()
+    against_platform[..., 3:] -= np.eye(3) - axis[..., :, None] * axis[..., None, :]
+    return np.concatenate([against_frame, against_platform], axis=2)
 
 
 def _cross(vector: FloatArray) -> FloatArray:

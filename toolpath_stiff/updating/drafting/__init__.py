@@ -32,6 +32,7 @@ WIDTH = 116  # columns of running text in the file
 LONGEST_TEXT, LONGEST_KEY = 108, 12  # of a string on a line of its own; of what stands before it on the same line
 MARKS_A_LINE = 10
 REPEATED = "stiffness = path."  # what several statements use, and one line says
+HOOK_NAMES = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading")
 KINDS = {STRUCTURE: "", GEOMETRY: "_geometry", INSTRUMENT: "_reading"}  # what an effect's name ends with
 
 
@@ -151,9 +152,9 @@ def _nothing_to_describe(diagnosis: Diagnosis) -> str:
     if diagnosis.portrait is None:
         word = "explains" if diagnosis.verdict == "identified" else "may explain"
         return f"{names} {word} these readings and leaves nothing that stands out: there is nothing to describe."
-    unseen = [one.term.variable for one in diagnosis.portrait.terms if not one.term.acts]
-    if len(unseen) == len(diagnosis.portrait.terms):
-        with_what = joined(list(dict.fromkeys(unseen)))
+    terms = [one.term for one in diagnosis.portrait.terms]
+    if not any(term.acts for term in terms):
+        with_what = joined(list(dict.fromkeys(name for term in terms for name in term.unseen)))
         return f"What is missing varies with {with_what}, which no effect of a machine sees: nothing is drafted."
     return ""
 
@@ -189,6 +190,8 @@ def draft_source(name: str, description: Description, origin: Origin) -> str:
         "diagnose": _plain(origin.next[1]),
         "plan": _plain(origin.next[2]),
         "vertices": any("frame_vertices(" in piece.functions for piece in pieces),
+        "swings": any("joint_angles(" in piece.functions for piece in pieces),
+        "turning": any("end_rotations(" in line for piece in pieces for line in piece.statements),
         "springs": any("springs(" in line for piece in pieces for line in piece.statements),
         "source": _long_text(f"described from {read}; not confirmed", indent=""),
         "effects": effects,
@@ -229,7 +232,7 @@ def _effect(called: str, own: Sequence[Piece]) -> dict[str, Any]:
         "equation": _long_text("; ".join(piece.formula for piece in own)),
         "needs": _tuple([need for effect in effects for need in effect.needs]),
         "load_dependent": any(effect.load_dependent for effect in effects),
-        "hooks": {**dict.fromkeys(("strut_compliance", "load_compliance", "geometry", "reading")), **hooks},
+        "hooks": {**dict.fromkeys(HOOK_NAMES), **hooks},
         "pieces": [_parameter(piece) for piece in own],
     }
 

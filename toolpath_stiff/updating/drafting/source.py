@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from toolpath_stiff.stiffness.effects.contract import Effect
 from toolpath_stiff.units import RAD_PER_DEG
-from toolpath_stiff.updating.portrait.terms import UNITS, Term, effect_of
+from toolpath_stiff.updating.portrait.terms import IN_SERIES, PINS, SWINGS, UNITS, Term, effect_of
 
 AXES = ("X", "Y", "Z")
 STRUCTURE, GEOMETRY, INSTRUMENT = "structure", "geometry", "instrument"
-HOOKS = {"strut": "strut_compliance", "strut factor": "strut_compliance", "joint offset": "geometry"}
+HOOKS = dict.fromkeys(IN_SERIES, "strut_compliance") | {"joint offset": "geometry", "turning": "parallel_stiffness"}
 HOOKS |= {"reading factor": "reading", "reading shift": "reading"}
 LEAST_STRUT = 0.8  # share of its own compliance that a strut may lose at most, so that it keeps some
 MOST_COUPLED = 0.9  # of the mean of both compliances: beyond 1 the pair has none left
@@ -94,7 +94,9 @@ def parameter_name(term: Term) -> str:
     place = [f"strut_{term.where}" if term.link == "one strut" else f"{term.link} {term.where or ''}"]
     if term.action == "joint offset":
         place = [f"{term.column}_joint_{term.where}"]
-    if term.direction not in ("reading", "along the struts"):
+    if term.action == "turning" or term.action in PINS:
+        place = [f"strut_{term.where}" if term.where else "", term.action]
+    if term.direction not in ("reading", "along the struts") and term.action != "turning":
         place.append(term.direction)
     if term.action in ("rocking", "tilting", "reading shift"):
         place.append(term.action.removeprefix("reading "))
@@ -127,6 +129,7 @@ VARIABLES: Mapping[str, tuple[str, str, str]] = {
     "time": ("time", "path.time", "s since the indicator was zeroed"),
     "temperature": ("temperature", "path.temperature", "degrees C"),
 }
+JOINT_ANGLES = "joint_angles(path.machine, path.struts, path.rotation)"
 EACH_STRUT = ("strut length", "strut force", "force sign")
 # Variable -> unit of its constants in SI, in the workshop, and the SI value of one of the latter.
 CONSTANTS: Mapping[str, tuple[str, str, float]] = {
@@ -148,6 +151,7 @@ MEANINGS = {
     "edge": "on one side it is there, on the other not",
     "from": "where it begins",
     "beyond": "what friction holds",
+    "within": "where the play is used up",
     "period": "from one crest to the next",
     "crest": "where it is as large as the size says",
 }
@@ -157,6 +161,9 @@ def _variable_lines(term: Term) -> list[str]:
     """Lines that say what the variable is; none for what does not vary."""
     if term.variable == "setup":
         return [f"on = (path.setup == {term.column!r}).astype(float)  # 1 in this set-up"]
+    if term.column in SWINGS:
+        said = f"# (n, 6) rad, swing of the {term.column}s from their place at rest"
+        return [said, f"swing = {JOINT_ANGLES}[{SWINGS.index(term.column)}]"]
     if term.variable == "tilt" and term.column:
         axis = AXES.index(term.column)
         return [f"tilt = np.arcsin(np.clip(path.rotation[:, {axis}, 2], -1.0, 1.0))  # rad, towards {term.column}"]
@@ -175,6 +182,8 @@ def _variable_lines(term: Term) -> list[str]:
 
 
 def _variable_name(term: Term) -> str:
+    if term.column in SWINGS and term.variable == "tilt":
+        return "swing"
     return "on" if term.variable == "setup" else VARIABLES[term.variable][0] if term.variable in VARIABLES else ""
 
 
@@ -202,13 +211,13 @@ def _constants_in_words(term: Term) -> str:
 # -- shapes ------------------------------------------------------------------------------------------------------------
 
 
-def _shape(term: Term) -> tuple[str, str]:
-    """The share of the size as an expression and as a formula."""
+def _shape(term: Term, signed: bool | None = None) -> tuple[str, str]:
+    """The share of the size as an expression and as a formula, without its second variable; `signed`: to both sides."""
     v = _variable_name(term)
     if not v:
         return "np.ones(len(path))", ""
     above = term.constants.get("side", 1.0) > 0.0
-    signed = len(term.signs) > 1
+    signed = len(term.signs) > 1 if signed is None else signed
     if term.shape == "slope" and "power" in term.constants:
         return f"(np.maximum({v}, 1e-3) / reference) ** power", f"({v} / reference)^power"
     if term.shape == "slope":
@@ -219,6 +228,8 @@ def _shape(term: Term) -> tuple[str, str]:
         return f"np.maximum({line}, 0.0)", f"max(0, {line})"
     if term.shape == "threshold" and "beyond" in term.constants:
         return f"np.maximum(1.0 - beyond / np.maximum({v}, 1e-3), 0.0)", f"max(0, 1 - beyond / {v})"
+    if term.shape == "threshold" and "within" in term.constants:
+        return f"np.minimum(within / np.maximum({v}, 1e-3), 1.0)", f"min(1, within / {v})"
     return {
         "offset": (v, "" if v == "on" else v),
         "square": (f"(({v} - centre) / reach) ** 2", f"(({v} - centre) / reach)^2"),
@@ -317,8 +328,27 @@ _LAW = "path.machine.strut_law.stiffness(path.struts.lengths{})"
 
 
 def _piece(term: Term, words: str, name: str) -> Piece:
-    if term.action in ("strut", "strut factor"):
+    first = _of_one(replace(term, times=None), words, name)
+    if term.second is None:
+        return first
+    second, share = term.second, f"{name}_share(path)"
+    own, said = _shape(second, signed=False)
+    each = second.variable in EACH_STRUT or second.column in SWINGS
+    wide = term.action in IN_SERIES or term.action == "turning"
+    if wide and not each:
+        own = f"{_grouped(own)}[:, None]"
+    what = f"{'(n, 6)' if each else '(n, 1)' if wide else '(n,)'}: by what that is multiplied."
+    function = _function(f"{name}_factor", what, _share_lines(second), own)
+    lines = tuple(line.replace(share, f"{share} * {name}_factor(path)") for line in first.statements)
+    formula = f"{first.formula}; times {said or 'whether it is on'}{_constants_in_words(second)}"
+    return replace(first, term=term, functions=f"{first.functions}\n\n\n{function}", statements=lines, formula=formula)
+
+
+def _of_one(term: Term, words: str, name: str) -> Piece:
+    if term.action in IN_SERIES:
         return _strut_piece(term, words, name)
+    if term.action == "turning":
+        return _turning_piece(term, words, name)
     if term.action == "joint offset":
         return _joint_piece(term, words, name)
     if term.action in ("reading factor", "reading shift"):
@@ -341,8 +371,42 @@ def _strut_piece(term: Term, words: str, name: str) -> Piece:
             f"added += np.maximum({own}, {-LEAST_STRUT}) / stiffness",
         )
         formula = f"c_i += {_times(name, shape)} / k_i"
+    if term.action in PINS:
+        pins, along = _pins(term, name)
+        function += f"\n\n\n{pins}"
+        statements = (f"own = {own}", f"added += own * {name}_along(path) ** 2")
+        formula = f"{formula} ({along})^2"
     if term.where is not None:
         formula = formula.replace("_i", f"_{term.where}")
+    return Piece(term, words, name, function, statements, formula + _constants_in_words(term))
+
+
+def _pins(term: Term, name: str) -> tuple[str, str]:
+    """The function of how much of its strut's force each pin has, and that in words."""
+    end = term.action.removesuffix(" pin")
+    lines = [
+        f"x, y = path.machine.{end}_joints[:, :2].T",
+        "nothing = np.zeros(6)",
+        f"pins = np.stack([{'x, y' if term.direction == 'radial' else '-y, x'}, nothing], axis=1)",
+        "pins = pins / np.hypot(x, y)[:, None]",
+    ]
+    if end == "platform":
+        lines.append("pins = pins @ np.swapaxes(path.rotation, 1, 2)  # turned with the platform")
+    what = "(n, 6): cosine of the angle between each strut and the pin of its joint."
+    function = _function(f"{name}_along", what, lines, "(path.struts.directions * pins).sum(axis=-1)")
+    return function, f"u_i . {term.direction} pin"
+
+
+def _turning_piece(term: Term, words: str, name: str) -> Piece:
+    lines, (share, shape) = _share_lines(term), _shape(term)
+    function = _function(f"{name}_share", "(n, 6): how much of the size each strut has.", lines, _each(term, share))
+    statements = (
+        f"weight = {_size(name)} * {name}_share(path)",
+        "turns = end_rotations(path)  # (n, 6, 6, 6), of each strut's two ends by the tip's motion",
+        'added += np.einsum("nk,nkai,nkaj->nij", weight, turns, turns)',
+    )
+    over = "i" if term.where is None else f"i = {term.where}"
+    formula = f"K += sum over {over} of {_times(name, shape)} B_i^T B_i"
     return Piece(term, words, name, function, statements, formula + _constants_in_words(term))
 
 
@@ -415,7 +479,7 @@ def _pose_share(term: Term, name: str, share: str) -> tuple[str, str]:
 
 def _each(term: Term, share: str) -> str:
     """The share of each strut, (n, 6), from one of all or from their own."""
-    own = term.variable in EACH_STRUT
+    own = term.variable in EACH_STRUT or term.column in SWINGS
     if term.where is not None:
         alone = f"np.eye(6)[{term.where - 1}]  # strut {term.where} alone"
         return f"{_grouped(share)} * {alone}" if own else f"{_grouped(share)}[:, None] * {alone}"

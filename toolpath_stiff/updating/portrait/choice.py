@@ -90,7 +90,7 @@ def choose(selection: Selection) -> tuple[Chosen | None, float]:
     if chance > LEADS or begun is None:
         return None, chance
     found = [_completed(selection, begun, threshold)]
-    if len(found[0].terms) > 1:
+    if _searched(found[0]) > 1:
         others = _other_beginnings(selection, start, found[0].terms[0])
         found += [_completed(selection, other, threshold) for other in others]
     found = _different(sorted(found, key=lambda one: -_worth(one, threshold)))
@@ -104,7 +104,7 @@ def choose(selection: Selection) -> tuple[Chosen | None, float]:
 def _completed(selection: Selection, begun: Description, threshold: float) -> Description:
     """With further terms as long as they join."""
     points = len(set(selection.problem.predictor.data.point.tolist()))
-    found = begun
+    found = _multiplied(selection, begun, 0, threshold)
     while len(found.terms) < min(MOST_TERMS, points // POINTS_EACH):
         more = _one_more(selection, found, threshold)
         if more is None:
@@ -122,6 +122,17 @@ def _one_more(selection: Selection, before: Description, threshold: float) -> De
         return None
     more = _swapped(selection, more)
     return more if _held(selection, more).rms <= BETTER * _held(selection, before).rms else None
+
+
+def _multiplied(selection: Selection, description: Description, k: int, threshold: float) -> Description:
+    """The k-th term times a shape of a second variable, under what is asked of a further term."""
+    if description.terms[k].times is not None:
+        return description
+    before = selection.without(description, k)
+    more = selection.multiplied(before, description, k)
+    if more is None or 2.0 * (more.posterior - description.posterior) <= threshold:
+        return description
+    return more if _held(selection, more).rms <= BETTER * _held(selection, description).rms else description
 
 
 def _swapped(selection: Selection, description: Description) -> Description:
@@ -153,15 +164,20 @@ def _other_beginnings(selection: Selection, start: Description, first: Term) -> 
 
 
 def _worth(description: Description, threshold: float) -> float:
-    """Log posterior less what chance would gain by the further terms."""
-    return description.posterior - 0.5 * threshold * (len(description.terms) - 1)
+    """Log posterior less what chance would gain by further terms and second variables."""
+    return description.posterior - 0.5 * threshold * (_searched(description) - 1)
+
+
+def _searched(description: Description) -> int:
+    """How often the dictionary was searched for it: terms and second variables."""
+    return len(description.terms) + sum(term.times is not None for term in description.terms)
 
 
 def _different(descriptions: Sequence[Description]) -> list[Description]:
     """The first of those that differ by constants only."""
     found: dict[frozenset[tuple[object, ...]], Description] = {}
     for one in descriptions:
-        kinds = frozenset((t.link, t.where, t.direction, t.variable, t.column, t.shape) for t in one.terms)
+        kinds = frozenset((t.link, t.where, t.direction, t.variables, t.column, t.shape) for t in one.terms)
         found.setdefault(kinds, one)
     return list(found.values())
 
@@ -204,7 +220,7 @@ def weigh(selection: Selection, descriptions: Sequence[Description], threshold: 
     terms: list[Term] = []
     logs: list[FloatArray] = []
     chosen: list[NDArray[np.bool_]] = []
-    worths = np.array([one.posterior / flat - 0.5 * threshold * len(one.terms) for one in descriptions])
+    worths = np.array([one.posterior / flat - 0.5 * threshold * _searched(one) for one in descriptions])
     for number, (one, cost) in enumerate(zip(descriptions, costs, strict=True)):
         leads = np.exp((cost - cost.max()) / flat)
         leads /= leads.sum()
@@ -213,7 +229,7 @@ def weigh(selection: Selection, descriptions: Sequence[Description], threshold: 
                 continue
             own, log = _in_place(selection, one, k, flat)
             terms += own
-            logs.append(log - 0.5 * threshold * (len(one.terms) - 1) + np.log(leads[k]))
+            logs.append(log - 0.5 * threshold * (_searched(one) - 1) + np.log(leads[k]))
             chosen.append(np.full(len(own), (number, k) == (0, 0)))
     every = np.concatenate(logs)
     weights = np.exp(every - every.max())

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations, product
 from typing import Any
 
@@ -23,16 +24,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import LoadPath
+from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.portrait.terms import (
+    AXES,
+    IN_SERIES,
+    PINS,
+    SWINGS,
     VARIABLES,
     Action,
     Constants,
+    Factor,
     Term,
+    along_pins,
     carriers,
     coupled,
     coupling_share,
+    factor_values,
+    multiplied,
     reading_share,
     shape_values,
     variable_values,
@@ -48,6 +59,7 @@ PLACE = ("x", "y", "z", "radius")
 BUMPS, MOST_EDGES = 5, 5
 SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
 MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
+TURNED = 0.1  # rms change of stiffness at which a resistance to turning is looked for: it is not linear in its size
 PHASES = 3  # of half a turn; the other half is the other sign's
 
 
@@ -74,10 +86,11 @@ class Local:
         """Whether it is one of several places or channels: a joint, a vertex, the readings along one axis."""
         return self.where is not None or (self.link == "instrument" and self.direction != "reading")
 
-    def term(self, variable: str, shape: str, at: Constants, column: str = "") -> Term:
-        """With a variable and a shape."""
+    def term(self, variable: str, shape: str, at: Constants, column: str = "", times: Factor | None = None) -> Term:
+        """With a variable and a shape, and a second one where there is one."""
+        column = column or self.column
         return Term(
-            self.link, self.direction, variable, shape, self.action, self.where, (*self.at, *at), column or self.column
+            self.link, self.direction, variable, shape, self.action, self.where, (*self.at, *at), column, times=times
         )
 
 
@@ -126,11 +139,15 @@ def _of_vertices(link: str, directions: Iterable[str], variables: tuple[str, ...
 
 
 def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
-    """Joints: they give along their strut, or stand off their place."""
+    """Joints: they give along their strut or along a pin of their cross, resist turning, or stand off their place."""
     for where in ALL_STRUTS:
         own = ("strut force", "force sign")
         variables = ("constant", "load", "temperature", *own) if where else (*whole, *own, "tilt")
         yield Local("joints", "strut", "along the struts", where, variables, crossed=(*whole, *own, "tilt"))
+        turning = ("constant",) if where else ("constant", "load", "tilt")
+        yield Local("joints", "turning", "all", where, turning, crossed=(*whole, "tilt"))
+        for action, direction in product(PINS, ("radial", "tangential")):
+            yield Local("joints", action, direction, where, ("constant",), crossed=variables)
     for axis in "XYZ":
         for where in ALL_STRUTS[1:]:
             for end in ("frame", "platform"):
@@ -158,11 +175,12 @@ class Entry:
     shape: str
     at: Constants
     log_prior: float
+    times: Factor | None = None
 
     @property
     def term(self) -> Term:
         """The term."""
-        return self.local.term(self.variable, self.shape, self.at, self.column)
+        return self.local.term(self.variable, self.shape, self.at, self.column, self.times)
 
 
 @dataclass(frozen=True)
@@ -206,12 +224,12 @@ def dictionary_of(ground: Ground) -> Dictionary:
         share, signed = ground.share(plain), len(plain.signs) > 1
         limit = max(abs(bound) for bound in plain.bounds) * plain.si
         for variable in local.variables:
-            every_column = columns_of(variable, ground)
+            every_column = columns_of(variable, ground, local.link == "joints")
             for column in every_column:
                 named, values = ground.shapes(variable, column, signed, local.where)
                 if not named:
                     continue
-                blocks.append(ground.columns(share, local.where, values))
+                blocks.append(ground.columns(plain, share, values))
                 kinds = Counter(shape for shape, _ in named)
                 log = prior.place(local, variable) - float(np.log(len(kinds) * len(every_column)))
                 entries += [
@@ -234,14 +252,14 @@ def dictionary_of(ground: Ground) -> Dictionary:
     )
 
 
-def columns_of(variable: str, ground: Ground) -> list[str]:
-    """What a variable comes in: set-ups by name, a tilt and its two leans, else once; nothing where it is unknown."""
+def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:
+    """What a variable comes in: set-ups by name, a tilt, its two leans and swings, else once; none where unknown."""
     if not ground.known(variable):
         return []
     if variable == "setup":
         names = sorted(set(ground.data.setup.tolist()) - {""})
         return names if len(names) > 1 or "" in ground.data.setup else []
-    return ["", "X", "Y"] if variable == "tilt" else [""]
+    return ["", "X", "Y", *(SWINGS if joints else ())] if variable == "tilt" else [""]
 
 
 @dataclass(frozen=True)
@@ -288,11 +306,42 @@ def crossed(term: Term, ground: Ground) -> list[Entry]:
             continue
         if local.action in ("coupling", "joint offset"):
             continue
+        if term.column in SWINGS and local.link != "joints":
+            continue
+        if term.times is not None and not _may_feel(local, term.times):
+            continue
         signed = len(local.term("constant", "offset", ()).signs) > 1
         log = prior.place(local, term.variable)
         found += [
-            Entry(local, term.variable, term.column, shape, at, log) for shape, at in _translated(term, signed, ground)
+            Entry(local, term.variable, term.column, shape, at, log, term.times)
+            for shape, at in _translated(term, signed, ground)
         ]
+    return found
+
+
+def _may_feel(local: Local, factor: Factor) -> bool:
+    """Whether a link may depend on a second variable."""
+    if factor.column in SWINGS and local.link != "joints":
+        return False
+    return factor.variable in (*local.variables, *local.crossed)
+
+
+def products(term: Term, ground: Ground) -> list[Term]:
+    """The same term times every shape of every other variable that its link may depend on, itself not negative."""
+    if term.times is not None or term.action in ("coupling", "joint offset"):
+        return []
+    place = (term.link, term.action, term.direction, term.where)
+    every = locals_of(ground.data.extra)
+    (local,) = (one for one in every if (one.link, one.action, one.direction, one.where) == place)
+    found = []
+    for variable in dict.fromkeys((*local.variables, *local.crossed)):
+        if variable in (*ONCE, term.variable):
+            continue
+        for column in columns_of(variable, ground, local.link == "joints"):
+            named = ground.shapes(variable, column, False, local.where)[0]
+            found += [
+                replace(term, times=Factor(variable, shape, at, column)) for shape, at in named if shape != "periodic"
+            ]
     return found
 
 
@@ -320,11 +369,11 @@ def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Con
 # -- shapes ------------------------------------------------------------------------------------------------------------
 
 
-def shapes_of(variable: str, values: FloatArray, signed: bool, lean: bool = False) -> list[tuple[str, Constants]]:
+def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "") -> list[tuple[str, Constants]]:
     """Shapes over the values that a variable takes, with their constants; none where it does not vary.
 
-    `signed`: of what may change to both sides, where one side of each shape says it all; `lean`: of a signed tilt,
-    about which few poses say more than its side and its size.
+    `signed`: of what may change to both sides, where one side of each shape says it all; `column`: of a tilt. About a
+    lean few poses say more than its side and its size; a swing counts from where the joint rests.
     """
     if variable in ("constant", "direction", "setup"):
         return [("offset", ())]
@@ -338,12 +387,16 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, lean: bool = Fals
     many, place = len(different), variable in (*PLACE, "strut length")
     found: list[tuple[str, Constants]] = []
     if variable in ("load", "strut force") and not (signed and many == 2):
-        found += _of_a_force(low, high, float(np.median(values)), many > 2)
+        # Of what may change to both sides, less of what friction holds is play.
+        play = variable == "strut force" and not signed
+        found += _of_a_force(low, high, float(np.median(values)), many > 2, play)
     found += _slopes(low, high, signed, many > 4)
     if many == 2:
         return found
     found += _squares(low, high, place)
-    edges = [0.0] if lean else _edges(different, MOST_EDGES if place else 3)
+    if column in SWINGS:
+        found.append(("square", (("centre", 0.0), ("reach", high))))
+    edges = [0.0] if column in AXES else _edges(different, MOST_EDGES if place else 3)
     found += [("threshold", (("edge", edge), ("side", side))) for edge in edges for side in sides]
     if place and many > 4:
         found += _bumps(low, high)
@@ -357,13 +410,14 @@ def _signs(signed: bool) -> list[tuple[str, Constants]]:
     return [("sign", (("side", side),)) for side in ((1.0,) if signed else (1.0, -1.0))]
 
 
-def _of_a_force(low: float, high: float, reference: float, several: bool) -> list[tuple[str, Constants]]:
-    """Powers of a force, and what friction holds below some of it."""
+def _of_a_force(low: float, high: float, reference: float, several: bool, play: bool) -> list[tuple[str, Constants]]:
+    """Powers of a force, what friction holds below some of it, and play that some of it uses up."""
     powers: list[tuple[str, Constants]] = [
         ("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)
     ]
     held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if several else [0.5 * low, 0.9 * low]
-    return [*powers, *(("threshold", (("beyond", force),)) for force in held)]
+    used_up: list[tuple[str, Constants]] = [("threshold", (("within", force),)) for force in held if play]
+    return [*powers, *(("threshold", (("beyond", force),)) for force in held), *used_up]
 
 
 def _squares(low: float, high: float, place: bool) -> list[tuple[str, Constants]]:
@@ -465,6 +519,7 @@ class Ground:
         self.predictor, self.data, self.compliance = predictor, data, compliance
         self.path: LoadPath = replace(path, strut_forces=forces * data.force[:, None], direction=data.direction)
         self.forces = np.concatenate([forces, data.direction, np.zeros_like(data.direction)], axis=1)  # [f; w]
+        self.law = law
         self.softness = 1.0 / scaled_law(predictor.machine.strut_law, law).stiffness(path.struts.lengths)
         self._values: dict[tuple[str, str], FloatArray] = {}
         self._shares: dict[tuple[Any, ...], FloatArray] = {}
@@ -501,9 +556,16 @@ class Ground:
 
     def _share(self, term: Term) -> FloatArray:
         path = self.path
-        plain = replace(term, variable="constant", shape="offset")
-        if term.action in ("strut", "strut factor"):
-            each = self.forces[:, :6] ** 2 * (self.softness if term.action == "strut factor" else 1.0)
+        plain = replace(term, variable="constant", shape="offset", times=None)
+        if term.action in (*IN_SERIES, "turning"):
+            each = self.forces[:, :6] ** 2
+            if term.action == "turning":
+                turns = np.einsum("nkai,nij,nj->nka", self._rotations, self._flexibility, self.forces[:, 6:])
+                each = -(turns**2).sum(axis=2) * self._seen[:, None]
+            if term.action in PINS:
+                each = each * along_pins(term.action, term.direction, path) ** 2
+            if term.action == "strut factor":
+                each = each * self.softness
             if term.where is not None:
                 each = each * (np.arange(6) == term.where - 1)
             return np.asarray(each)
@@ -520,6 +582,59 @@ class Ground:
         rows = carriers(term.link, term.action, term.direction, term.where, path)
         return np.asarray((np.einsum("nkj,nj->nk", rows, self.forces) ** 2).sum(axis=1))
 
+    @cached_property
+    def _rotations(self) -> FloatArray:
+        return end_rotations(self.path)
+
+    @cached_property
+    def _flexibility(self) -> FloatArray:
+        """(n, 6, 6) of the tip, forces and moments."""
+        machine = self.path.machine
+        machine = machine.with_changes(strut_law=scaled_law(machine.strut_law, self.law))
+        path = replace(self.path, machine=machine)
+        links = exact.assemble_links(replace(self.predictor.base, machine=machine), path)
+        return exact.respond(path, links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
+
+    @cached_property
+    def _seen(self) -> FloatArray:
+        """(n,) compliance over that of `_flexibility`: where more gives way, the joints turn by as much more."""
+        wrench = self.forces[:, 6:]
+        return np.asarray(self.compliance / np.einsum("ni,nij,nj->n", wrench, self._flexibility, wrench))
+
+    def _turned_by(self, weights: FloatArray, size: float) -> tuple[FloatArray, FloatArray]:
+        """(n,) m/N per unit of size that `turning` of weights (n, 6) adds at a size, and by which it grows there.
+
+        Springs K of the rotations B x of a twist x stand parallel to what bears the load: C + dC = (C^-1 + B^T K B)^-1.
+        """
+        springs = np.einsum("nk,nkai,nkaj->nij", size * weights, self._rotations, self._rotations)
+        wrench = self.forces[:, 6:, None]
+        moved = np.linalg.solve(np.eye(6) + self._flexibility @ springs, self._flexibility @ wrench)
+        change = ((moved - self._flexibility @ wrench) * wrench).sum(axis=(1, 2))
+        slope = -(np.einsum("nij,njk->nik", springs, moved) * moved).sum(axis=(1, 2))
+        return np.asarray(change * self._seen / size), np.asarray(slope * self._seen / size)
+
+    def _turned(self, term: Term, tangents: FloatArray, shapes: FloatArray) -> FloatArray:
+        """(s, n) of `turning`, at the term's size or, where it has none, at one as it is usually found."""
+        found = []
+        for tangent, shape in zip(tangents, shapes, strict=True):
+            size = term.size or TURNED / max(float(np.sqrt(np.mean((tangent / self.compliance) ** 2))), 1e-12)
+            found.append(self._turned_by(_each(shape, term), min(size, term.bounds[1] * term.si))[0])
+        return np.array(found).reshape(tangents.shape)
+
+    def slope(self, term: Term) -> FloatArray:
+        """(n,) m/N by which what a term adds grows with its size; its `column` unless it is not linear in it."""
+        if not term.size or term.action != "turning":
+            return self.column(term)
+        return self._turned_by(_each(self.shape(term), term), term.size)[1]
+
+    def shape(self, term: Term) -> FloatArray:
+        """(n,) or (n, 6) of what a term depends on."""
+        values = self.values(term.variable, term.column)
+        first = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+        if term.times is None:
+            return first
+        return multiplied(first, factor_values(term.times, self.values(term.times.variable, term.times.column)))
+
     def shapes(self, variable: str, column: str, signed: bool, where: int | None) -> Shapes:
         """All shapes of a variable over these readings, worked out once; of strut `where` where each has its own."""
         values = self.values(variable, column)
@@ -527,23 +642,37 @@ class Ground:
         key = (variable, column, signed, own)
         if key not in self._shapes:
             values = values if own is None else values[:, own - 1]
-            named = tuple(shapes_of(variable, values, signed, bool(column)))
+            named = tuple(shapes_of(variable, values, signed, column if variable == "tilt" else ""))
             rows = [shape_values(shape, values, dict(at), signed) for shape, at in named]
             self._shapes[key] = named, np.stack(rows) if rows else np.zeros((0, *values.shape))
         return self._shapes[key]
 
-    def columns(self, share: FloatArray, where: int | None, shapes: FloatArray) -> FloatArray:
-        """(s, n) m/N per unit of size, for shapes (s, n) or (s, n, 6); `share` (n,) or (n, 6) as of `share`."""
+    def columns(self, term: Term, share: FloatArray, shapes: FloatArray) -> FloatArray:
+        """(s, n) m/N per unit of size of a term's link, for shapes (s, n) or (s, n, 6); its `share` (n,) or (n, 6)."""
         if share.ndim == 1:
             return np.asarray(share * shapes)
         if shapes.ndim == 3:
-            return np.asarray(np.einsum("ni,sni->sn", share, shapes))
-        return np.asarray((share.sum(axis=1) if where is None else share[:, where - 1]) * shapes)
+            found = np.einsum("ni,sni->sn", share, shapes)
+        else:
+            found = (share.sum(axis=1) if term.where is None else share[:, term.where - 1]) * shapes
+        return self._turned(term, found, shapes) if term.action == "turning" else np.asarray(found)
 
     def column(self, term: Term) -> FloatArray:
         """(n,) m/N per unit (SI) of a term's size."""
-        values, share = self.values(term.variable, term.column), self.share(term)
-        if values.ndim == 2 and share.ndim == 1:
-            raise ValueError(f"{term.link} has no {term.variable} of its own")
-        shape = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
-        return np.asarray(self.columns(share, None, shape[None])[0])
+        share = self.share(term)
+        if share.ndim == 1 and any(self.values(*one).ndim == 2 for one in _asked(term)):
+            raise ValueError(f"{term.link} has no {' or '.join(term.variables)} of its own")
+        shape = self.shape(term)
+        return np.asarray(self.columns(term, share, shape[None])[0])
+
+
+def _asked(term: Term) -> list[tuple[str, str]]:
+    """Variables with their columns."""
+    own = [(term.variable, term.column)]
+    return own if term.times is None else [*own, (term.times.variable, term.times.column)]
+
+
+def _each(shape: FloatArray, term: Term) -> FloatArray:
+    """(n, 6) of a shape (n,) or (n, 6) at the struts of a term."""
+    each = shape if shape.ndim == 2 else np.repeat(shape[:, None], 6, axis=1)
+    return each if term.where is None else np.asarray(each * (np.arange(6) == term.where - 1))

@@ -18,14 +18,23 @@ from toolpath_stiff.updating.inference.covariances import Precision, inverse_roo
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.gates import Simulator, set_wild_aside
 from toolpath_stiff.updating.inference.noise import Noise, Scatter, scaled_inverse
-from toolpath_stiff.updating.portrait.dictionary import Dictionary, Entry, Ground, crossed, dictionary_of, shapes_near
-from toolpath_stiff.updating.portrait.terms import Term
+from toolpath_stiff.updating.portrait.dictionary import (
+    Dictionary,
+    Entry,
+    Ground,
+    crossed,
+    dictionary_of,
+    products,
+    shapes_near,
+)
+from toolpath_stiff.updating.portrait.terms import Factor, Term
 
 DRAWS = 200  # simulated campaigns
 JOINS = 0.02  # probability by chance below which a further term is taken for something
 TIE = 0.5  # of log likelihood: so near, the place with the larger prior is taken
 FINALISTS, EACH = 40, 1  # terms that are fitted in full: the best of all, and of every link and variable
 STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
+NOT_LINEAR, AT_SIZE = ("turning",), 3  # actions that are not linear in their size, and fits at the size of the last
 ROUNDS = 2  # searches for wild readings
 
 
@@ -170,10 +179,14 @@ class Selection:
                 break
             scatter = again
         found = self.fitted(columns[None], low[None], high[None], law, scatter.precision)
+        sized = tuple(t.sized(float(u / s)) for t, u, s in zip(terms, found.size[0], scale, strict=True))
         jacobian = self._linearised(found.law, found.size, columns[None])[1][0]
+        for k, term in enumerate(sized):
+            if term.action in NOT_LINEAR:
+                grows = self.ground.slope(term) / scale[k]
+                jacobian[2 + k] = -grows * np.exp(self.problem.observed - found.residual[0])
         information = scatter.precision.times(jacobian) @ jacobian.T
         information[:2, :2] += np.eye(2) / LAW_PRIOR**2
-        sized = tuple(t.sized(float(u / s)) for t, u, s in zip(terms, found.size[0], scale, strict=True))
         fit = replace(
             self.base, law=found.law[0], residual=found.residual[0], jacobian=jacobian.T,
             covariance=np.asarray(scaled_inverse(information)), scatter=scatter,
@@ -274,15 +287,27 @@ class Selection:
 
     def extended(self, before: Description, term: Term) -> Description:
         """A description with a term more, all refitted."""
-        column = self.ground.column(term) / self.compliance
-        scale = float(np.sqrt(np.mean(column**2)))
-        return self.described(
+        column, scale = self._scaled(term)
+        grown = self.described(
             (*before.terms, term),
-            np.concatenate([before.columns, column[None] / scale]),
+            np.concatenate([before.columns, column[None]]),
             np.append(before.scale, scale),
             before.fit.law,
             before.fit.scatter,
         )
+        if all(one.action not in NOT_LINEAR for one in grown.terms):
+            return grown
+        for _ in range(AT_SIZE):
+            scaled = [self._scaled(one) for one in grown.terms]
+            columns, scales = np.stack([column for column, _ in scaled]), np.array([scale for _, scale in scaled])
+            grown = self.described(grown.terms, columns, scales, grown.fit.law, grown.fit.scatter)
+        return grown
+
+    def _scaled(self, term: Term) -> tuple[FloatArray, float]:
+        """(n,) change of compliance over the base model's for an rms change of 1, and that of an SI unit of size."""
+        column = self.ground.column(term) / self.compliance
+        scale = float(np.sqrt(np.mean(column**2)))
+        return column / scale, scale
 
     def settled(self, before: Description, grown: Description) -> Description:
         """With finer constants of the last term's shape."""
@@ -295,6 +320,27 @@ class Selection:
             if better.posterior > grown.posterior:
                 grown = better
         return grown
+
+    def multiplied(self, before: Description, whole: Description, k: int) -> Description | None:
+        """The k-th term of a whole, which `before` lacks, times the best shape of a second variable; None without."""
+        others = self.scattered(before, whole)
+        terms = products(whole.terms[k], self.ground)
+        if not terms:
+            return None
+        found = self.together(others, terms)
+        best = self.extended(before, terms[int(np.argmax(found.posterior))])
+        second = best.terms[-1].second
+        assert second is not None
+        for finer in (1.0, 0.4):
+            near = shapes_near(second, self.ground, finer)
+            if not near:
+                return best
+            factors = [replace(best.terms[-1], times=Factor(t.variable, t.shape, t.at, t.column)) for t in near]
+            found = self.together(others, factors)
+            better = self.extended(before, factors[int(np.argmax(found.posterior))])
+            if better.posterior > best.posterior:
+                best, second = better, near[int(np.argmax(found.posterior))]
+        return best
 
     def without(self, description: Description, k: int) -> Description:
         """A description less one of its terms, refitted."""

@@ -18,9 +18,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.machine.kinematics import joint_angles
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
 from toolpath_stiff.stiffness.effects.frame_compliance import frame_vertices
+from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
 
 LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
 VARIABLES = (
@@ -36,14 +38,17 @@ DIRECTIONS = ("X", "Y", "Z", "horizontal", "radial", "axial", "along the struts"
 #   tilting         the moment of the tip's force about the middle of the platform joints turns it; rad per N m
 #   vertex          the forces of the two struts that share a vertex move that vertex; m/N
 #   strut           in series with each strut; m/N
+#   frame pin,      a joint gives along one pin of its cross, which stands radially or tangentially about the machine's
+#   platform pin    axis, or about the platform's; in series with its strut; m/N
+#   turning         joints resist turning, at both ends of the strut; N m/rad, parallel to the struts
 #   strut factor    a share of the strut's own compliance by the strut law
 #   coupling        the force of one strut stretches another, by a share of the mean of both struts' compliances
 #   joint offset    a joint stands off its place, and the control does not know; m
 #   reading factor  the deflection is read too large by a share
 #   reading shift   the deflection is read too large by a displacement; m
 Action = Literal[
-    "give", "rocking", "tilting", "vertex", "strut", "strut factor", "coupling", "joint offset", "reading factor",
-    "reading shift",
+    "give", "rocking", "tilting", "vertex", "strut", "frame pin", "platform pin", "turning", "strut factor", "coupling",
+    "joint offset", "reading factor", "reading shift",
 ]  # fmt: skip
 # Action -> unit, its SI value, bounds and usual sizes in that unit; assumed: what a machine that still mills can have.
 UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = {
@@ -52,6 +57,9 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
     "tilting": ("nrad/N/m", 1e-9, (0.0, 5000.0), (1.0, 300.0)),
     "vertex": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
     "strut": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
+    "frame pin": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
+    "platform pin": ("nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0)),
+    "turning": ("kN m/rad", 1e3, (0.0, 5000.0), (5.0, 550.0)),
     "strut factor": ("%", 0.01, (-50.0, 400.0), (-20.0, 40.0)),
     "coupling": ("%", 0.01, (-50.0, 50.0), (-20.0, 20.0)),
     "joint offset": ("mm", 1e-3, (-30.0, 30.0), (-3.0, 3.0)),
@@ -59,9 +67,22 @@ UNITS: dict[str, tuple[str, float, tuple[float, float], tuple[float, float]]] = 
     "reading shift": ("um", 1e-6, (-200.0, 200.0), (-10.0, 10.0)),
 }
 ASSUMED = "described from readings; usual sizes are engineering experience, no source"
+PINS: tuple[Action, ...] = ("frame pin", "platform pin")
+IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
+SWINGS = ("frame joint", "platform joint")
 AXES = {"X": 0, "Y": 1, "Z": 2}
 Constants = tuple[tuple[str, float], ...]
 IDLE = 1e-3  # N in a strut: below, a power of the force would diverge, and the strut adds nothing that shows
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A further variable that a term depends on, times the first: shape and so on as of `Term`."""
+
+    variable: str
+    shape: str
+    at: Constants = ()
+    column: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,13 +101,16 @@ class Term:
         Constants in SI, by name. Of the shape: `slope` has `start` (where it is 0) and `end` (where it is 1), or
         `power` and `reference`; `square` has `centre` and `reach`; `bump` has `centre` and `width`; `threshold` has
         `edge` and `side` (1: above it, -1: below), or `from` (where it begins) and `end` (where it is 1), or
-        `beyond`, a force that friction holds; `periodic` has `period` and `crest`; `sign` has `side`. Of a
-        `coupling`: `first` and `second`, numbers of struts.
+        `beyond`, a force that friction holds, or `within`, a force beyond which play is used up; `periodic` has
+        `period` and `crest`; `sign` has `side`. Of a `coupling`: `first` and `second`, numbers of struts.
     column
-        Name of the set-up; of `tilt`, "" for the angle from Z, "X" or "Y" for the lean towards that axis; of a
-        `joint offset`, "frame" or "platform".
+        Name of the set-up; of `tilt`, "" for the angle from Z, "X" or "Y" for the lean towards that axis, one of
+        `SWINGS` for how far each of these joints has swung from its place at the neutral pose; of a `joint offset`,
+        "frame" or "platform".
     size
         In SI.
+    times
+        A second variable with its shape: c(v, w) = size * s(v) * t(w).
     """
 
     link: str
@@ -98,6 +122,7 @@ class Term:
     at: Constants = ()
     column: str = ""
     size: float = field(default=0.0, compare=False)
+    times: Factor | None = None
 
     @property
     def unit(self) -> str:
@@ -121,8 +146,26 @@ class Term:
 
     @property
     def acts(self) -> bool:
-        """Whether an effect can see its variable: the order of readings and further columns it cannot."""
-        return self.variable in VARIABLES and self.variable != "order"
+        """Whether an effect can see its variables."""
+        return not self.unseen
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Variables that no effect sees: the order of readings and further columns."""
+        return tuple(one for one in self.variables if one not in VARIABLES or one == "order")
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """One or two."""
+        return (self.variable,) if self.times is None else (self.variable, self.times.variable)
+
+    @property
+    def second(self) -> Term | None:
+        """The same with its second variable as the only one."""
+        if self.times is None:
+            return None
+        one = self.times
+        return replace(self, variable=one.variable, shape=one.shape, at=one.at, column=one.column, times=None)
 
     @property
     def constants(self) -> dict[str, float]:
@@ -134,7 +177,10 @@ class Term:
         """A name that no other term has: its words, and its constants to six digits."""
         numbers = [f"{name}={value:.6g}" for name, value in self.at]
         named = [self.link, str(self.where or ""), self.action, self.direction, self.variable, self.column, self.shape]
-        return " ".join(part for part in (*named, *numbers) if part)
+        own = " ".join(part for part in (*named, *numbers) if part)
+        if self.second is None:
+            return own
+        return f"{own} times {self.second.key.removeprefix(f'{self.link} ')}"
 
     def sized(self, size: float) -> Term:
         """The same with a size (SI)."""
@@ -158,6 +204,8 @@ def variable_values(variable: str, path: LoadPath, column: str = "") -> FloatArr
         return np.hypot(position[:, 0], position[:, 1])
     if variable == "tilt":
         axis = path.rotation[:, :, 2]
+        if column in SWINGS:
+            return joint_angles(path.machine, path.struts, path.rotation)[SWINGS.index(column)]
         if column:
             return np.arcsin(np.clip(axis[:, AXES[column]], -1.0, 1.0))
         return np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2])
@@ -194,6 +242,8 @@ def shape_values(shape: str, values: FloatArray, at: Mapping[str, float], signed
         return np.asarray(np.exp(-0.5 * ((values - at["centre"]) / at["width"]) ** 2))
     if shape == "threshold" and "beyond" in at:  # Coulomb friction holds up to the edge: (v - edge) / v of a force v
         return np.maximum(1.0 - at["beyond"] / np.maximum(values, IDLE), 0.0)
+    if shape == "threshold" and "within" in at:  # play that a force uses up gives no more: min(v, edge) / v
+        return np.minimum(at["within"] / np.maximum(values, IDLE), 1.0)
     if shape == "threshold" and "from" in at:  # nothing up to there, then a straight line
         return np.asarray(np.maximum((values - at["from"]) / (at["end"] - at["from"]), 0.0))
     if shape == "threshold":
@@ -209,7 +259,23 @@ def shaped(term: Term, path: LoadPath) -> FloatArray:
     What varies from strut to strut belongs to a single strut where the term has one.
     """
     values = variable_values(term.variable, path, term.column)
-    return np.asarray(shape_values(term.shape, values, term.constants, len(term.signs) > 1))
+    first = shape_values(term.shape, values, term.constants, len(term.signs) > 1)
+    if term.times is None:
+        return first
+    return multiplied(first, factor_values(term.times, variable_values(term.times.variable, path, term.times.column)))
+
+
+def factor_values(factor: Factor, values: FloatArray) -> FloatArray:
+    """t(w) of a second variable, not below 0."""
+    return shape_values(factor.shape, values, dict(factor.at), False)
+
+
+def multiplied(first: FloatArray, second: FloatArray) -> FloatArray:
+    """The product of two shapes, (n,) or of each strut (n, 6)."""
+    if first.ndim == second.ndim:
+        return np.asarray(first * second)
+    wide, narrow = (first, second) if first.ndim == 2 else (second, first)
+    return np.asarray(wide * narrow[:, None])
 
 
 # -- links -------------------------------------------------------------------------------------------------------------
@@ -273,14 +339,25 @@ def _vertex_carriers(link: str, direction: str, where: int | None, path: LoadPat
     return np.stack(found, axis=1)
 
 
+def along_pins(action: str, direction: str, path: LoadPath) -> FloatArray:
+    """(n, 6) share of each strut's force that is along the pin of its joint."""
+    joints = path.machine.frame_joints if action == "frame pin" else path.machine.platform_joints
+    x, y = joints[:, :2].T / np.linalg.norm(joints[:, :2], axis=1)
+    pins = np.stack([x, y, 0.0 * x] if direction == "radial" else [-y, x, 0.0 * x], axis=1)
+    turned = pins if action == "frame pin" else pins @ np.swapaxes(path.rotation, 1, 2)
+    return np.asarray((path.struts.directions * turned).sum(axis=-1))
+
+
 def strut_share(term: Term, path: LoadPath) -> FloatArray:
-    """(n, 6) m/N that a `strut` or `strut factor` adds to each strut per unit of its size."""
+    """(n, 6) of each strut per unit of a size: compliance of what is in series with it, stiffness of `turning`."""
     shape = shaped(term, path)
     each = np.array(np.broadcast_to(shape[:, None] if shape.ndim == 1 else shape, (len(path), 6)), dtype=float)
     if term.where is not None:
         each[:, np.arange(6) != term.where - 1] = 0.0
     if term.action == "strut factor":
         each = np.asarray(each / path.machine.strut_law.stiffness(path.struts.lengths))
+    if term.action in PINS:
+        each = np.asarray(each * along_pins(term.action, term.direction, path) ** 2)
     return each
 
 
@@ -345,6 +422,17 @@ class _Strut(TermEffect):
         return np.asarray(p["size"] * strut_share(self.term, path))
 
 
+class _Turning(TermEffect):
+    def parallel_stiffness(self, path: LoadPath, p: Mapping[str, float]) -> FloatArray | None:
+        """Rotational springs at both ends of each strut."""
+        if p["size"] == 0.0 or not _seen(self.term, path):
+            return None
+        rotations = end_rotations(path)
+        weighted = (p["size"] * strut_share(self.term, path))[:, :, None, None] * rotations
+        flat = (len(path), 36, 6)
+        return np.asarray(np.swapaxes(rotations.reshape(flat), 1, 2) @ weighted.reshape(flat))
+
+
 class _Offset(TermEffect):
     unknown_to_control = True
 
@@ -368,9 +456,8 @@ class _Reading(TermEffect):
 def _seen(term: Term, path: LoadPath) -> bool:
     """Whether these poses say what the term varies with."""
     needed = {"time": path.time, "temperature": path.temperature, "setup": path.setup}
-    if term.variable in ("strut force", "force sign"):
-        return path.strut_forces is not None
-    return term.variable not in needed or needed[term.variable] is not None
+    needed |= dict.fromkeys(OF_FORCES, path.strut_forces)
+    return all(one not in needed or needed[one] is not None for one in term.variables)
 
 
 NEEDS = {
@@ -380,6 +467,7 @@ NEEDS = {
     "temperature": "temperature_C",
     "setup": "setup",
 }
+OF_FORCES = ("strut force", "force sign")
 CATALOGUE_LINKS = {"one strut": "struts"}
 
 
@@ -398,13 +486,13 @@ def effect_of(term: Term) -> Effect:
     'size_nm_per_N'
     """
     if not term.acts:
-        raise ValueError(f"no effect sees the variable {term.variable!r}")
+        raise ValueError(f"no effect sees the variable {' times '.join(term.variables)!r}")
     unit, si, bounds, typical = UNITS[term.action]
     kinds: dict[str, type[TermEffect]] = {
-        "coupling": _Coupling, "strut": _Strut, "strut factor": _Strut, "joint offset": _Offset,
+        "coupling": _Coupling, **dict.fromkeys(IN_SERIES, _Strut), "turning": _Turning, "joint offset": _Offset,
         "reading factor": _Reading, "reading shift": _Reading,
     }  # fmt: skip
-    needs = [NEEDS[term.variable]] if term.variable in NEEDS else []
+    needs = list(dict.fromkeys(NEEDS[one] for one in term.variables if one in NEEDS))
     if term.action in ("reading factor", "reading shift"):
         needs += ["direction"] if term.direction in AXES else []
         needs += ["force_N"] if term.action == "reading shift" and "force_N" not in needs else []
@@ -415,11 +503,11 @@ def effect_of(term: Term) -> Effect:
         "name": f"term: {term.key}",
         "title": term.key,
         "link": link,
-        "equation": "c += size s(v) sum_k (h_k . [f; w])^2",
+        "equation": "c += size s(v) sum_k (h_k . [f; w])^2; of turning: K += size s(v) sum_k B_k^T B_k",
         "source": ASSUMED,
         "parameters": (Parameter("size", unit, si, bounds, typical, ASSUMED, meaning=f"size of {term.key}"),),
         "needs": tuple(needs),
-        "load_dependent": term.variable in ("strut force", "force sign"),
+        "load_dependent": not set(OF_FORCES).isdisjoint(term.variables),
     }
     made = type("TermOfPortrait", (kinds.get(term.action, _Form),), attributes)
     found: Effect = made()

@@ -11,7 +11,7 @@ from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import RAD_PER_DEG, json_number
 from toolpath_stiff.updating.portrait import Portrait, Sized
 from toolpath_stiff.updating.portrait.alike import Alike
-from toolpath_stiff.updating.portrait.terms import Term
+from toolpath_stiff.updating.portrait.terms import PINS, SWINGS, Term
 
 __all__ = [
     "PortraitEntry",
@@ -48,13 +48,17 @@ GIVES = {
 ROCKS = {
     "X": "rocks about Y", "Y": "rocks about X", "all": "rocks about X and Y", "tangential": "turns about Z",
 }  # fmt: skip
+PINNED = {"radial": "radially", "tangential": "tangentially"}
 TIPS = {"X": "tips about the platform's Y", "Y": "tips about the platform's X", "radial": "tips"}
 MOST_SAID = 3  # terms in a sentence on what else would look the same; a document has more
 
 
 def term_words(term: Term) -> str:
     """What gives way and what it varies with: a clause, without its size."""
-    return f"{_cause(term)}{_with(term)}"
+    said = f"{_cause(term)}{_with(term, len(term.signs) > 1)}"
+    if term.second is None:
+        return said
+    return f"{said}, and this {_with(term.second, signed=False).removeprefix(',').strip()}"
 
 
 def _cause(term: Term) -> str:
@@ -73,6 +77,11 @@ def _cause(term: Term) -> str:
         return f"strut {term.where} is {side}" if term.where else f"the struts are {side}"
     if term.action == "strut":
         return f"the joints of strut {term.where} give way" if term.where else "the joints of the struts give way"
+    if term.action == "turning":
+        return f"the joints of strut {term.where} resist turning" if term.where else "the joints resist turning"
+    if term.action in PINS:
+        which = f"joint of strut {term.where} gives" if term.where else "joints of the struts give"
+        return f"the {term.action.removesuffix(' pin')} {which} way along a pin that stands {PINNED[term.direction]}"
     if term.action == "vertex":
         which = f"{term.link} vertex {term.where} gives" if term.where else f"the vertices of the {term.link} give"
         return f"{which} way {GIVES[term.direction]}"
@@ -87,8 +96,8 @@ def _cause(term: Term) -> str:
     return f"the {term.link} gives way {along}"
 
 
-def _with(term: Term) -> str:
-    """What it varies with and how, after its cause."""
+def _with(term: Term, signed: bool) -> str:
+    """What it varies with and how, after its cause; `signed`: to both sides."""
     if term.variable in ("constant", "direction"):
         return ""
     if term.variable == "setup":
@@ -98,13 +107,13 @@ def _with(term: Term) -> str:
     at = term.constants
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     if term.variable == "tilt" and term.column:
-        name = f"the lean towards {term.column}"
+        name = f"the swing of the {term.column}s" if term.column in SWINGS else f"the lean towards {term.column}"
 
     def shown(value: float) -> str:
         return f"{float(f'{value / si:.3g}'):g} {unit}".rstrip()
 
     if term.shape == "slope":
-        return _slope_words(term, name, shown)
+        return _slope_words(term, name, shown, signed)
     if term.shape == "square":
         return f", with the square of {name} from {shown(at['centre'])}, in full {shown(at['reach'])} from there"
     if term.shape == "bump":
@@ -114,13 +123,13 @@ def _with(term: Term) -> str:
     return _threshold_words(term, name, shown)
 
 
-def _slope_words(term: Term, name: str, shown: Callable[[float], str]) -> str:
+def _slope_words(term: Term, name: str, shown: Callable[[float], str], signed: bool) -> str:
     """A straight line or a power of a variable, in words."""
     at = term.constants
     if "power" in at:
         fading = "less" if at["power"] < 0.0 else "more"
         return f", {fading} with {name} (power {at['power']:.2g}, the size given at {shown(at['reference'])})"
-    if len(term.signs) > 1:
+    if signed:
         return f" in a straight line with {name}, nothing at {shown(at['start'])} and in full at {shown(at['end'])}"
     side = "above" if at["end"] > at["start"] else "below"
     return f" where {name} is {side} {shown(at['start'])}, in full at {shown(at['end'])}"
@@ -132,6 +141,8 @@ def _threshold_words(term: Term, name: str, shown: Callable[[float], str]) -> st
     if "from" in at:
         side = "above" if at["end"] > at["from"] else "below"
         return f" where {name} is {side} {shown(at['from'])}, in full at {shown(at['end'])}"
+    if "within" in at:
+        return f" until {name} reaches {shown(at['within'])}, and no further"
     if "beyond" in at:
         return f" as far as {name} is above {shown(at['beyond'])}, which friction holds"
     return f" where {name} is {'above' if at['side'] > 0.0 else 'below'} {shown(at['edge'])}"
@@ -211,12 +222,13 @@ class VariableEntry(TypedDict):
 
 
 class SizedTermEntry(TypedDict):
-    """A term of the dictionary with its size; `where` is a strut or a vertex."""
+    """A term of the dictionary with its size; `where` is a strut or a vertex, `second_variable` null without one."""
 
     link: str
     where: int | None
     direction: str
     variable: str
+    second_variable: str | None
     shape: str
     size: float | None
     unit: str
@@ -310,6 +322,7 @@ def _of_term(term: Term) -> SizedTermEntry:
         "where": term.where,
         "direction": term.direction,
         "variable": term.variable,
+        "second_variable": None if term.times is None else term.times.variable,
         "shape": term.shape,
         "size": json_number(term.size / term.si),
         "unit": term.unit,
