@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.units import certain
-from toolpath_stiff.updating.rows import date_text
+from toolpath_stiff.updating.dates import date_text
 
 Kind = Literal["step", "drift", "step or drift"]
 

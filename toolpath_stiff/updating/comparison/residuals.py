@@ -20,7 +20,7 @@ from toolpath_stiff.updating.history import NOTHING, HistoryDocument, Readings, 
 from toolpath_stiff.updating.inference.covariances import Covariance
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
-from toolpath_stiff.updating.rows import day_of
+from toolpath_stiff.updating.dates import day_of
 
 AXIS_ALIGNED = 0.999  # |cosine| from which a direction counts as X, Y or Z
 SAME_PLANE = 0.005  # m, heights closer than this are one plane
