@@ -83,6 +83,16 @@ IN_NAME = (
 )
 
 
+def order_of(text: str | None) -> Order | None:
+    """An order by its name. Raises `InputError`."""
+    for order in ORDERS:
+        if text == order:
+            return order
+    if text is not None:
+        raise MeasurementError(f"date order {text!r}", expected=" or ".join(ORDERS))
+    return None
+
+
 def day_of(text: str) -> float:
     """Days since 1970-01-01, nan of an empty cell; a time with a zone in UTC, one without as it stands.
 
@@ -121,6 +131,11 @@ def _middle(text: str) -> datetime | None:
 def date_text(day: float) -> str:
     """The calendar date of a count of days, as day_of counts them."""
     return (EPOCH + timedelta(days=float(np.floor(day)))).date().isoformat()
+
+
+def short_dates(texts: Iterable[str]) -> dict[float, str]:
+    """Day -> text of the dates that are a year or a month alone."""
+    return {float(np.floor(day_of(text))): text for text in texts if REDUCED.fullmatch(text)}
 
 
 def days_since_first(days: FloatArray) -> FloatArray:
@@ -272,12 +287,8 @@ def _settled(found: dict[str, _Read], order: Order | None, remedy: str) -> Dates
         notes.append(f"a spreadsheet's numbers of days are read as dates: {text} as {iso[text]}")
     short = [one for one in iso.values() if REDUCED.fullmatch(one)]
     if short:
-        notes.append(f"dates without a day count as the middle of their year or month: {short[0]} as {_assumed(short[0])}")
+        notes.append(f"a year or a month alone counts as its middle: {short[0]} as {date_text(day_of(short[0]))}")
     return Dates({text: one for text, one in iso.items() if text != one}, notes)
-
-
-def _assumed(text: str) -> str:
-    return date_text(day_of(text))
 
 
 def dates_in(name: str) -> list[str]:

@@ -176,18 +176,25 @@ def with_dates(tables: Sequence[Table], order: Order | None = None, remedy: str 
     try:
         dates = read_dates(cells, order, remedy)
     except InputError as error:
-        where = {"file": at[0][0].file, "line": at[0][0].heading_line}
-        raise MeasurementError(error.found, expected=error.expected, hint=error.hint, **where) from None
+        raise MeasurementError(
+            error.found, expected=error.expected, hint=error.hint, file=at[0][0].file, line=at[0][0].heading_line
+        ) from None
     if not dates.iso and not dates.notes:
         return list(tables)
-    found, notes = [], tuple(f"{at[0][0].file}: {note}" for note in dates.notes)
+    found, notes = [], dates.notes
     for table in tables:
-        if DATE in table.heading:
-            i = table.heading.index(DATE)
-            rows = ((n, (*c[:i], dates.of(c[i]), *c[i + 1 :]) if i < len(c) else c) for n, c in table.rows)
-            table, notes = replace(table, rows=tuple(rows), notes=(*table.notes, *notes)), ()
-        found.append(table)
+        found.append(with_cells(table, DATE, dates.iso, *notes))
+        notes = [] if DATE in table.heading else notes
     return found
+
+
+def with_cells(table: Table, column: str, cells: Mapping[str, str], *notes: str) -> Table:
+    """The table with other texts in the cells of a column, if it has that, and notes of it."""
+    if column not in table.heading:
+        return table
+    i = table.heading.index(column)
+    rows = tuple((n, (*c[:i], cells.get(c[i], c[i]), *c[i + 1 :]) if i < len(c) else c) for n, c in table.rows)
+    return replace(table, rows=rows, notes=(*table.notes, *(f"{table.file}: {note}" for note in notes if note)))
 
 
 def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:

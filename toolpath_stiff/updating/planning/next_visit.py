@@ -344,8 +344,8 @@ def _taken(tables: Tables, files: tuple[str, ...]) -> tuple[Taken, list[str]]:
             elif np.isfinite(value):
                 rows.append(own)
                 logs.append(value)
-                clamps.append(f"{name} {row.labels['clamp'] or row.position}")
-                where.append(f"{name}:{row.line}")
+                clamps.append(f"{table.file} {row.labels['clamp'] or row.position}")
+                where.append(f"{table.file}:{row.line}")
     notes = [f"{others} readings are not of this plan and are passed over"] if others else []
     return Taken(np.array(rows, dtype=np.int64), np.array(logs), np.array(clamps, dtype=str), tuple(where)), notes
 
