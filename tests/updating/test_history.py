@@ -18,7 +18,7 @@ from toolpath_stiff.report.readings import history_png
 from toolpath_stiff.updating.comparison import compare
 from toolpath_stiff.updating.history import DRAWS, Readings, history
 from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.rows import date_text, day_of
+from toolpath_stiff.updating.dates import date_text, day_of
 
 DATES = ("2018-03-01", "2018-09-10", "2019-04-02", "2019-06-11", "2020-01-15", "2020-08-03", "2021-02-11")
 DAYS = np.array([day_of(text) for text in DATES])

@@ -143,7 +143,7 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--units",
         metavar="UNITS",
-        help="units of headings that state none: N,um (force, displacement), N/um (stiffness)",
+        help="units of headings that state none: N,um of force and displacement, N/um",
     )
     parser.add_argument(
         "--compression-positive", action="store_true", help="forces of struts on a bench count compression positive"
