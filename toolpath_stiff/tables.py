@@ -148,8 +148,10 @@ def parse_table(text: str, file: str, columns: Columns) -> Table:
     return grid_table(text_grid(text, file, columns), file, columns)
 
 
-def text_grid(text: str, file: str, columns: Columns) -> Grid:
-    """Cells of a text, parted by the mark that makes the best heading of it. Raises `InputError`."""
+def text_grid(text: str, file: str, columns: Columns, mark: str = "") -> Grid:
+    """Cells of a text, parted by a mark; "" is that which makes the best heading of it. Raises `InputError`."""
+    if mark:
+        return Grid(list(_lines(text, file, mark)), mark)
     declared = re.match(r"\ufeff?sep=(.)\s*[\r\n]", text, re.IGNORECASE)  # Excel's own first line
     if declared and declared[1] in SEPARATORS:
         return Grid(list(_lines(text, file, declared[1]))[1:], declared[1])

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import MeasurementError
+from toolpath_stiff.errors import InputError, MeasurementError
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 Order = Literal["dmy", "mdy"]
@@ -199,6 +199,8 @@ def _year(text: str) -> int:
 
 def _iso(year: int, month: int, day: int) -> str:
     """ISO 8601; "" where the calendar has no such day. Month or day 0 is not given."""
+    if not EARLIEST <= year < LATEST:
+        return ""
     try:
         datetime(year, month or 1, day or 1)
     except ValueError:
@@ -257,7 +259,11 @@ def read_dates(texts: Iterable[str], order: Order | None = None, remedy: str = W
 
 def _as_iso(text: str) -> _Read | None:
     """A date that is written so already, in whatever precision."""
-    return _Read((text, text)) if DATE_TIME.fullmatch(text) or REDUCED.fullmatch(text) else None
+    try:
+        day_of(text)
+    except InputError:
+        return None
+    return _Read((text, text))
 
 
 def _settled(found: dict[str, _Read], order: Order | None, remedy: str) -> Dates:

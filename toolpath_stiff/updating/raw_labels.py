@@ -13,7 +13,7 @@ from toolpath_stiff.updating.dates import Order, dates_in, finer, read_dates
 from toolpath_stiff.updating.rows import DATE, POSITION, with_cells, with_dates
 
 WORDS = ("strut", "leg", "actuator", "limb", "ram", "stab", "bein", "strebe")
-_WORD = rf"(?i:(?<![a-z])(?:{'|'.join(WORDS)})[ _:=#-]*(?:(?:no|nr|number)\.?[ _:]*)?)"
+_WORD = rf"(?i:(?<![a-z])(?:{'|'.join(WORDS)})[ _:=#-]*(?:(?:no|nr|number)\.?[ _:]*)?[LlSs]?)"
 STRUT = re.compile(rf"{_WORD}(0?[0-9](?![0-9.])|[A-F](?![A-Za-z0-9]))")
 BARE = re.compile(r"(?:[LlSs][-_ ]?)?0?([0-9])|([A-F])")  # the whole of a cell, of a sheet's or a file's name
 IN_NAME = re.compile(r"(?<![A-Za-z0-9])[LlSs]0?([0-9])(?![A-Za-z0-9])|(?<![A-Za-z0-9])([A-F])(?![A-Za-z0-9])")

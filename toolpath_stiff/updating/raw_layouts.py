@@ -29,7 +29,7 @@ from toolpath_stiff.tables import (
     text_grid,
 )  # fmt: skip
 from toolpath_stiff.updating.dates import REDUCED, dates_in, like_date, read_dates
-from toolpath_stiff.updating.raw_labels import BARE, STRUT, WORDS, keyed_dates, strut_label
+from toolpath_stiff.updating.raw_labels import BARE, KEYED_DATE, STRUT, WORDS, keyed_dates, strut_label
 from toolpath_stiff.updating.rows import DATE
 from toolpath_stiff.workbook import SPREADSHEET_ERROR, Grid, is_workbook, sheet_grid, sheet_names, split_name, typed
 
@@ -62,6 +62,7 @@ MISSING = ("", "-", "--", "---", "nan", "n/a", "na", "null", "none", "#n/a")  # 
 NUMBER = re.compile(r"[+-]?(?:\d[\d.,'’ \u00a0\u202f]*|[.,]\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
 TARE = re.compile(r"tare|tara|zero|zeroing|null|nullung|nullpunkt", re.IGNORECASE)
 DATED = re.compile(r"(?<!\d)(?:\d{4}-\d{2}(?:-\d{2})?(?:T00:00:00)?|\d{1,2}\.\d{1,2}\.\d{4}|(?:19|20)\d{2})(?!\d)")
+FEWEST_CELLS = 3  # of a row of dates that are headings
 ALL_STRUTS = 6
 
 Rows = list[tuple[int, list[str]]]
@@ -135,6 +136,8 @@ def head_of(text: str) -> Head | None:
     text = " ".join(text.split())
     if like_date(text) or re.fullmatch(r"(?:19|20)\d{2}(?:-\d{2})?", text):
         return Head(date=text)
+    if KEYED_DATE.fullmatch(text):
+        return Head(quantity=DATE)
     label = strut_label(text)
     if label:
         return Head(strut=label, worded=bool(STRUT.fullmatch(text)))
@@ -208,7 +211,8 @@ def _layout_at(rows: Rows, start: int, units: Units) -> _Layout | None:
             continue
         width = max(len(cells) for _, cells in rows[start : start + depth + 1])
         found = _layout(rows[start][0], start, start + depth, _stacked(stack, width))
-        if found and _is_data(rows[start + depth][1], found):
+        below = rows[start + depth]
+        if found and (_is_data(below[1], found) or _other_block(below, "strut" in found.shared or bool(found.groups))):
             return found
     return None
 
@@ -224,6 +228,10 @@ def _is_units(cells: Sequence[str]) -> bool:
 def _is_labels(cells: Sequence[str]) -> bool:
     """Whether every cell of a row above the quantities is a strut, a date, a quantity or empty."""
     heads = [head_of(cell) for cell in cells if cell]
+    if len(heads) < FEWEST_CELLS and (
+        len(heads) < 2 or keyed_dates([(0, cells)]) or (heads[0] is not None and heads[0].quantity == "strut")
+    ):
+        return False  # `Strut 3` or `Date;2021-03-04` above a heading are of all records
     return bool(heads) and all(head is not None for head in heads) and any(head and any(head.group) for head in heads)
 
 
@@ -510,12 +518,22 @@ def _long(records: _Records, layout: _Layout, units: Units, file: str) -> Long:
     heading = [_time(name, i, layout, records.rows) for i, name in enumerate(heading)]
     needed = [*layout.data, *layout.shared.get("strut", []), *layout.shared.get(DATE, [])]
     rows = [(n, _fitted(cells, len(heading), needed)) for n, cells in records.rows]
+    dated = next((i for i, head in enumerate(layout.heads) if head == Head() and _holds_dates(i, records.rows)), None)
+    if DATE not in heading and dated is not None:
+        notes.append(f"column {heading[dated]!r} is read as date")
+        heading[dated] = DATE
     several = layout.shared.get("displacement", [])
     if len(several) > 1:
         notes.append(_averaged_note(several, layout))
         rows = [(n, _averaged(cells, several)) for n, cells in rows]
         heading = [name for i, name in enumerate(heading) if i not in several[1:]]
     return heading, _tared(rows, records.tare, notes), notes
+
+
+def _holds_dates(i: int, rows: Rows) -> bool:
+    """Whether a column without a known name holds nothing but dates."""
+    cells = [cells[i] for _, cells in rows if i < len(cells)]
+    return bool(cells) and all(like_date(cell) for cell in cells)
 
 
 def _is_strut_force(layout: _Layout, i: int) -> bool:
@@ -740,8 +758,13 @@ def _text_cells(text: str, path: str, columns: Columns) -> tuple[Grid, frozenset
             rest = line[mark.end() :]
             lines[i] = "" if re.match(r"[+-]?[\d.]", rest) else rest.replace('"', "")
             comments.add(i + 1)
-    by_spaces = _by_spaces(lines)
-    return by_spaces or text_grid("\n".join(lines), path, columns), frozenset(comments)
+    filled = [line for line in lines if line.strip()]
+    # A mark in most lines that cannot stand in a number; commas can.
+    usual = (mark for mark in ";\t" if sum(mark in line for line in filled) > 0.5 * len(filled))
+    declared = re.match(r"\ufeff?sep=", text, re.IGNORECASE)
+    separator = "" if declared else next(usual, "")
+    grid = _by_spaces(lines) or text_grid("\n".join(lines), path, columns, separator)
+    return grid, frozenset(comments)
 
 
 def _by_spaces(lines: Sequence[str]) -> Grid | None:
