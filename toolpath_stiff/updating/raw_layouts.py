@@ -138,7 +138,7 @@ def head_of(text: str) -> Head | None:
         return Head(date=text)
     if KEYED_DATE.fullmatch(text):
         return Head(quantity=DATE)
-    label = strut_label(text)
+    label = "" if text == "F" else strut_label(text)  # the force, unless other letters stand beside it
     if label:
         return Head(strut=label, worded=bool(STRUT.fullmatch(text)))
     tokens = [part for token in heading_key(text).split("_") for part in _parted(token)]
@@ -227,7 +227,7 @@ def _is_units(cells: Sequence[str]) -> bool:
 
 def _is_labels(cells: Sequence[str]) -> bool:
     """Whether every cell of a row above the quantities is a strut, a date, a quantity or empty."""
-    heads = [head_of(cell) for cell in cells if cell]
+    heads = [head_of(_fenced(cell)) for cell in cells if cell]
     if len(heads) < FEWEST_CELLS and (
         len(heads) < 2 or keyed_dates([(0, cells)]) or (heads[0] is not None and heads[0].quantity == "strut")
     ):
@@ -243,7 +243,7 @@ def _stacked(rows: Sequence[Sequence[str]], width: int) -> list[str]:
         for i in range(width):
             cell = cells[i] if i < len(cells) else ""
             if depth < len(rows) - 1 and _is_labels(cells):
-                head = head_of(cell) if cell else None
+                head = head_of(_fenced(cell)) if cell else None
                 last = cell if head and any(head.group) else ("" if cell else last)
                 cell = cell or last
             found[i] = f"{found[i]} {_fenced(cell)}".strip() if cell != found[i] else found[i]
@@ -256,7 +256,8 @@ def _fenced(cell: str) -> str:
 
 
 def _layout(line: int, start: int, stop: int, texts: Sequence[str]) -> _Layout | None:
-    heads = _without_corner([_head(text) for text in texts])
+    letters = {"A", "B", "C"} <= set(texts)
+    heads = _without_corner([_head(_fenced(text) if letters else text) for text in texts])
     quantities = {head.quantity for head in heads} & set(OWN_UNIT)
     if "stiffness" not in quantities and not {"force", "displacement"} <= quantities:
         if quantities or not _names_series(heads):
@@ -420,7 +421,8 @@ def _other_block(row: tuple[int, list[str]], own_strut: bool) -> bool:
     """Whether a line among the records names a strut or a date, as the head of a block does."""
     text = " ".join(row[1])
     named = STRUT.search(text) if not own_strut else None
-    return bool(named and len(text) <= len(named[0]) + 30) or bool(keyed_dates([row]))
+    dated = sum(map(bool, row[1])) < FEWEST_CELLS and any(read_dates([d], "dmy").of(d) for d, _ in keyed_dates([row]))
+    return dated or bool(named and len(text) <= len(named[0]) + 30)
 
 
 def _is_footer(cells: Sequence[str], layout: _Layout) -> bool:
@@ -447,7 +449,7 @@ def _tables(
     if "" in heading or len(set(heading)) < len(heading):
         keep = [i for i, name in enumerate(heading) if name and heading.index(name) == i]
         heading, rows = [heading[i] for i in keep], [(n, [c[i] for i in keep]) for n, c in rows]
-    known = Grid([(layout.line, heading), *rows], "" if grid.separator == "," else grid.separator, grid.notes)
+    known = Grid([(layout.line, heading), *rows], grid.separator, grid.notes)
     table = grid_table(known, file, columns)
     lines = tuple((n, tuple(c)) for n, c in above)
     return [replace(table, above=lines, notes=(*notes, *table.notes))]
@@ -782,7 +784,7 @@ def _by_spaces(lines: Sequence[str]) -> Grid | None:
         cells = parted[i] if numbers[i] >= 2 or (len(parted[i]) == width and len(wide) != width) else wide
         if line.strip():
             found.append((i + 1, [typed(cell) for cell in cells]))
-    return Grid(found, "")
+    return Grid(found, " ")
 
 
 def _json_tables(text: str, path: str, columns: Columns, units: Units) -> list[Table]:
