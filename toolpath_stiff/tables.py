@@ -56,6 +56,7 @@ PLAIN = re.compile(r"[+-]?\d+(?:e[+-]?\d+)?", re.IGNORECASE)
 ONE_MARK = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
 LIKE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[.,'’ \u00a0\u202f]\d{3})+(?:[.,]\d*)?")
+BETWEEN_COMMAS = "a decimal comma between commas? Write semicolons between the cells"
 REMOVE_THEM = "write numbers without thousands separators"
 
 Rows = list[tuple[int, list[str]]]
@@ -113,7 +114,7 @@ class Table:
         raise TableError(
             f"row with {len(cells)} cells",
             expected=f"{len(self.heading)} as in the heading",
-            hint="a decimal comma between commas? Write semicolons between the cells" if comma else "",
+            hint=BETWEEN_COMMAS if comma else "",
         )
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, MeasurementError
-from toolpath_stiff.tables import Table, split_name
+from toolpath_stiff.tables import BETWEEN_COMMAS, Table, split_name
 from toolpath_stiff.updating.dates import Order, dates_in, finer, read_dates
 from toolpath_stiff.updating.rows import DATE, POSITION, with_cells, with_dates
 
@@ -69,6 +69,15 @@ def labelled(table: Table) -> Table:
             notes.append(f"{table.file}: {column} {values[0]} is taken from {where}")
     if not found:
         return table
+    for line, cells in table.rows:
+        if len(cells) != len(table.heading):
+            raise MeasurementError(
+                f"row with {len(cells)} cells",
+                expected=f"{len(table.heading)} as in the heading",
+                hint=BETWEEN_COMMAS if table.separator == "," and len(cells) > len(table.heading) else "",
+                file=table.file,
+                line=line,
+            )
     rows = tuple((line, (*cells, *found.values())) for line, cells in table.rows)
     return replace(table, heading=(*table.heading, *found), rows=rows, notes=(*table.notes, *notes))
 

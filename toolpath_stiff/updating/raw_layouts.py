@@ -207,7 +207,8 @@ def _layout_at(rows: Rows, start: int, units: Units) -> _Layout | None:
         if len(rows) <= start + depth:
             return None
         upper = stack[:-2] if _is_units(stack[-1]) else stack[:-1]
-        if not all(_is_labels(cells) for cells in upper):
+        read = depth > 1 and any(_is_number(cell) and re.search(r"[.,]", cell) for cell in stack[-1])
+        if read or not all(_is_labels(cells) for cells in upper):
             continue
         width = max(len(cells) for _, cells in rows[start : start + depth + 1])
         found = _layout(rows[start][0], start, start + depth, _stacked(stack, width))
@@ -245,8 +246,8 @@ def _stacked(rows: Sequence[Sequence[str]], width: int) -> list[str]:
             if depth < len(rows) - 1 and _is_labels(cells):
                 head = head_of(_fenced(cell)) if cell else None
                 last = cell if head and any(head.group) else ("" if cell else last)
-                cell = cell or last
-            found[i] = f"{found[i]} {_fenced(cell)}".strip() if cell != found[i] else found[i]
+                cell = _fenced(cell or last)
+            found[i] = f"{found[i]} {cell}".strip() if cell != found[i] else found[i]
     return found
 
 
