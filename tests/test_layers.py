@@ -53,6 +53,7 @@ UPDATING_RANK = {
     "measurements": 1,
     "raw_labels": 1,
     "raw_layouts": 2,
+    "raw_files": 3,
     "raw_records": 3,
     "raw": 4,
     "inference": 2,
