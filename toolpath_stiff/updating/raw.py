@@ -182,7 +182,10 @@ def _hint(loop: Loop, stiffness: float) -> str:
     if loop.jog is not None:
         return "force, jog and displacement count positive the same way; displacement is what the indicator read"
     if stiffness < 0.0:
-        return "tension and stretch are positive: one of the two columns counts the other way; turn its sign"
+        return (
+            "tension and stretch are positive: one of the two columns counts the other way; turn its sign, "
+            "or say --compression-positive (compression_positive=True)"
+        )
     rules = "Tension and stretch are positive; a slope needs two forces"
     for factor, words in ((1e3, "the force in kN"), (1e-3, "the displacement in mm"), (1e6, "both in kN and mm")):
         if USUAL[0] <= factor * n_per_mm_from_n_per_m(stiffness) <= USUAL[1]:

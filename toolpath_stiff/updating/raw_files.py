@@ -1,4 +1,4 @@
-"""Files of raw records: folders, all sheets of a workbook, text with any mark or spaces between cells, LabVIEW, JSON."""
+"""Files of raw records: folders, sheets of a workbook, text with any mark or spaces between cells, LabVIEW, JSON."""
 
 from __future__ import annotations
 
