@@ -47,13 +47,15 @@ RANK = {
 # The same within `updating`, of its modules and rooms.
 UPDATING_RANK = {
     "loops": -1,
-    "raw_cycles": -1,
+    "dates": -1,
     "rows": 0,
     "history": 1,
     "measurements": 1,
     "raw_labels": 1,
-    "raw_records": 2,
-    "raw": 3,
+    "raw_layouts": 2,
+    "raw_files": 3,
+    "raw_records": 3,
+    "raw": 4,
     "inference": 2,
     "comparison": 3,
     "planning": 3,

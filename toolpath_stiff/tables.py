@@ -24,29 +24,45 @@ SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
 LOOKED_AT = 60  # rows among which the heading is searched
 HEADING_FROM = 3  # known columns in a row make it the heading, so that titles may stand above it
 FEWEST = 2  # known columns of a heading, where no row has so many
-# Tokens of units, as `_key` makes them: those of the columns and those that stand there by mistake.
-LENGTHS, FORCES = ("nm", "um", "mm", "cm", "m", "in", "inch"), ("n", "kn")
-OTHERS = ("n_per_um", "n_per_mm", "n_per_m", "kn_per_mm", "deg", "rad", "mrad", "s", "min", "h", "c", "k", "f", "%")
+# Tokens of units, as `heading_key` makes them: those of the columns and those that stand there by mistake.
+LENGTHS = ("nm", "um", "mm", "cm", "m", "in", "inch", "inches", "mil", "mils", "thou", "uin")
+FORCES = ("n", "kn", "dan", "kgf", "kp", "lbf", "lb", "lbs")
+STIFFNESSES = ("n_per_um", "n_per_mm", "n_per_m", "kn_per_mm", "kn_per_um", "mn_per_m", "kgf_per_mm", "lbf_per_in")
+OTHERS = (*STIFFNESSES, "deg", "rad", "mrad", "s", "min", "h", "c", "k", "f", "%")
 UNITS = frozenset((*LENGTHS, *FORCES, *OTHERS))
-# Units of one quantity by their size, as ratios of whole numbers (BIPM: The International System of Units, 9th ed.).
+# Units of one quantity by their size, as ratios of whole numbers (BIPM: The International System of Units, 9th ed.;
+# inch, pound-force and kilogram-force: NIST Special Publication 811:2008, B.8, exact).
+INCH, POUND_FORCE, KILOGRAM_FORCE = (254, 10**4), (44482216152605, 10**13), (980665, 10**5)
 SCALES: tuple[Mapping[str, tuple[int, int]], ...] = (
-    {"nm": (1, 10**9), "um": (1, 10**6), "mm": (1, 1000), "cm": (1, 100), "m": (1, 1)},
-    {"n": (1, 1), "kn": (1000, 1)},
+    {
+        "nm": (1, 10**9), "um": (1, 10**6), "mm": (1, 1000), "cm": (1, 100), "m": (1, 1),
+        **dict.fromkeys(("in", "inch", "inches"), INCH),
+        **dict.fromkeys(("mil", "mils", "thou"), (INCH[0], 1000 * INCH[1])), "uin": (INCH[0], 10**6 * INCH[1]),
+    },
+    {
+        "n": (1, 1), "kn": (1000, 1), "dan": (10, 1), **dict.fromkeys(("kgf", "kp"), KILOGRAM_FORCE),
+        **dict.fromkeys(("lbf", "lb", "lbs"), POUND_FORCE),
+    },
     {"s": (1, 1), "min": (60, 1), "h": (3600, 1)},
-    {"n_per_m": (1, 1), "n_per_mm": (1000, 1), "n_per_um": (10**6, 1), "kn_per_mm": (10**6, 1)},
-)
+    {
+        "n_per_m": (1, 1), "n_per_mm": (1000, 1), "n_per_um": (10**6, 1), "kn_per_mm": (10**6, 1),
+        "kn_per_um": (10**9, 1), "mn_per_m": (10**6, 1), "kgf_per_mm": (1000 * KILOGRAM_FORCE[0], KILOGRAM_FORCE[1]),
+        "lbf_per_in": (POUND_FORCE[0] * INCH[1], POUND_FORCE[1] * INCH[0]),
+    },
+)  # fmt: skip
 SAME_TOKEN = {"degc": "c", "degrees": "deg", "minutes": "min", "micron": "um", "microns": "um"}
 
 PLAIN = re.compile(r"[+-]?\d+(?:e[+-]?\d+)?", re.IGNORECASE)
 ONE_MARK = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
 LIKE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[.,'’ \u00a0\u202f]\d{3})+(?:[.,]\d*)?")
+BETWEEN_COMMAS = "a decimal comma between commas? Write semicolons between the cells"
 REMOVE_THEM = "write numbers without thousands separators"
 
 Rows = list[tuple[int, list[str]]]
 Cell = tuple[int, str, str]  # line, column, text
 
-__all__ = ["Columns", "Table", "parse_table", "read_table", "split_name"]
+__all__ = ["Columns", "Table", "grid_table", "heading_key", "parse_table", "read_table", "split_name", "text_grid"]
 
 
 @dataclass(frozen=True)
@@ -98,7 +114,7 @@ class Table:
         raise TableError(
             f"row with {len(cells)} cells",
             expected=f"{len(self.heading)} as in the heading",
-            hint="a decimal comma between commas? Write semicolons between the cells" if comma else "",
+            hint=BETWEEN_COMMAS if comma else "",
         )
 
 
@@ -122,7 +138,7 @@ def read_table(path: str, what: str, columns: Columns) -> Table:
     workbook, sheet = split_name(path)
     content = read_bytes(workbook, what)
     if is_workbook(content):
-        return _table(sheet_grid(content, workbook, sheet), path, columns)
+        return grid_table(sheet_grid(content, workbook, sheet), path, columns)
     if sheet:
         raise TableError(f"{workbook!r} is not an Excel workbook and has no sheets", file=path)
     return parse_table(decoded(content), path, columns)
@@ -130,10 +146,13 @@ def read_table(path: str, what: str, columns: Columns) -> Table:
 
 def parse_table(text: str, file: str, columns: Columns) -> Table:
     """The same from the text of a file."""
-    return _table(_text_grid(text, file, columns), file, columns)
+    return grid_table(text_grid(text, file, columns), file, columns)
 
 
-def _text_grid(text: str, file: str, columns: Columns) -> Grid:
+def text_grid(text: str, file: str, columns: Columns, mark: str = "") -> Grid:
+    """Cells of a text, parted by a mark; "" is that which makes the best heading of it. Raises `InputError`."""
+    if mark:
+        return Grid(list(_lines(text, file, mark)), mark)
     declared = re.match(r"\ufeff?sep=(.)\s*[\r\n]", text, re.IGNORECASE)  # Excel's own first line
     if declared and declared[1] in SEPARATORS:
         return Grid(list(_lines(text, file, declared[1]))[1:], declared[1])
@@ -164,7 +183,8 @@ def _lines(text: str, file: str, separator: str, strict: bool = True) -> Iterato
             raise TableError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
 
 
-def _table(grid: Grid, file: str, columns: Columns) -> Table:
+def grid_table(grid: Grid, file: str, columns: Columns) -> Table:
+    """The same from cells. Raises as `read_table`."""
     if not grid.rows:
         raise TableError("the file is empty", expected="a heading and rows below it", file=file)
     known = _known(columns)
@@ -191,6 +211,9 @@ def _table(grid: Grid, file: str, columns: Columns) -> Table:
     rows = [(at_line, _fitted(cells, len(heading), grid.separator == "")) for at_line, cells in body]
     _refuse_spreadsheet_errors(heading, rows, file)
     numbers = [i for i, name in enumerate(heading) if name not in columns.texts]
+    if columns.converted:
+        rows, grouped = _without_groups(rows, numbers)
+        notes += [f"{file}: {grouped!r} is read as a thousands separator"] if grouped else []
     rows, commas = with_points(heading, rows, numbers, grid.separator, file)
     if commas:
         notes.append(f"{file}: numbers are read with decimal commas")
@@ -229,7 +252,7 @@ def _paired(written: list[str], units: list[str]) -> Iterator[tuple[str, str]]:
     return zip(written, (units + [""] * len(written))[: len(written)], strict=True)
 
 
-def _key(name: str) -> str:
+def heading_key(name: str) -> str:
     """A heading without case, brackets, spaces and signs: `Stiffness [N/mm]` and `stiffness_N_per_mm` are one."""
     text = unicodedata.normalize("NFKC", name.replace("°", "deg").replace("º", "deg")).casefold()
     tokens = re.findall(r"[^\W_]+|%", text.replace("μ", "u").replace("/", " per "))
@@ -238,7 +261,7 @@ def _key(name: str) -> str:
 
 def _known(columns: Columns) -> dict[str, str]:
     """Key -> name of every column."""
-    return {_key(name): name for name in (*columns.numbers, *columns.texts)}
+    return {heading_key(name): name for name in (*columns.numbers, *columns.texts)}
 
 
 def _meant(key: str, known: Mapping[str, str]) -> str | None:
@@ -262,21 +285,21 @@ def _ends(key: str, unit: str) -> bool:
 
 def _score(cells: Sequence[str], known: Mapping[str, str]) -> int:
     """How many cells of a row are headings."""
-    keys = {_key(cell) for cell in cells if cell}
+    keys = {heading_key(cell) for cell in cells if cell}
     return sum(key in known or _meant(key, known) is not None for key in keys)
 
 
 def _is_unit_row(cells: Sequence[str], heading: Sequence[str]) -> bool:
     """Whether the cells are units, empty, a dash, or (merged cells) the heading once more; and one is a unit."""
     units = [cell for cell, above in zip(cells, [*heading, *[""] * len(cells)], strict=False) if cell != above]
-    return any(_key(cell) in UNITS for cell in units) and all(
-        _key(cell) in UNITS or not cell.strip("-–[]() ") for cell in units
+    return any(heading_key(cell) in UNITS for cell in units) and all(
+        heading_key(cell) in UNITS or not cell.strip("-–[]() ") for cell in units
     )
 
 
 def _name(written: str, unit: str, known: Mapping[str, str], file: str, line: int) -> str:
     """The known name of a heading and the unit below it; others as they stand. Raises `InputError`."""
-    key, unit_key = _key(written), _key(unit)
+    key, unit_key = heading_key(written), heading_key(unit)
     if not key:
         return written
     bare = unit_key not in UNITS
@@ -300,12 +323,12 @@ def _name(written: str, unit: str, known: Mapping[str, str], file: str, line: in
 
 def _factor(written: str, unit: str, known: Mapping[str, str]) -> tuple[str, int, int] | None:
     """The known name, and the ratio by which numbers in the unit that the heading states become those of its own."""
-    key = "_".join(filter(None, (_key(written), _key(unit))))
-    name = None if _key(written) in known or key in known else _meant(key, known)
-    base = _without_unit(_key(name)) if name else None
+    key = "_".join(filter(None, (heading_key(written), heading_key(unit))))
+    name = None if heading_key(written) in known or key in known else _meant(key, known)
+    base = _without_unit(heading_key(name)) if name else None
     if name is None or not base or not key.startswith(f"{base}_"):
         return None
-    stated, own = key[len(base) + 1 :], _key(name)[len(base) + 1 :]
+    stated, own = key[len(base) + 1 :], heading_key(name)[len(base) + 1 :]
     for scale in SCALES:
         if stated in scale and own in scale:
             (up, down), (own_up, own_down) = scale[stated], scale[own]
@@ -386,6 +409,28 @@ def with_points(
 
 def _with_point(cell: str) -> str:
     return cell.replace(",", ".") if ONE_MARK.fullmatch(cell) else cell
+
+
+def _without_groups(rows: Rows, numbers: Sequence[int]) -> tuple[Rows, str]:
+    """Numbers of a logger without their thousands separators, and which it is.
+
+    "" where no number shows one, or others of the file contradict.
+    """
+    cells = [row[i] for _, row in rows for i in numbers if i < len(row)]
+    sure = [cell for cell in cells if THOUSANDS.fullmatch(cell) and not ONE_MARK.fullmatch(cell)]
+    marks = {match[1] for cell in sure if (match := re.match(r"[+-]?\d{1,3}([^\d])", cell))}
+    if len(marks) != 1:
+        return rows, ""
+    mark = marks.pop()
+    if any(mark in cell and (not _groups_by(mark).fullmatch(cell)) for cell in cells if re.match(r"[+-]?[\d.,]", cell)):
+        return rows, ""
+    of = frozenset(numbers)
+    return [(n, [c.replace(mark, "") if i in of else c for i, c in enumerate(row)]) for n, row in rows], mark
+
+
+@cache
+def _groups_by(mark: str) -> re.Pattern[str]:
+    return re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+(?:[.,]\d*)?")
 
 
 def _refuse_grouped(cells: list[Cell], file: str) -> None:

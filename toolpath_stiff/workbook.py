@@ -89,9 +89,21 @@ def sheet_grid(content: bytes, file: str, sheet: str = "") -> Grid:
     return Grid([(line, row) for line, row in rows if counts(row)], "", tuple(notes), merged)
 
 
+def sheet_names(content: bytes, file: str) -> list[str]:
+    """Names of the sheets that are not empty, in their order. Raises as `sheet_grid`."""
+    if content.startswith(OLD_EXCEL):
+        raise TableError("an old or a protected Excel file", expected="an .xlsx workbook", hint=SAVE_AS, file=file)
+    _refuse_large(content, file)
+    return [one.title for one in _filled(_open(content, file, values=True))]
+
+
+def _filled(workbook: Any) -> list[Any]:
+    return [one for one in workbook.worksheets if any(v is not None for row in one.values for v in row)]
+
+
 def _chosen_sheet(workbook: Any, file: str, sheet: str) -> tuple[Any, list[str]]:
     """The sheet of that name, or the first that is not empty, and a note where there are others."""
-    filled = [one for one in workbook.worksheets if any(v is not None for row in one.values for v in row)]
+    filled = _filled(workbook)
     names = [one.title for one in filled]
     if not filled:
         raise TableError("the workbook is empty", file=file)

@@ -160,12 +160,16 @@ def test_a_table_of_stiffnesses_is_a_history(reduced, tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("timestamp,strut,force_N,displacement_um\n2020-01-01T10:00,1,0,0\n2021-01-01T10:00,1,9,9\n",
-         "rename timestamp"),
+        ("strut,date,force_N,displacement_um\n1,04/03/2021,0,0\n", "date-order dmy .* or mdy"),
+        ("strut,date,force_N,displacement_um\n1,13/03/2021,0,0\n1,03/13/2021,0,0\n", "one order"),
         ("strut,date,force_N,displacement_um\n1,2020-01-01,1,25\n1,2020-01-01,-1,-25\n", "is the force in kN?"),
         ("strut,date,force_N,displacement_um\n1,2020-01-01,9e2,-25\n1,2020-01-01,-9e2,25\n", "turn its sign"),
-        ("date,strut 1,strut 2\n2020-01-01,40000,40000\n", "side by side are not read"),
-        ("Strebe,Kraft,Weg\n1,0,0\n", "'Strebe', 'Kraft', 'Weg' are not known"),
+        ("date,strut 1,strut 2\n2020-01-01,40000,40000\n", "'strut 1' has no unit"),
+        ("Strebe,Kraft,Weg\n1,0,0\n", "'Kraft' has no unit; .* --units N,um"),
+        ("strut,force_N,disp [counts]\n1,0,0\n", "the logger's own counts"),
+        ("strut,force_N,force_N,disp_um\n1,0,0,0\n", "2 columns of forces without their struts"),
+        ("strut,force_mm,displacement_um\n1,0,0\n", "mm is no unit of a force"),
+        ("strut,force_N,displacement_um\n0,0,0\n6,0,0\n", "from 0 to 5"),
         ("strut,stiffness_N_per_mm\n1,40\n", "is the unit right"),
     ],
 )  # fmt: skip
@@ -176,7 +180,7 @@ def test_what_to_do_is_said(reduced, text, message):
 
 def test_many_equal_errors_are_told_together(reduced):
     with pytest.raises(InputErrors) as caught:
-        reduced("strut,date,force_N,displacement_um\n" + "1,04.03.2021,0,0\n" * 500)
+        reduced("strut,date,force_N,displacement_um\n" + "1,04.13.2021,0,0\n" * 500)
     lines = str(caught.value).splitlines()
     assert len(lines) == 2 and lines[1].endswith("raw.csv: the same in 499 further lines: 3-501")
 

@@ -141,7 +141,7 @@ def test_json_without_plots(raw, capsys):
     [
         ("", "the file is empty"),
         (HEADING, "no records"),
-        (HEADING.replace("jog_um", "jog_inch") + "0,0,800,X,A,1,1,1\n", "unknown column 'jog_inch'"),
+        (HEADING.replace("jog_um", "jog_steps") + "0,0,800,X,A,1,1,1\n", "column jog_um is missing"),
         (HEADING.replace(",jog_um", "") + "0,0,800,X,A,1,1\n", "column jog_um is missing"),
         (HEADING.replace(",direction", "") + "0,0,800,A,1,1,1\n", "no direction"),
         (HEADING + "0,0,800,X,A,0,0\n", "raw.csv:2: row with 7 cells; expected 8"),

@@ -105,13 +105,22 @@ class Reduction(Result):
         return [write_atomically(name, content) for name, content in self.files(file, plots=plots).items()]
 
 
-def reduce(*raw: str | Path) -> Reduction:
+def reduce(
+    *raw: str | Path, date_order: str | None = None, units: str | None = None, compression_positive: bool = False
+) -> Reduction:
     """Raw records of force and displacement to measured stiffnesses: the secant of each loop (the paper's equation 12).
 
     Parameters
     ----------
     raw
-        One file or several: CSV, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their stiffnesses.
+        Files and folders of them: text, JSON, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their
+        stiffnesses.
+    date_order
+        "dmy" or "mdy", where dates as 04/03/2021 can be read in two ways; None: as the other dates of the set show.
+    units
+        Of headings that state none: "N,um" of force and displacement, "N/um" of a stiffness.
+    compression_positive
+        Whether the forces of struts on a bench count compression positive, where no head says so.
 
     Raises
     ------
@@ -131,11 +140,19 @@ def reduce(*raw: str | Path) -> Reduction:
     >>> found.to_frame()["stiffness_N_per_mm"].tolist()
     [50000.0]
     """
+    from toolpath_stiff.updating.dates import order_of
     from toolpath_stiff.updating.raw import reduce as reduce_records
+    from toolpath_stiff.updating.raw import units_of
 
     if not raw:
         raise InputError("no raw records", expected="a file or several")
-    return Reduction(reduce_records(*raw), [str(one) for one in raw])
+    found = reduce_records(
+        *raw,
+        date_order=order_of(date_order),
+        units=units_of(units) if units else {},
+        compression=compression_positive,
+    )
+    return Reduction(found, [str(one) for one in raw])
 
 
 class Update(FolderResult):

@@ -114,12 +114,14 @@ columns of RAW:
   x_mm,y_mm,z_mm,direction     where and along what (X, Y, Z; or dx,dy,dz), optionally a_deg,b_deg,c_deg
   jog_um                       how far the machine was told to move from zero
   force_N,displacement_um      gauge and indicator, positive the way the jog counts
-  date                         ISO 8601, as 2024-03-31; each date is a loop of its own
+  date                         2024-03-31, 31.03.2024, 31 Mar 2024, 2024-03, 2024 ...; each date is a loop of its own
   point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
 of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um, length_mm if known; no pose and no jog;
                                or strut, date, stiffness_N_per_mm of struts that were reduced elsewhere
 Another unit in a heading (force_kN, Displacement [mm]) is converted; further columns are not used. In a file of one
-strut, strut and date may stand above the heading (strut: 3) or in the file's name (strut3_2021-09-16.csv).
+strut, strut and date may stand above the heading (strut: 3) or in the file's name (strut3_2021-09-16.csv). Struts or
+dates side by side (F1,d1,F2,d2,...), a row of struts above the quantities, one sheet a strut, blocks one below the
+other, JSON and LabVIEW's .lvm are read as well.
 
 Records in the order taken, jogging 0, +200, -200, 0 um as ASME B5.54 and the paper do; those of one point, direction,
 set-up, clamping and repeat are one loop. Its stiffness is the secant between the extremes (the paper's equation 12);
@@ -132,7 +134,20 @@ def reduce_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = REDUCE_EPILOG
-    parser.add_argument("raw", nargs="+", metavar="RAW", help="raw records: CSV, or FILE.xlsx[#SHEET]")
+    parser.add_argument("raw", nargs="+", metavar="RAW", help="raw records: files, FILE.xlsx[#SHEET], folders of files")
+    parser.add_argument(
+        "--date-order",
+        metavar="ORDER",
+        help="dmy or mdy: whether day or month stands first in dates as 04/03/2021, where no other date tells",
+    )
+    parser.add_argument(
+        "--units",
+        metavar="UNITS",
+        help="units of headings that state none: N,um of force and displacement, N/um",
+    )
+    parser.add_argument(
+        "--compression-positive", action="store_true", help="forces of struts on a bench count compression positive"
+    )
     parser.add_argument(
         "--out",
         metavar="FILE",
@@ -150,7 +165,9 @@ def reduce(args: argparse.Namespace) -> int:
     from toolpath_stiff.files import write_atomically
     from toolpath_stiff.tables import split_name
 
-    found = reduce(*args.raw)
+    found = reduce(
+        *args.raw, date_order=args.date_order, units=args.units, compression_positive=args.compression_positive
+    )
     out = Path(args.out or f"{Path(split_name(args.raw[0])[0]).stem}_measurements.csv")
     files = found.files(out, plots=not args.no_plots)
     keep(check_written(args, files), quiet=args.json)

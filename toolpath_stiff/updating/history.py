@@ -15,8 +15,8 @@ dates it is assumed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal, TypedDict, cast
 
 import numpy as np
@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.units import certain
-from toolpath_stiff.updating.rows import date_text
+from toolpath_stiff.updating.dates import date_text
 
 Kind = Literal["step", "drift", "step or drift"]
+DateText = Callable[[float], str]
 
 SURE = 0.05  # probability, all struts and places counted, below which a change is told of
 DRAWS = 2000  # simulated sets of series
@@ -61,12 +62,19 @@ class Readings:
         (n,) ln(N/m), at one length or reduced to one.
     side
         (n,) 1 of tension, -1 of compression, 0 of both or unknown.
+    dates
+        Day -> its text, where that is less than a day: a year or a month.
     """
 
     strut: TextArray
     day: FloatArray
     log_stiffness: FloatArray
     side: FloatArray
+    dates: Mapping[float, str] = field(default_factory=dict)
+
+    def text(self, day: float) -> str:
+        """A date as it was given."""
+        return self.dates.get(float(day)) or date_text(day)
 
 
 class ChangeEntry(TypedDict):
@@ -298,7 +306,7 @@ def _contrasts(day: FloatArray) -> FloatArray:
 # -- changes -----------------------------------------------------------------------------------------------------------
 
 
-def _changes(day: FloatArray, ln: FloatArray, scale: _Scale) -> tuple[list[ChangeEntry], list[float]]:
+def _changes(day: FloatArray, ln: FloatArray, scale: _Scale, text: DateText) -> tuple[list[ChangeEntry], list[float]]:
     """Changes of a series in the order of time, and dates that stand out alone."""
     if len(day) < 2:
         return [], []
@@ -309,19 +317,20 @@ def _changes(day: FloatArray, ln: FloatArray, scale: _Scale) -> tuple[list[Chang
     lone = _lone(day, ln, scale)
     if lone is not None:
         keep = np.arange(len(day)) != lone
-        found, wild = _changes(day[keep], ln[keep], scale)
+        found, wild = _changes(day[keep], ln[keep], scale, text)
         return found, sorted([float(day[lone]), *wild])
     step, drift = _evidence(day, ln, scale.sd)
     peak = float(step.max())
     weights = np.exp(step - peak)
     odds = peak + float(np.log(weights.mean())) - drift
     if odds < np.log(DECISIVE):
-        return [_drift(day, ln, scale.sd, p, "drift" if -odds >= np.log(DECISIVE) else "step or drift")], []
+        kind: Kind = "drift" if -odds >= np.log(DECISIVE) else "step or drift"
+        return [_drift(day, ln, scale.sd, p, kind, text)], []
     places = np.array(_places(len(day)))
     at = int(places[int(np.argmax(step))])
-    before, wild_before = _changes(day[:at], ln[:at], scale)
-    after, wild_after = _changes(day[at:], ln[at:], scale)
-    one = _step(day, ln, at, places[_credible(weights)], scale.sd, p)
+    before, wild_before = _changes(day[:at], ln[:at], scale, text)
+    after, wild_after = _changes(day[at:], ln[at:], scale, text)
+    one = _step(day, ln, at, places[_credible(weights)], scale.sd, p, text)
     return [*before, one, *after], [*wild_before, *wild_after]
 
 
@@ -354,20 +363,22 @@ def _credible(weights: FloatArray) -> NDArray[np.int64]:
     return np.sort(order[: int(np.searchsorted(held, CREDIBLE)) + 1])
 
 
-def _step(day: FloatArray, ln: FloatArray, at: int, places: NDArray[np.int64], sd: float, p: float) -> ChangeEntry:
+def _step(
+    day: FloatArray, ln: FloatArray, at: int, places: NDArray[np.int64], sd: float, p: float, text: DateText
+) -> ChangeEntry:
     """A step with its largest likelihood before date `at`, somewhere at `places`."""
     one, other = float(ln[:at].mean()), float(ln[at:].mean())
     error = sd * (1.0 / at + 1.0 / (len(day) - at)) ** 0.5
-    ends = date_text(day[int(places[0]) - 1]), date_text(day[int(places[-1])])
+    ends = text(day[int(places[0]) - 1]), text(day[int(places[-1])])
     return _change("step", ends, (one, other), error, p, None)
 
 
-def _drift(day: FloatArray, ln: FloatArray, sd: float, p: float, kind: Kind) -> ChangeEntry:
+def _drift(day: FloatArray, ln: FloatArray, sd: float, p: float, kind: Kind, text: DateText) -> ChangeEntry:
     """A drift over the series."""
     years = (day - day.mean()) / DAYS_PER_YEAR
     slope, error = _slope(day, ln, sd)
     ends = float(ln.mean() + slope * years[0]), float(ln.mean() + slope * years[-1])
-    return _change(kind, (date_text(day[0]), date_text(day[-1])), ends, error * float(np.ptp(years)), p, slope)
+    return _change(kind, (text(day[0]), text(day[-1])), ends, error * float(np.ptp(years)), p, slope)
 
 
 def _slope(day: FloatArray, ln: FloatArray, sd: float) -> tuple[float, float]:
@@ -407,17 +418,17 @@ def _strut(one: _Series, scale: _Scale, readings: Readings) -> StrutEntry:
     n = len(one.day)
     own = readings.strut == one.name
     ln = one.mean if n else readings.log_stiffness[own]
-    changes, wild = _changes(one.day, one.mean, scale)
+    changes, wild = _changes(one.day, one.mean, scale, readings.text)
     slope, error = _slope(one.day, one.mean, scale.sd) if n > 1 else (np.nan, np.nan)
     least = scale.limit * scale.sd * (1.0 / (n // 2) + 1.0 / (n - n // 2)) ** 0.5 if n > 1 else np.nan
     dates: list[DateEntry] = [
-        {"date": date_text(d), "day": float(d - one.day[0]), "stiffness_N_per_mm": 1e-3 * float(np.exp(m)),
+        {"date": readings.text(d), "day": float(d - one.day[0]), "stiffness_N_per_mm": 1e-3 * float(np.exp(m)),
          "readings": int(c)}
         for d, m, c in zip(one.day, one.mean, one.count, strict=True)
     ]  # fmt: skip
     short = one.name.replace(" alone", "")
     said = [f"{short} {change['text']}" for change in changes]
-    said += [f"{short}: {date_text(d)} stands out alone: measure again" for d in wild]
+    said += [f"{short}: {readings.text(d)} stands out alone: measure again" for d in wild]
     if n > 1 and not changes:
         said.append(
             f"{short}: no change found in {n} dates; a step of {100 * np.expm1(least):.2g} % halfway would show"
@@ -430,7 +441,7 @@ def _strut(one: _Series, scale: _Scale, readings: Readings) -> StrutEntry:
         "drift_percent_per_year": 100.0 * slope if n > 1 else None,
         "drift_sd_percent_per_year": 100.0 * error if n > 1 else None,
         "smallest_step_percent": 100.0 * float(np.expm1(least)) if n > 1 else None,
-        "dates": dates, "changes": changes, "wild_dates": [date_text(d) for d in wild], "sides": None,
+        "dates": dates, "changes": changes, "wild_dates": [readings.text(d) for d in wild], "sides": None,
         "text": "; ".join(said),
     }  # fmt: skip
 

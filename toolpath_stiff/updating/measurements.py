@@ -24,8 +24,9 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.exact import loop_compliance
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_path
-from toolpath_stiff.tables import parse_table, read_table
+from toolpath_stiff.tables import Table, parse_table, read_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.updating.dates import day_of, days_since_first
 from toolpath_stiff.updating.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
 from toolpath_stiff.updating.rows import (
     COLUMNS,
@@ -33,10 +34,9 @@ from toolpath_stiff.updating.rows import (
     OPTIONAL,
     Row,
     RowFile,
-    day_of,
-    days_since_first,
     duplicates,
     read_rows,
+    with_dates,
 )
 
 NIST_TABLE_1 = "nist-table1"
@@ -190,12 +190,11 @@ def read_measurements(
     if not names:
         raise MeasurementError("no measurements", expected="a CSV file, or nist-table1")
     seen: set[str] = set()
-    files = []
     for name in map(str, names):
         if name in seen:
             raise MeasurementError(f"{name!r} is given twice", hint="name it once")
         seen.add(name)
-        files.append(_read_file(name, planned))
+    files = _read_files([str(name) for name in names], planned)
     errors: list[InputError] = []
     for parsed in files:
         if isinstance(parsed, InputErrors):
@@ -207,21 +206,38 @@ def read_measurements(
     return with_offsets(_checked(_columns(good, machine), machine), machine)
 
 
-def _read_file(name: str, planned: bool) -> RowFile | InputErrors:
-    """One file; its bad rows are handed back, so that those of all files are reported together."""
-    if name == NIST_TABLE_1:
-        text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
-        table = read_rows(parse_table(text, NIST_TABLE_1, COLUMNS))
-        rows = tuple(
-            replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
-            for row in table.rows
-        )
-        note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
-        return RowFile(rows, table.columns | {"setup"}, (*table.notes, note))
-    try:
-        return read_rows(read_table(name, "measurements", COLUMNS), planned)
-    except InputErrors as bad:
-        return bad
+def _read_files(names: list[str], planned: bool) -> list[RowFile | InputErrors]:
+    """Every file; bad rows of one are handed back, so that those of all files are reported together."""
+    found: list[Table | InputErrors] = []
+    for name in names:
+        try:
+            found.append(_table(name))
+        except InputErrors as bad:
+            found.append(bad)
+    dated = iter(with_dates([one for one in found if isinstance(one, Table)]))
+    return [one if isinstance(one, InputErrors) else _rows(next(dated), planned) for one in found]
+
+
+def _table(name: str) -> Table:
+    if name != NIST_TABLE_1:
+        return read_table(name, "measurements", COLUMNS)
+    text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
+    return parse_table(text, NIST_TABLE_1, COLUMNS)
+
+
+def _rows(table: Table, planned: bool) -> RowFile | InputErrors:
+    if table.file != NIST_TABLE_1:
+        try:
+            return read_rows(table, planned)
+        except InputErrors as bad:
+            return bad
+    own = read_rows(table)
+    rows = tuple(
+        replace(row, labels={**row.labels, "setup": "riser" if row.position[2] > RISER_ABOVE else "no riser"})
+        for row in own.rows
+    )
+    note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
+    return RowFile(rows, own.columns | {"setup"}, (*own.notes, note))
 
 
 def _columns(files: list[RowFile], machine: Machine) -> Measurements:

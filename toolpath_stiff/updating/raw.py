@@ -19,7 +19,8 @@ a weighing A B A does (OIML R 111-1:2004, C.4), and the shape of the loop is tha
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -30,9 +31,13 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.tables import read_table
+from toolpath_stiff.tables import Table, heading_key
 from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.updating.dates import Order, day_of, short_dates
 from toolpath_stiff.updating.history import HistoryDocument, Readings, history
+from toolpath_stiff.updating.raw_files import raw_tables
+from toolpath_stiff.updating.raw_labels import labelled, settled
+from toolpath_stiff.updating.raw_layouts import UNIT_WORDS
 from toolpath_stiff.updating.raw_records import (
     COLUMNS,
     CONDITIONS,
@@ -50,7 +55,6 @@ from toolpath_stiff.updating.rows import (
     DATE,
     SOFTEST,
     STIFFEST,
-    day_of,
 )
 
 USUAL = 5e3, 1e6  # N/mm, of machine tools' struts and spindles; assumed, to tell what a wrong unit may be
@@ -107,6 +111,18 @@ class LoopFigures:
         return 0.0 if math.isnan(self.force) else math.copysign(1.0, self.force)
 
 
+NO_UNITS: Mapping[str, str] = {}
+COMPRESSION = re.compile(
+    r"(?:compression|compressive|pressure|pushing|druck)(?:\s+(?:force|load|is|counts|as))*\s*[:=(]?\s*(?:positiv|pos\b|\+)"
+    r"|(?:tension|tensile|pulling|zug)(?:\s+(?:force|load|is|counts|as))*\s*[:=(]?\s*(?:negativ|neg\b|-(?!\d))"
+    r"|(?:positive?|\+)\s*(?:in|=|:|is|means)\s*(?:compression|compressive|druck)",
+    re.IGNORECASE,
+)
+TENSION = re.compile(
+    r"(?:tension|tensile|pulling|zug)(?:\s+(?:force|load|is|counts|as))*\s*[:=(]?\s*(?:positiv|pos\b|\+)"
+    r"|(?:positive?|\+)\s*(?:in|=|:|is|means)\s*(?:tension|tensile|zug)",
+    re.IGNORECASE,
+)
 NO_FIGURES = LoopFigures(*(math.nan,) * 7, Shape())
 STEPS = 3.0  # of the indicator, that it misses while it stands still, from which that is told of
 
@@ -166,7 +182,10 @@ def _hint(loop: Loop, stiffness: float) -> str:
     if loop.jog is not None:
         return "force, jog and displacement count positive the same way; displacement is what the indicator read"
     if stiffness < 0.0:
-        return "tension and stretch are positive: one of the two columns counts the other way; turn its sign"
+        return (
+            "tension and stretch are positive: one of the two columns counts the other way; turn its sign, "
+            "or say --compression-positive (compression_positive=True)"
+        )
     rules = "Tension and stretch are positive; a slope needs two forces"
     for factor, words in ((1e3, "the force in kN"), (1e-3, "the displacement in mm"), (1e6, "both in kN and mm")):
         if USUAL[0] <= factor * n_per_mm_from_n_per_m(stiffness) <= USUAL[1]:
@@ -245,13 +264,22 @@ class Reduction:
     history: HistoryDocument
 
 
-def reduce(*raw: str | Path) -> Reduction:
+def reduce(
+    *raw: str | Path, date_order: Order | None = None, units: Mapping[str, str] = NO_UNITS, compression: bool = False
+) -> Reduction:
     """Raw records of force and displacement to measured stiffnesses.
 
     Parameters
     ----------
     raw
-        Files: CSV, or FILE.xlsx[#SHEET]; or tables of struts' stiffnesses, whose history is looked at.
+        Files and folders of them: text, JSON, or FILE.xlsx[#SHEET]; or tables of struts' stiffnesses, whose history is
+        looked at.
+    date_order
+        "dmy" or "mdy" of dates with slashes or dashes; None: what the dates of the set show.
+    units
+        "force", "displacement", "stiffness" -> the unit of headings that state none, as `units_of` gives them.
+    compression
+        Whether the forces of struts on a bench count compression positive.
 
     Raises
     ------
@@ -274,19 +302,63 @@ def reduce(*raw: str | Path) -> Reduction:
     loops: list[Loop] = []
     figures: list[LoopFigures] = []
     notes: list[str] = []
-    for file in raw:
-        table = read_table(str(file), "raw records", COLUMNS)
+    tables = [labelled(table) for table in raw_tables([str(file) for file in raw], COLUMNS, units)]
+    for table in settled(tables, date_order):
         if is_table(table):
             records, known = read_stiffnesses(table)
             own = [replace(NO_FIGURES, stiffness=stiffness, force=force) for stiffness, force in known]
         else:
             records = read_raw(table)
+            turned = compression or says_compression(table)
+            if turned:
+                records = records._replace(loops=[in_tension(loop) for loop in records.loops])
+                notes.append(f"{table.file}: compression counts positive there; it is turned: tension is positive here")
             own = reduce_loops(records.loops)
         loops += records.loops
         figures += own
         notes += [*table.notes, *records.notes]
     notes += _stuck(loops, figures)
     return Reduction(tuple(loops), tuple(figures), tuple(notes), _history(loops, figures))
+
+
+def units_of(text: str) -> dict[str, str]:
+    """Units of `N,um`: of a force, a displacement, a stiffness, in any order.
+
+    Raises
+    ------
+    InputError
+        A unit of none of these, or two of one.
+
+    Examples
+    --------
+    >>> units_of("kN,mm")
+    {'force': 'kn', 'displacement': 'mm'}
+    """
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        unit = heading_key(part)
+        if unit not in UNIT_WORDS or UNIT_WORDS[unit] in found:
+            raise MeasurementError(f"units {text!r}", expected="those of force and displacement, as N,um, or N/um")
+        found[UNIT_WORDS[unit]] = unit
+    return found
+
+
+def says_compression(table: Table) -> bool:
+    """Whether a head says that compression counts positive. Raises `InputError` where it says both."""
+    text = " ".join(cell for _, cells in table.above for cell in [*cells, "|"])
+    pressed, pulled = COMPRESSION.search(text), TENSION.search(text)
+    if pressed and pulled:
+        raise MeasurementError(f"{pressed[0]!r} and {pulled[0]!r}", expected="one of them", file=table.file)
+    return bool(pressed)
+
+
+def in_tension(loop: Loop) -> Loop:
+    """A loop of a bench with tension positive; its displacement counts the way that makes a stiffness positive."""
+    if loop.jog is not None or not len(loop.force):
+        return loop
+    force = -loop.force
+    way = 1.0 if float((force - force.mean()) @ (loop.displacement - loop.displacement.mean())) > 0.0 else -1.0
+    return replace(loop, force=force, displacement=way * loop.displacement)
 
 
 def _stuck(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> list[str]:
@@ -322,6 +394,7 @@ def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDo
             np.array([day_of(loop.place.get(DATE, "")) for loop, _, _ in chosen]),
             np.log([stiffness for _, stiffness, _ in chosen]),
             np.array([side for _, _, side in chosen]),
+            short_dates(loop.place.get(DATE, "") for loop, _, _ in chosen),
         )
 
     secants = [(loop, one.stiffness, one.side if not len(loop.force) else side_of(loop)) for loop, one in rows]

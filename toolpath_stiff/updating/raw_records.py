@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -31,15 +30,15 @@ from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.stiffness.effects.contract import TIP, MeasuringLoop, measuring_loop
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_um, n_per_m_from_n_per_mm
+from toolpath_stiff.updating.dates import day_of, like_date
 from toolpath_stiff.updating.loops import loop_of
-from toolpath_stiff.updating.raw_labels import STRUT, told_of_all
+from toolpath_stiff.updating.raw_layouts import MISSING
 from toolpath_stiff.updating.rows import (
     ANGLES,
     DATE,
     LABELS,
     POSITION,
     VECTOR,
-    day_of,
     direction_of,
     number,
     optional_number,
@@ -66,13 +65,11 @@ COLUMNS = Columns(
 )
 BENCH = "strut,date,force_N,displacement_um of a strut on a bench"
 WHICH = "name the strut in a column, above the heading (`strut: 3`) or in the file's name (strut3_2021-09-16.csv)"
-MISSING = ("", "nan")  # what a logger writes for a reading that it lost
 SIGNED = {"force_N": 1e7, "displacement_um": 1e6, "jog_um": 1e6}  # largest magnitude, either sign
 NEAR_END = 0.02  # of the range of a force set on a bench: records this close are at its extreme, and averaged
 SHARED = 3  # records that a date-time needs to stand for a loop of its own
 SAME_JOG = 1e-9  # m: jogs this close are the same step
 DAY = len("2024-03-31")
-LIKE_DATE = re.compile(r"\d{4}[-/.]\d{2}[-/.]\d{2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}")
 MOST = 200  # records of that way that are looked at singly; of more, runs are averaged: a logger's thousands
 FEWEST = 7  # records on the way from extreme to extreme from which a shape is looked for
 A_SIDE = 3  # records on each side of a kink
@@ -162,18 +159,17 @@ def read_raw(table: Table) -> RawRecords:
         Bad records, all of them.
     """
     file = table.file
-    same, notes = told_of_all(table)
-    unused = _check_heading([*table.heading, *same], file, table.heading_line)
-    if DATE not in (*table.heading, *same):
+    unused = _check_heading(list(table.heading), file, table.heading_line)
+    if DATE not in table.heading:
         _refuse_unnamed_dates(table, unused)
-    notes += [f"{file}: column {name} is not used" for name in unused]
+    notes = [f"{file}: column {name} is not used" for name in unused]
     if not table.rows:
         raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
     groups: dict[tuple[str, ...], list[Record]] = {}
     errors, lost = [], []
     for line, cells in table.rows:
         try:
-            record = {**table.record(cells), **same}
+            record = table.record(cells)
             if _is_lost(record):
                 lost.append(line)
                 continue
@@ -199,8 +195,8 @@ def read_raw(table: Table) -> RawRecords:
 def _refuse_unnamed_dates(table: Table, unused: list[str]) -> None:
     """A column of dates by another name: without it the records of all dates would be one loop."""
     for name in unused:
-        cells = {row[table.heading.index(name)][:DAY] for _, row in table.rows if len(row) == len(table.heading)}
-        if len(cells) > 1 and all(LIKE_DATE.match(cell) for cell in cells):
+        cells = {row[table.heading.index(name)] for _, row in table.rows if len(row) == len(table.heading)}
+        if len(cells) > 1 and all(like_date(cell) for cell in cells):
             raise MeasurementError(
                 f"column {name!r} holds several dates, and there is no column date",
                 expected="date, so that the records of each are a loop of their own",
@@ -223,8 +219,7 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
     InputError, InputErrors
         Rows that are not of a strut alone, have no stiffness or none that could be; all of them.
     """
-    same, notes = told_of_all(table)
-    heading, errors = [*table.heading, *same], []
+    heading, errors = table.heading, []
     if "strut" not in heading and "loop" not in heading:
         raise MeasurementError(
             "stiffnesses without a column strut",
@@ -234,11 +229,11 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
             line=table.heading_line,
         )
     known = ("strut", *LABELS, DATE, "length_mm", *STIFFNESS)
-    notes += [f"{table.file}: column {name} is not used" for name in heading if name not in known]
+    notes = [f"{table.file}: column {name} is not used" for name in heading if name not in known]
     loops, figures = [], []
     for line, cells in table.rows:
         try:
-            record = {**table.record(cells), **same}
+            record = table.record(cells)
             if _loop_named(record).kind != "alone":
                 raise MeasurementError("a row of no strut", expected="strut 1 to 6")
             day_of(record.get(DATE, ""))
@@ -337,8 +332,6 @@ def _check_heading(heading: list[str], file: str, line: int) -> list[str]:
 
 def _to_do(missing: str, unused: list[str]) -> str:
     """What to do about a missing column."""
-    if missing == "strut" and sum(bool(STRUT.fullmatch(name)) for name in unused) > 1:
-        return "write one row a strut and date: columns of struts side by side are not read"
     parts = [WHICH] if missing == "strut" else []
     if unused:
         parts.append(f"{', '.join(repr(name) for name in unused)} are not known: rename what is meant")

@@ -2,8 +2,6 @@
 
 A file is either long (one row a reading) or wide like the paper's Table 1 (one row a point, `measured_x_N_per_mm` and
 so on). A bad row is named with its line; all bad rows of a file are reported together.
-
-Dates are ISO 8601, as text and as days.
 """
 
 from __future__ import annotations
@@ -11,18 +9,15 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.stiffness.effects.contract import TIP, MeasuringLoop
 from toolpath_stiff.tables import Columns, Table
-from toolpath_stiff.units import SECONDS_PER_DAY, m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
+from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm, rad_from_deg
 from toolpath_stiff.updating import loops
+from toolpath_stiff.updating.dates import WRITE_ISO, Order, day_of, read_dates
 from toolpath_stiff.updating.loops import LoopReading
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
@@ -66,12 +61,6 @@ BOUNDS = {
 LOOP_BOUNDS = {"stiffness_N_per_mm": (-1e12, 1e12), "displacement_um": (-loops.LARGEST_UM, loops.LARGEST_UM)}
 LIKE_DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be their quotient, rounding allowed
-EPOCH = datetime(1970, 1, 1)  # without a zone, as days are counted
-EARLIEST, LATEST = 1900, 2200  # years; beyond, the year is a slip
-EXPECTED = "a date as 2024-03-31, or 2024-03-31T14:05"
-
-# Extended format of ISO 8601:2019, 5.2.2.1 and 5.4.2.1; a space for the T as RFC 3339 allows.
-DATE_TIME = re.compile(r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d{1,6})?)?(?:Z|[+-]\d{2}:\d{2})?)?")
 
 
 @dataclass(frozen=True)
@@ -172,6 +161,40 @@ def read_rows(table: Table, planned: bool = False) -> RowFile:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
     columns = {name for name in heading if name in KNOWN}
     return RowFile(tuple(rows), frozenset(columns), tuple(notes))
+
+
+def with_dates(tables: Sequence[Table], order: Order | None = None, remedy: str = WRITE_ISO) -> list[Table]:
+    """Tables of one set with their dates in ISO 8601; what was assumed stands in the notes of the first that has some.
+
+    Raises
+    ------
+    InputError
+        Dates that can be read in two ways.
+    """
+    at = [(table, table.heading.index(DATE)) for table in tables if DATE in table.heading]
+    cells = [cells[i] for table, i in at for _, cells in table.rows if i < len(cells)]
+    try:
+        dates = read_dates(cells, order, remedy)
+    except InputError as error:
+        raise MeasurementError(
+            error.found, expected=error.expected, hint=error.hint, file=at[0][0].file, line=at[0][0].heading_line
+        ) from None
+    if not dates.iso and not dates.notes:
+        return list(tables)
+    found, notes = [], dates.notes
+    for table in tables:
+        found.append(with_cells(table, DATE, dates.iso, *notes))
+        notes = [] if DATE in table.heading else notes
+    return found
+
+
+def with_cells(table: Table, column: str, cells: Mapping[str, str], *notes: str) -> Table:
+    """The table with other texts in the cells of a column, if it has that, and notes of it."""
+    if column not in table.heading:
+        return table
+    i = table.heading.index(column)
+    rows = tuple((n, (*c[:i], cells.get(c[i], c[i]), *c[i + 1 :]) if i < len(c) else c) for n, c in table.rows)
+    return replace(table, rows=rows, notes=(*table.notes, *(f"{table.file}: {note}" for note in notes if note)))
 
 
 def _check_heading(heading: list[str], file: str, line: int, planned: bool) -> None:
@@ -385,48 +408,3 @@ def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
                 )
             )
     return errors
-
-
-def day_of(text: str) -> float:
-    """Days since 1970-01-01, nan of an empty cell; a time with a zone in UTC, one without as it stands.
-
-    Raises
-    ------
-    InputError
-        No date of ISO 8601, or none of the calendar.
-
-    Examples
-    --------
-    >>> day_of("1970-01-02T06:00")
-    1.25
-    """
-    if not text:
-        return float("nan")
-    try:
-        found = datetime.fromisoformat(text) if DATE_TIME.fullmatch(text) else None
-        if found is not None and found.tzinfo is not None:
-            found = found.astimezone(UTC).replace(tzinfo=None)
-    except (ValueError, OverflowError):
-        found = None
-    if found is None or not EARLIEST <= found.year < LATEST:
-        raise MeasurementError(f"date {text!r}", expected=EXPECTED, hint=_hint(text))
-    return (found - EPOCH).total_seconds() / SECONDS_PER_DAY
-
-
-def _hint(text: str) -> str:
-    """What the cell may be, where that can be seen."""
-    if re.fullmatch(r"\d{5}(?:\.\d+)?", text):
-        return "a spreadsheet's number of a day: format the column as YYYY-MM-DD before you save it"
-    if re.fullmatch(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}(?:\D.*)?", text):
-        return "day and month can be mistaken for each other: format the column as YYYY-MM-DD"
-    return ""
-
-
-def date_text(day: float) -> str:
-    """The calendar date of a count of days, as day_of counts them."""
-    return (EPOCH + timedelta(days=float(np.floor(day)))).date().isoformat()
-
-
-def days_since_first(days: FloatArray) -> FloatArray:
-    """(n,) days since the first of them; nan stays nan."""
-    return np.asarray(days - np.nanmin(days)) if np.isfinite(days).any() else days

@@ -16,11 +16,11 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
 from toolpath_stiff.stiffness.effects.contract import about
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.comparison.structure import SIGNIFICANT, FoundPattern, Pattern
+from toolpath_stiff.updating.dates import day_of, short_dates
 from toolpath_stiff.updating.history import NOTHING, HistoryDocument, Readings, history
 from toolpath_stiff.updating.inference.covariances import Covariance
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
-from toolpath_stiff.updating.rows import day_of
 
 AXIS_ALIGNED = 0.999  # |cosine| from which a direction counts as X, Y or Z
 SAME_PLANE = 0.005  # m, heights closer than this are one plane
@@ -478,7 +478,6 @@ def strut_history(data: Measurements, log_model: FloatArray, seed: int) -> Histo
     for name in np.unique(names):
         own = names == name
         log_read[own] -= modelled[own] - modelled[own].mean()
-    day = np.full(len(names), np.nan)
-    if data.date is not None:
-        day = np.array([day_of(text) for text in data.date[alone].tolist()])
-    return history(Readings(names, day, log_read, data.beside.side[alone]), seed=seed)
+    dates = [""] * len(names) if data.date is None else data.date[alone].tolist()
+    day = np.array([day_of(text) for text in dates], dtype=float)
+    return history(Readings(names, day, log_read, data.beside.side[alone], short_dates(dates)), seed=seed)

@@ -29,7 +29,7 @@ from toolpath_stiff.updating.planning.document import RivalEntry, plan_rows
 from toolpath_stiff.updating.planning.gaps import SETTLED, ReadingNoise, choose, further_minutes, pair_shares, why_of
 from toolpath_stiff.updating.planning.rivals import Forecast, principal
 from toolpath_stiff.updating.planning.visits import Costs, Menu, Visits, planned_readings
-from toolpath_stiff.updating.rows import COLUMNS, Row, read_rows
+from toolpath_stiff.updating.rows import COLUMNS, Row, read_rows, with_dates
 
 TABLES = "plan_tables.npz"  # in the plan's folder
 VERSION = 1
@@ -335,8 +335,8 @@ def _taken(tables: Tables, files: tuple[str, ...]) -> tuple[Taken, list[str]]:
             k,
         )  # fmt: skip
     rows, logs, clamps, where, others = [], [], [], [], 0
-    for name in files:
-        for row in read_rows(read_table(name, "measurements", COLUMNS), planned=True).rows:
+    for table in with_dates([read_table(name, "measurements", COLUMNS) for name in files]):
+        for row in read_rows(table, planned=True).rows:
             own = known.get(_of_row(row, tables.menu.setups[0]))
             value = np.nan if own is None else _log(row, float(tables.offset[own]), float(tables.toward[own]))
             if own is None:
@@ -344,8 +344,8 @@ def _taken(tables: Tables, files: tuple[str, ...]) -> tuple[Taken, list[str]]:
             elif np.isfinite(value):
                 rows.append(own)
                 logs.append(value)
-                clamps.append(f"{name} {row.labels['clamp'] or row.position}")
-                where.append(f"{name}:{row.line}")
+                clamps.append(f"{table.file} {row.labels['clamp'] or row.position}")
+                where.append(f"{table.file}:{row.line}")
     notes = [f"{others} readings are not of this plan and are passed over"] if others else []
     return Taken(np.array(rows, dtype=np.int64), np.array(logs), np.array(clamps, dtype=str), tuple(where)), notes
 
