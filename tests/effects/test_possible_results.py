@@ -200,3 +200,9 @@ def test_extreme_parameters_give_a_result_or_a_message():
         figures = np.column_stack([found.along_axes, found.softest_stiffness, found.stiffest_stiffness])[within]
         assert np.isfinite(figures).all() and (figures > 0.0).all(), [one.effect.name for one in acting]
     assert answered > 0.7 * len(ends)
+
+
+@pytest.mark.parametrize("pose", [(0, 0, "a"), [[1, 2, 3], [4]]])
+def test_a_pose_that_is_no_numbers_is_an_error_of_ours(pose):
+    with pytest.raises(InputError, match="expected numbers X Y Z"):
+        tps.pose("nist", pose)
