@@ -331,7 +331,8 @@ def main() -> int:
     text = table(args, {kind.name: counts[kind.name] for kind in chosen}, growth, slowest)
     print("\n".join([text, *wrong[:40]]))
     if out:
-        write_atomically(out, text + f"\nMade by `python -m benchmarks.mutations --out {args.out}`.\n")
+        command = f"python -m benchmarks.mutations --n {args.n} --seed {args.seed}"
+        write_atomically(out, text + f"\nMade by `{command} --out {args.out}`.\n")
     return int(bool(wrong) or growth > GROWTH_BAR)
 
 

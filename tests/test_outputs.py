@@ -114,11 +114,14 @@ def test_measuring_again_keeps_its_hands_off_the_exercise(here, capsys):
     assert "would be written over" in capsys.readouterr().err
 
 
-def test_other_files_are_written_over_as_ever(here):
-    (here / "better.toml").write_text("an earlier result")
-    assert main([*UPDATE, "-o", "better.toml"]) == 0
+def test_earlier_results_are_written_over_and_other_files_kept(here, capsys):
+    for words, file in (([*UPDATE, "-o"], "better.toml"), (["path", "part.nc", "--out"], "path.csv")):
+        Path(file).write_text("mine")
+        assert main([*words, file]) == main([*words, file]) == 0
+        assert Path(f"{file}.old").read_text() == "mine" != Path(file).read_text()
+        assert not Path(f"{file}.old2").exists()
+        assert capsys.readouterr().out.count(f"kept the old {file} as {file}.old") == 1
     assert load_machine("better.toml").origins["strut_law"] == "fitted"
-    assert not (here / "better.toml.old").exists()
 
 
 def test_the_check_itself(tmp_path):

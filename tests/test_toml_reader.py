@@ -44,6 +44,22 @@ def test_the_line_of_a_dotted_name(where, line):
     assert TomlReader(TEXT, "control.toml").line_at(where) == line
 
 
+def test_rows_of_arrays_are_no_headings_and_headings_may_hold_blanks():
+    text = """[joints]
+mm = [
+    [1.5],
+    [-2],
+]
+origin = "guessed"
+[ kinematics . head ]
+letter = "A"
+['G54']
+"""
+    file = TomlReader(text, "mine.toml")
+    found = [file.line_at(where) for where in ("joints.origin", "kinematics.head.letter", "kinematics", "G54")]
+    assert found == [6, 8, 7, 9]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

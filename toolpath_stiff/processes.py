@@ -196,11 +196,11 @@ def _serve(pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "SIGHUP"):  # so does the end of the terminal
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # what is half-written is removed on the way out
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, BLOCKED)
-    threading.Thread(target=_end_with_the_first, daemon=True).start()
     with suppress(EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # what is half-written is removed on the way out
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, BLOCKED)
+        threading.Thread(target=_end_with_the_first, daemon=True).start()
         while True:
             pipe.send_bytes(_answer(pipe.recv_bytes()))
 

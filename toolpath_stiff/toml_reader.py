@@ -18,7 +18,7 @@ MOST_PARTS = 64  # of a dotted key: tomllib's time grows with their square
 DEEPEST = 32  # arrays and tables in each other
 LARGEST_INTEGER = 2**63 - 1  # TOML 1.0: "64-bit signed integers"
 LONG_KEY = re.compile(rf"""(?:\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+){{{MOST_PARTS}}}""")
-HEADING = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]")
+HEADING = re.compile(r"""[ \t]*\[\[?([\w.'" \t-]+)\]""")
 NTH = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -106,10 +106,10 @@ class TomlReader:
         """Line of a key of a section (the nth of its name), or of its heading; None if it is not found."""
         inside, seen = section == "", -1
         for number, line in enumerate(self.lines, 1):
-            heading = HEADING.match(line)
+            heading = self._heading(line)
             if heading:
-                seen += heading[1] == section
-                inside = heading[1] == section and seen == nth
+                seen += heading == section
+                inside = heading == section and seen == nth
                 if inside and not key:
                     return number
             elif inside and key and re.match(rf"\s*(?:[\"']?{re.escape(key)}[\"']?\s*=|{re.escape(key)}\s*\.)", line):
@@ -136,7 +136,15 @@ class TomlReader:
                 return line
         nth = NTH.fullmatch(where)
         line = self.line_of(nth[1], "", int(nth[2]) - 1) if nth else self.line_of(where)
-        return line or next((n for n, text in enumerate(self.lines, 1) if _heads_part_of(text, where)), None)
+        return line or next(
+            (n for n, text in enumerate(self.lines, 1) if self._heading(text).startswith(f"{where}.")), None
+        )
+
+    def _heading(self, line: str) -> str:
+        """The table that a line is the heading of, without blanks and quotes; "" if it is none."""
+        heading = HEADING.match(line)
+        name = re.sub(r"[ \t'\"]", "", heading[1]) if heading else ""
+        return name if name.partition(".")[0] in self.data else ""  # else a row of an array, as [-25.4]
 
     def error(self, found: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
         """An error at the line of the dotted name `where`."""
@@ -179,12 +187,6 @@ class TomlReader:
         if not isinstance(value, dict):
             raise self.error(f"{where} = {value!r}", expected, where=where)
         return value
-
-
-def _heads_part_of(line: str, where: str) -> bool:
-    """Whether a line is the heading of a table within a table."""
-    heading = HEADING.match(line)
-    return heading is not None and heading[1].startswith(f"{where}.")
 
 
 def is_number(value: object) -> TypeGuard[int | float]:

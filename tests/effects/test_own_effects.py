@@ -90,7 +90,7 @@ def test_an_effect_that_takes_more_than_there_is_names_effect_and_pose(tmp_path)
     with pytest.raises(InputError, match=r"with effect mine strut \d has no positive stiffness at X0 Y0 Z800 mm"):
         use(file)
     overflow = own(tmp_path, (BODY, "return np.full((len(path), 6), 1.7e308)"))
-    with pytest.raises(InputError, match="effect mine the tip has no positive stiffness"):
+    with pytest.raises(EffectFault, match=r"strut_compliance returns 1.7e\+308 at X0 Y0 Z800 mm; expected numbers"):
         use(overflow)
 
 

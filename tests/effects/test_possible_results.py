@@ -84,6 +84,14 @@ def test_an_effect_of_ones_own_that_leaves_a_strut_nothing(tmp_path, monkeypatch
     assert "with effect mine strut 2 has no positive stiffness at X" in capsys.readouterr().err
 
 
+def test_an_effect_of_ones_own_whose_figures_would_overflow(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    own(tmp_path, (BODY, "return np.full((len(path), 6), 1e300)"))
+    with_machine(tmp_path)
+    assert main(["compare", "nist-table1", "--no-plots", "--machine", "m.toml", "--effects", "mine.py"]) == 2
+    assert "strut_compliance returns 1e+300 at X" in (error := capsys.readouterr().err) and "within +-1e+18" in error
+
+
 def test_an_indefinite_form_is_refused_however_small_its_share(tmp_path):
     """A tip that pushes back along Z by a billionth of its softest compliance is no machine."""
     text = "q = np.zeros((len(path), 12, 12)); q[:, 8, 8] = -1e-7; return q"
@@ -192,3 +200,9 @@ def test_extreme_parameters_give_a_result_or_a_message():
         figures = np.column_stack([found.along_axes, found.softest_stiffness, found.stiffest_stiffness])[within]
         assert np.isfinite(figures).all() and (figures > 0.0).all(), [one.effect.name for one in acting]
     assert answered > 0.7 * len(ends)
+
+
+@pytest.mark.parametrize("pose", [(0, 0, "a"), [[1, 2, 3], [4]]])
+def test_a_pose_that_is_no_numbers_is_an_error_of_ours(pose):
+    with pytest.raises(InputError, match="expected numbers X Y Z"):
+        tps.pose("nist", pose)

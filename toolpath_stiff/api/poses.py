@@ -14,6 +14,7 @@ from toolpath_stiff.defaults import FORCE
 from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.toml_reader import shortened
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 if TYPE_CHECKING:
@@ -217,7 +218,10 @@ def pose(
     from toolpath_stiff.analysis.poses import evaluate_poses
 
     on = machine_from(machine)
-    given = np.asarray(pose_mm_deg, dtype=float)
+    try:
+        given = np.asarray(pose_mm_deg, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"a pose {shortened(pose_mm_deg)}", expected="numbers X Y Z or X Y Z A B C") from error
     if given.ndim not in (1, 2) or given.shape[-1] not in (3, 6):
         count = f"of {given.shape[0]} numbers" if given.ndim == 1 else f"of shape {given.shape}"
         raise InputError(f"a pose {count}", expected="X Y Z or X Y Z A B C")

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM
 from toolpath_stiff.defaults import FORCE, LOAD, MACHINE
 from toolpath_stiff.errors import InputError, harmless
-from toolpath_stiff.files import Content, check_outputs, keep_old, write_atomically
+from toolpath_stiff.files import Content, check_outputs, is_file, keep_old, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 from toolpath_stiff.units import ShopPose
 
@@ -35,6 +35,7 @@ SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 ALL_BLOCKS = "all"
 LOADS_HELP = "tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ"
 LONGEST = 60  # letters of a default folder's name; of more files, the first and how many there are
+MARK_BYTES = 4096  # of a file, within which a command knows what it wrote itself
 DESTINATIONS = ("out", "output", "write")
 
 
@@ -320,6 +321,22 @@ def check_new(args: argparse.Namespace, file: str) -> list[Path]:
             f"{file!r} exists already", hint="choose another name, or say --replace: the old file is kept beside it"
         )
     return [Path(file)] if Path(file).exists() else []
+
+
+def check_single(args: argparse.Namespace, file: str | None, mark: bytes = b"") -> list[Path]:
+    """The same for one file of a name that the user chose; what stands there is to be kept unless it bears the mark.
+
+    A single file has no record of what wrote it, as a folder has: `mark` is at the head of what the tool writes.
+    """
+    replaced = check_written(args, [file])
+    if not file or replaced or not is_file(file):
+        return replaced
+    try:
+        with Path(file).open("rb") as stream:
+            ours = bool(mark) and mark in stream.read(MARK_BYTES)
+    except OSError:
+        ours = False
+    return [] if ours else [Path(file)]
 
 
 def keep(replaced: Iterable[Path], quiet: bool = False) -> None:

@@ -11,6 +11,7 @@ from toolpath_stiff.cli.arguments import (
     add_machine_options,
     add_replace_option,
     check_new,
+    check_single,
     check_written,
     destination,
     finite_number,
@@ -286,7 +287,7 @@ def _machine_new(args: argparse.Namespace) -> int:
 def _from_linuxcnc(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.machines import machine_from_linuxcnc
 
-    replaced = check_written(args, [args.out])
+    replaced = check_single(args, args.out)
     found = machine_from_linuxcnc(args.file, args.units)
     if args.out:
         keep(replaced)

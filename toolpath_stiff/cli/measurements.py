@@ -13,6 +13,7 @@ from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_program_options,
     add_replace_option,
+    check_single,
     check_written,
     destination,
     finite_number,
@@ -322,7 +323,7 @@ def update(args: argparse.Namespace) -> int:
     from toolpath_stiff.report.update import MACHINE_FILE, names
 
     args.replace |= args.force
-    replaced = check_written(args, [args.output])
+    replaced = check_single(args, args.output, mark=b"# Command: tps update")
     target = destination(args, "update", args.data, "-update")
     target.check(names(not args.no_plots, machine=args.output is None))
     from toolpath_stiff.api.correction import update

@@ -11,7 +11,7 @@ from toolpath_stiff.cli.arguments import (
     add_machine_options,
     add_program_options,
     add_replace_option,
-    check_written,
+    check_single,
     destination,
     finite_number,
     keep,
@@ -164,7 +164,7 @@ def place(args: argparse.Namespace) -> int:
     from toolpath_stiff.api.placements import KeepOut, place
     from toolpath_stiff.report.place import names
 
-    replaced = check_written(args, [args.write])
+    replaced = check_single(args, args.write)
     target = destination(args, "place", [args.program], "-place").check(names(not args.no_plots))
     with progress_line(quiet=args.json) as progress:
         found = place(

@@ -15,7 +15,7 @@ from toolpath_stiff.cli.arguments import (
     add_machine_options,
     add_program_options,
     add_replace_option,
-    check_written,
+    check_single,
     destination,
     keep,
     machine_for,
@@ -264,7 +264,7 @@ def path(args: argparse.Namespace) -> int:
     """Sample, write."""
     from toolpath_stiff.api.programs import sample_path
 
-    replaced = check_written(args, [args.out])
+    replaced = check_single(args, args.out, mark=b"line,motion,tool,s_mm")
     found = sample_path(program_for(args, args.program), origin_mm_deg=args.origin, step_mm=args.step)
     if args.out:
         keep(replaced)

@@ -162,7 +162,8 @@ def singularity_index(machine: Machine, struts: Struts) -> FloatArray:
     neither tool length nor the choice of units enters the ratio.
     """
     neutral = solve_struts_at(machine, machine.limits.neutral_pose)
-    return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / np.abs(np.linalg.det(neutral.jacobian[0])))
+    with np.errstate(divide="ignore", invalid="ignore"):  # singular at the neutral pose too: nan is out of reach
+        return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / np.abs(np.linalg.det(neutral.jacobian[0])))
 
 
 def forward_kinematics(

@@ -35,6 +35,7 @@ SHAPES: dict[str, tuple[tuple[int, ...], str]] = {
 }
 HOOKS = (*SHAPES, "geometry", "reading")
 ASYMMETRY = 1e-9  # of the largest entry at the pose
+LARGEST = 1e18  # SI: a metre cube of diamond has 1e12 N/m; what is far beyond overflows in sums of squares
 APART = 1e-6  # of the tip's compliance: how far a result may be from symmetric
 # Condition of the struts' screws, arms in units of their size, beyond which a pose with an impossible compliance counts
 # as singular: rounding may have left nothing right but its largest eigenvalue.
@@ -273,12 +274,13 @@ def _array(effect: Effect, hook: str, raw: Any, shape: tuple[int, ...], words: s
 
 
 def _refuse_not_finite(effect: Effect, hook: str, found: FloatArray, path: LoadPath) -> None:
-    bad = ~np.isfinite(found)
+    bad = ~(np.abs(found) <= LARGEST)
     if path.strut_forces is not None:  # nan at a singular pose, where nothing can be asked
         bad[~np.isfinite(path.strut_forces).all(axis=1)] = False
     if bad.any():
         first = np.unravel_index(int(np.argmax(bad)), found.shape)
-        raise _fault(effect, hook, f"returns {found[first]:g}{at_pose(path, int(first[0]))}", "finite numbers")
+        expected = f"numbers within +-{LARGEST:g}" if np.isfinite(found[first]) else "finite numbers"
+        raise _fault(effect, hook, f"returns {found[first]:g}{at_pose(path, int(first[0]))}", expected)
 
 
 def _largest_gap(found: FloatArray, bad: BoolArray) -> int:
