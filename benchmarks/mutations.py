@@ -38,7 +38,7 @@ from toolpath_stiff.nc.controller import DIALECTS, Controller, read_controller
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.results_folder import check_folder
 from toolpath_stiff.rig import read_plan
-from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.structure import load_nominal
 from toolpath_stiff.stiffness.effects import effects_from_file
 from toolpath_stiff.updating.measurements import read_measurements
 from toolpath_stiff.updating.raw import reduce

@@ -94,9 +94,8 @@ def reading(report: Report, lines: int, rounds: int) -> None:
 def one_by_one(text: str) -> None:
     """Our reader without its fast way."""
     from toolpath_stiff.nc import ZERO
-    from toolpath_stiff.nc.frames import Frames
     from toolpath_stiff.nc.interpreter import ProgramRun
-    from toolpath_stiff.nc.state import State
+    from toolpath_stiff.nc.state import Frames, State
     from toolpath_stiff.nc.tables import Offsets
     from toolpath_stiff.nc.words import split_lines
 

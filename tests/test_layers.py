@@ -29,7 +29,6 @@ RANK = {
     "processes": 2,
     "results_folder": 3,
     "column_files": 2,
-    "workbook": 2,
     "tables": 3,
     "nc": 3,
     "path": 4,
@@ -46,14 +45,12 @@ RANK = {
 }
 # The same within `updating`, of its modules and rooms.
 UPDATING_RANK = {
-    "loops": -1,
     "dates": -1,
     "rows": 0,
     "history": 1,
     "measurements": 1,
     "raw_labels": 1,
     "raw_layouts": 2,
-    "raw_files": 3,
     "raw_records": 3,
     "raw": 4,
     "inference": 2,

@@ -21,12 +21,12 @@ from toolpath_stiff.report.compare import text as compare_text
 from toolpath_stiff.report.machine import machine_figures
 from toolpath_stiff.report.update import text as update_text
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.nominal import parse_nominal
+from toolpath_stiff.rig.structure import parse_nominal
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import compiled, core, truss
 from toolpath_stiff.stiffness.model import build_model, with_parameter_moved
 from toolpath_stiff.updating.comparison import compare
-from toolpath_stiff.updating.correction.strut_law import minimise_mean_error
+from toolpath_stiff.updating.correction import minimise_mean_error
 from toolpath_stiff.updating.inference.prediction import Predictor, at_both_ends, scaled_law
 from toolpath_stiff.updating.measurements import Measurements, read_measurements
 

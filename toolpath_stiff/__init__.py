@@ -21,8 +21,6 @@ from toolpath_stiff.defaults import VERSION as _VERSION
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.case import Case as Case
-    from toolpath_stiff.api.case_studies import CaseStudy as CaseStudy
-    from toolpath_stiff.api.case_studies import case_study as case_study
     from toolpath_stiff.api.correction import Plan as Plan
     from toolpath_stiff.api.correction import Reduction as Reduction
     from toolpath_stiff.api.correction import Update as Update
@@ -32,8 +30,10 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.diagnosis import Comparison as Comparison
     from toolpath_stiff.api.diagnosis import Diagnosis as Diagnosis
     from toolpath_stiff.api.diagnosis import Measurements as Measurements
+    from toolpath_stiff.api.diagnosis import NextVisit as NextVisit
     from toolpath_stiff.api.diagnosis import compare as compare
     from toolpath_stiff.api.diagnosis import diagnose as diagnose
+    from toolpath_stiff.api.diagnosis import next_visit as next_visit
     from toolpath_stiff.api.effects import EffectCatalogue as EffectCatalogue
     from toolpath_stiff.api.effects import EffectCheck as EffectCheck
     from toolpath_stiff.api.effects import EffectDraft as EffectDraft
@@ -53,12 +53,12 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.machines import recover_geometry as recover_geometry
     from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
     from toolpath_stiff.api.many import analyze_many as analyze_many
-    from toolpath_stiff.api.next_visits import NextVisit as NextVisit
-    from toolpath_stiff.api.next_visits import next_visit as next_visit
+    from toolpath_stiff.api.placements import CaseStudy as CaseStudy
     from toolpath_stiff.api.placements import KeepOut as KeepOut
     from toolpath_stiff.api.placements import Placement as Placement
     from toolpath_stiff.api.placements import PlacementTrial as PlacementTrial
     from toolpath_stiff.api.placements import RewrittenProgram as RewrittenProgram
+    from toolpath_stiff.api.placements import case_study as case_study
     from toolpath_stiff.api.placements import place as place
     from toolpath_stiff.api.placements import rewrite as rewrite
     from toolpath_stiff.api.placements import try_placement as try_placement
@@ -93,9 +93,8 @@ __version__ = _VERSION
 # Module -> its public names; imported when first asked for: the command line starts without numpy.
 _PUBLIC = {
     "api.case": ("Case",),
-    "api.case_studies": ("CaseStudy", "case_study"),
     "api.correction": ("Plan", "Reduction", "Update", "plan", "reduce", "update"),
-    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "compare", "diagnose"),
+    "api.diagnosis": ("Comparison", "Diagnosis", "Measurements", "NextVisit", "compare", "diagnose", "next_visit"),
     "api.effects": (
         "EffectCatalogue", "EffectCheck", "EffectDraft", "EffectFile", "Preview", "check_effects", "draft_effect",
         "effect_template", "effects", "preview",
@@ -105,9 +104,9 @@ _PUBLIC = {
         "Machine", "MachineCheck", "MachineFile", "machine_from_linuxcnc", "machine_template", "recover_geometry",
     ),
     "api.many": ("ManyAnalyses", "analyze_many"),
-    "api.next_visits": ("NextVisit", "next_visit"),
     "api.placements": (
-        "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "place", "rewrite", "try_placement",
+        "CaseStudy", "KeepOut", "Placement", "PlacementTrial", "RewrittenProgram", "case_study", "place", "rewrite",
+        "try_placement",
     ),
     "api.poses": ("PoseStiffness", "StiffnessMap", "map_stiffness", "pose", "read_poses"),
     "api.programs": ("Analysis", "ProgramCheck", "SampledPath", "analyze", "check", "sample_path"),

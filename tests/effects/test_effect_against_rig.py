@@ -13,7 +13,7 @@ from tests.stiffness.cases import nist
 from toolpath_stiff.rig.case import rows_of, tilted_campaign
 from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.structure import load_nominal
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model
 from toolpath_stiff.updating.measurements import model_stiffness, read_measurements
 

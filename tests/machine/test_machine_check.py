@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from toolpath_stiff.analysis.checks import check_machine
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine, packaged_machines, parse_machine
-from toolpath_stiff.machine.symmetry import find_symmetry
+from toolpath_stiff.machine.kinematics import find_symmetry
 from toolpath_stiff.stiffness.model import build_model
 
 NIST = packaged_machines()["nist"].read_text()

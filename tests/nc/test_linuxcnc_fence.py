@@ -11,8 +11,7 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import linuxcnc, parse_program, read_program
-from toolpath_stiff.nc.linuxcnc import runner
-from toolpath_stiff.nc.linuxcnc.runner import Limits
+from toolpath_stiff.nc.linuxcnc import Limits
 from toolpath_stiff.nc.tables import Offsets
 
 INSTALLED = shutil.which("rs274") is not None
@@ -95,7 +94,7 @@ def started(monkeypatch):
 
     monkeypatch.setattr(linuxcnc, "run_rs274", run)
     monkeypatch.setattr(linuxcnc, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
-    monkeypatch.setattr(runner, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
+    monkeypatch.setattr(linuxcnc, "find_rs274", lambda path=None, unconfined=False: "/usr/bin/rs274")
     return runs
 
 
@@ -263,7 +262,7 @@ def read_limited(text: str, limits: Limits, unconfined: bool = False) -> linuxcn
 @pytest.mark.parametrize("confined", [True, False])
 def test_an_endless_loop_ends(confined, monkeypatch):
     if not confined:
-        monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
+        monkeypatch.setattr(linuxcnc, "_bubblewrap", lambda: None)
     with pytest.raises(InputError, match=r"part\.nc.*after 1 s of processor time.*endless loop"):
         read_limited("G1 X1 F100\no100 while [1]\n#1 = 1\no100 endwhile\nM2", Limits(seconds=1), not confined)
 
@@ -281,13 +280,13 @@ def test_an_endless_loop_is_named():
 def test_it_starts_no_process(confined, monkeypatch, tmp_path):
     """A stand-in for rs274 that tries; what it is itself, it still does."""
     if not confined:
-        monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
+        monkeypatch.setattr(linuxcnc, "_bubblewrap", lambda: None)
     fake = tmp_path / "rs274"
     fake.write_text(
         "#!/bin/sh\necho alive > canon.txt\n/bin/true && echo started >> canon.txt\necho late >> canon.txt\n"
     )
     fake.chmod(0o755)
-    assert runner.run_rs274("M2\n", "", "", rs274=str(fake)).canon == "alive\n"
+    assert linuxcnc.run_rs274("M2\n", "", "", rs274=str(fake)).canon == "alive\n"
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="root alone may become another user")
@@ -295,7 +294,7 @@ def test_a_user_without_the_filter_starts_no_process_either(tmp_path):
     """The limit on processes holds for everyone but root, for whom the filter is."""
     script, limit = tmp_path / "limiter.py", "    resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))\n"
     with_filter = limit + "    start_nothing()\n"
-    text = runner.LIMITER.read_text()
+    text = linuxcnc.LIMITER.read_text()
     assert with_filter in text
     script.write_text(text.replace(with_filter, "    os.setuid(65534)\n" + limit))
     limits = ["10", str(1 << 30), "1000000"]
@@ -316,7 +315,7 @@ def test_endless_recursion_ends():
         read_limited("o100 sub\no100 call\no100 endsub\nG1 X1 F100\no100 call\nM2", Limits(seconds=5))
 
 
-@pytest.mark.skipif(runner._bubblewrap() is None, reason="bubblewrap is not installed, or may not work here")
+@pytest.mark.skipif(linuxcnc._bubblewrap() is None, reason="bubblewrap is not installed, or may not work here")
 def test_in_bubblewrap_nothing_else_can_be_written_and_there_is_no_network(tmp_path):
     """A stand-in for rs274 that tries."""
     outside = tmp_path / "outside"
@@ -325,7 +324,7 @@ def test_in_bubblewrap_nothing_else_can_be_written_and_there_is_no_network(tmp_p
         f"#!/bin/sh\necho x > {outside}\nwhile read line; do echo $line; done < /proc/net/dev > canon.txt\n"
     )
     fake.chmod(0o755)
-    run = runner.run_rs274("M2\n", "", "", rs274=str(fake))
+    run = linuxcnc.run_rs274("M2\n", "", "", rs274=str(fake))
     assert not outside.exists()
     interfaces = [line.split(":")[0].strip() for line in run.canon.splitlines() if ":" in line]
     assert interfaces == ["lo"]
@@ -336,8 +335,8 @@ def test_it_is_started_without_a_shell_in_a_home_of_its_own(tmp_path, monkeypatc
     fake = tmp_path / "rs; touch x"
     fake.write_text("#!/bin/sh\nexport -p > canon.txt\npwd >> canon.txt\n")
     fake.chmod(0o755)
-    monkeypatch.setattr(runner, "_bubblewrap", lambda: None)
-    run = runner.run_rs274("M2\n", "", "", rs274=str(fake))
+    monkeypatch.setattr(linuxcnc, "_bubblewrap", lambda: None)
+    run = linuxcnc.run_rs274("M2\n", "", "", rs274=str(fake))
     home = next(line for line in run.canon.splitlines() if line.startswith("export HOME=")).split("=")[1].strip("'")
     assert run.canon.splitlines()[-1] == home and home != os.environ.get("HOME")
     assert "SECRET" not in run.canon

@@ -18,9 +18,8 @@ from tests.updating.cases import campaign, readings_by_hand, table_1
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.report.compare import QUESTIONS, compare_html, compare_pictures, residuals_csv
+from toolpath_stiff.report.compare import QUESTIONS, compare_html, compare_pictures, load_path_png, residuals_csv
 from toolpath_stiff.report.compare import text as terminal_text
-from toolpath_stiff.report.compare.variables import load_path_png
 from toolpath_stiff.updating.comparison import Comparison, compare
 from toolpath_stiff.updating.measurements import Measurements
 

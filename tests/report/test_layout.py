@@ -18,7 +18,7 @@ from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.poses import map_stiffness
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.placement.case_study import run_case_study
-from toolpath_stiff.report import case_study, figure, machine, measuring
+from toolpath_stiff.report import asset, case_study, figure, machine, measuring
 from toolpath_stiff.report import map as map_report
 from toolpath_stiff.report.analysis import summary_with_options
 from toolpath_stiff.report.analysis.page import page
@@ -28,7 +28,6 @@ from toolpath_stiff.report.diagnose import diagnose_html
 from toolpath_stiff.report.diagnose import pictures as diagnose_pictures
 from toolpath_stiff.report.figure import INK, page_colours
 from toolpath_stiff.report.map import map_page
-from toolpath_stiff.report.pages import asset
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.updating.comparison import compare
 from toolpath_stiff.updating.measurements import read_measurements

@@ -12,7 +12,7 @@ from toolpath_stiff.rig import CATALOGUE, OUTSIDE, Nuisances, csv_text, draw_cas
 from toolpath_stiff.rig.case import clamp_of, rows_of
 from toolpath_stiff.rig.effects import Covariance
 from toolpath_stiff.rig.hidden import disturb_readings
-from toolpath_stiff.rig.nominal import load_nominal, reachable
+from toolpath_stiff.rig.structure import load_nominal, reachable
 
 NIST = load_nominal("nist")
 
@@ -173,7 +173,7 @@ def test_wrong_arguments_are_named(arguments, message):
 def test_a_machine_that_already_carries_effects_is_refused():
     text = NIST.text + '\n[[effect]]\nname = "weak_strut"\nstrut = 1\nfactor = 0.5\n'
     with pytest.raises(InputError, match="effect"):
-        from toolpath_stiff.rig.nominal import parse_nominal
+        from toolpath_stiff.rig.structure import parse_nominal
 
         parse_nominal(text, "mine.toml")
 

@@ -12,9 +12,8 @@ from tests.updating.cases import campaign, predictor_for, simple_noise
 from toolpath_stiff.updating.inference.doubts import noise_doubt, slips_that_show, suspect_entries, suspect_rows
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
-from toolpath_stiff.updating.inference.noise import noise_models
+from toolpath_stiff.updating.inference.noise import from_repeats, noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.inference.repeats import from_repeats
 
 DATA = campaign(78, "tilted", "none")[0]
 

@@ -13,7 +13,7 @@ from toolpath_stiff.report.compare import text
 from toolpath_stiff.rig import csv_text
 from toolpath_stiff.rig.case import again, draw_case
 from toolpath_stiff.rig.hidden import HiddenMachine, Rows, true_displacements
-from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.structure import load_nominal
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.stiffness.effects.contract import MeasuringLoop, measuring_loop

@@ -16,10 +16,11 @@ from toolpath_stiff.rig import Nuisances
 from toolpath_stiff.updating.inference.noise import (
     Scatter,
     covariance,
+    from_repeats,
     noise_models,
+    repeat_groups,
 )
 from toolpath_stiff.updating.inference.prediction import Predictor
-from toolpath_stiff.updating.inference.repeats import from_repeats, repeat_groups
 
 REPEAT, CLAMPING = 0.02, 0.03
 

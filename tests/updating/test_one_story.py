@@ -22,8 +22,7 @@ from toolpath_stiff.report import compare as compare_report
 from toolpath_stiff.report import diagnose as diagnose_report
 from toolpath_stiff.report import update as update_report
 from toolpath_stiff.report.compare import QUESTIONS as COMPARE_QUESTIONS
-from toolpath_stiff.report.compare import compare_html
-from toolpath_stiff.report.compare.variables import stiffness_deviation_percent
+from toolpath_stiff.report.compare import compare_html, stiffness_deviation_percent
 from toolpath_stiff.report.diagnose import diagnose_html
 from toolpath_stiff.report.explanations import explanations, headline, is_plausible, model_rows
 from toolpath_stiff.stiffness.effects import find_effect

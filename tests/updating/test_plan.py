@@ -17,8 +17,8 @@ from tests.stiffness.cases import nist
 from tests.updating.planning import READING_SD, active, rival, rivals, table_1_design
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.nominal import reachable as rig_reachable
+from toolpath_stiff.rig.structure import load_nominal
+from toolpath_stiff.rig.structure import reachable as rig_reachable
 from toolpath_stiff.updating.inference import NAMED
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.planning import Plan, plan_measurements, random_visits

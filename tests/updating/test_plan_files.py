@@ -17,10 +17,10 @@ from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
-from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.nominal import reachable as rig_reachable
+from toolpath_stiff.rig.structure import load_nominal
+from toolpath_stiff.rig.structure import reachable as rig_reachable
 from toolpath_stiff.stiffness.effects import known_effects
-from toolpath_stiff.updating.inference.repeats import repeat_groups
+from toolpath_stiff.updating.inference.noise import repeat_groups
 from toolpath_stiff.updating.measurements import read_measurements
 from toolpath_stiff.updating.planning import plan_measurements
 from toolpath_stiff.updating.planning.campaign import Campaign, first_campaign

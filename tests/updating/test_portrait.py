@@ -18,11 +18,10 @@ from toolpath_stiff.updating.inference.fits import fit_effects
 from toolpath_stiff.updating.inference.noise import noise_models
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import read_measurements
-from toolpath_stiff.updating.portrait import Portrait, draw_portrait
-from toolpath_stiff.updating.portrait.alike import looks_the_same
+from toolpath_stiff.updating.portrait import Portrait, alike_entry, draw_portrait, portrait_entry, term_words
+from toolpath_stiff.updating.portrait.choice import looks_the_same
 from toolpath_stiff.updating.portrait.dictionary import Ground, crossed, dictionary_of
 from toolpath_stiff.updating.portrait.terms import LINKS, SHAPES, VARIABLES, Term, effect_of
-from toolpath_stiff.updating.portrait.words import alike_entry, portrait_entry, term_words
 
 
 @cache

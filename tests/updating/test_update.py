@@ -13,10 +13,9 @@ from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import machine_toml, parse_machine
 from toolpath_stiff.machine.model import EffectEntry
-from toolpath_stiff.updating.correction import Correction
+from toolpath_stiff.updating.correction import Correction, update_by_mean_error
 from toolpath_stiff.updating.correction.document import document, residuals_csv
 from toolpath_stiff.updating.correction.ladder import build_ladder, parse_addition
-from toolpath_stiff.updating.correction.strut_law import update_by_mean_error
 from toolpath_stiff.updating.inference.prediction import Predictor
 
 MEAN_OVER_SD = np.sqrt(2.0 / np.pi)

@@ -17,13 +17,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolpath_stiff.api.case_results import Findings
-from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.effects import effects
-from toolpath_stiff.api.inputs import Program
-from toolpath_stiff.api.machines import Machine
-from toolpath_stiff.api.steps import (
+from toolpath_stiff.api.case_results import (
     CASE_FILE,
+    Findings,
     copied,
     first_name,
     free_name,
@@ -34,6 +30,10 @@ from toolpath_stiff.api.steps import (
     without_lines,
     write_files,
 )
+from toolpath_stiff.api.diagnosis import Measurements
+from toolpath_stiff.api.effects import effects
+from toolpath_stiff.api.inputs import Program
+from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import read_bytes

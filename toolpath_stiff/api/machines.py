@@ -571,7 +571,7 @@ def machine_template(file: str | Path = "mine.toml") -> MachineFile:
     """
     from importlib import resources
 
-    from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
+    from toolpath_stiff.machine import TEMPLATE_REMARK, toml_text
 
     target = Path(file)
     text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")

@@ -23,15 +23,17 @@ from toolpath_stiff.defaults import FORCE, LOAD, VERSION, job_count
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.processes import ProcessDied, ProcessPool
 from toolpath_stiff.report import counted
-from toolpath_stiff.report.batch import files, names, text
-from toolpath_stiff.report.batch.programs import (
+from toolpath_stiff.report.batch import (
     Found,
     Listed,
     Outcome,
     columns_of,
     figures_of,
+    files,
     find_programs,
+    names,
     report_folders,
+    text,
 )
 from toolpath_stiff.results_folder import Rules, check_folder, clear_up, write_folder
 
@@ -294,7 +296,7 @@ def _found(programs: Iterable[str | Path | Program | Found]) -> tuple[list[Found
 
 def _check_shared(on: Machine, other: Machine | None, programs: Iterable[Program]) -> None:
     """What all programs share, so that a mistake in it is one error. Raises `InputError`."""
-    from toolpath_stiff.nc.linuxcnc.runner import find_rs274
+    from toolpath_stiff.nc.linuxcnc import find_rs274
 
     for program in programs:
         on.running(program, [other] if other else [])

@@ -442,7 +442,7 @@ class ProgramCheck(Result):
         return pd.DataFrame(self.findings, columns=["line", "column", "code", "text", "severity", "count"])
 
     def __str__(self) -> str:
-        from toolpath_stiff.report.check import text
+        from toolpath_stiff.report import text
 
         return text(self._document)
 

@@ -295,7 +295,7 @@ def add_replace_option(parser: argparse.ArgumentParser, *, force: bool = True) -
 
 def inputs_of(args: argparse.Namespace) -> Iterator[str]:
     """Every argument that may name a file to read; of a workbook's sheet, the workbook."""
-    from toolpath_stiff.workbook import split_name
+    from toolpath_stiff.tables import split_name
 
     for name, value in vars(args).items():
         if name not in DESTINATIONS:
@@ -407,7 +407,7 @@ def destination(args: argparse.Namespace, command: str, sources: Sequence[str], 
 
 def joined_names(sources: Sequence[str]) -> str:
     """Files by their names without folder, ending and sheet: `first+second`."""
-    from toolpath_stiff.workbook import split_name
+    from toolpath_stiff.tables import split_name
 
     names = [Path(split_name(source)[0]).stem for source in sources]
     joined = "+".join(names)

@@ -1,4 +1,7 @@
-"""The commands on a machine: pose, map, machine, effects."""
+"""The commands on a machine: pose, map, machine, effects.
+
+`tps studio`: a case in the browser.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +27,13 @@ from toolpath_stiff.cli.arguments import (
     show,
     written_text,
 )
+from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, hint, options
 
 # -- tps pose ---------------------------------------------------------------------------------------------------------
 
 POSE_OUT_OF_REACH, MOST_NAMED = 1, 10
-
 POSE_EPILOG = """\
 examples:
   tps pose -300 300 300 -30 0 0
@@ -39,6 +42,14 @@ examples:
 Angles are roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); the position is the tool tip in mm, machine
 coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row a pose in the
 same order, with empty cells where a pose is out of reach (exit code 1).
+"""
+EPILOG = """\
+examples:
+  tps studio                                          a new case, in tps-case/
+  tps studio measured.csv --machine mine.toml --program part.nc --case mill-3
+  tps studio --case mill-3                            goes on where it was left
+
+It serves 127.0.0.1 alone; the address holds a token. Ctrl-C ends it, nothing is lost.
 """
 
 
@@ -427,10 +438,35 @@ def _effects_draft(args: argparse.Namespace) -> int:
     return 0
 
 
+def studio_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    parser.add_argument("data", nargs="*", metavar="DATA", help="measurement files to add to the case")
+    parser.add_argument("--machine", metavar="NAME|FILE", help=f"machine of a new case (default: {MACHINE})")
+    parser.add_argument("--program", metavar="FILE", help="NC program to add")
+    parser.add_argument("--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects")
+    parser.add_argument("--case", default="tps-case", metavar="DIR", help="folder of the case (default: tps-case)")
+    parser.add_argument("--exercise", type=int, metavar="SEED", help="start a blind exercise in a new case")
+    parser.add_argument("--port", type=int, default=0, metavar="N", help="port (default: one that is free)")
+    parser.add_argument("--no-browser", action="store_true", help="print the address, open nothing")
+
+
+def studio(args: argparse.Namespace) -> int:
+    """Open the case and serve it until Ctrl-C."""
+    from toolpath_stiff.studio import opened_case, serve
+
+    case = opened_case(
+        args.case, args.data, machine=args.machine, program=args.program, effects=args.effects, exercise=args.exercise
+    )
+    return serve(case, args.port, browser=not args.no_browser)
+
+
 # Command -> what declares its arguments, what runs it.
 COMMANDS = {
     "pose": (pose_arguments, pose),
     "map": (map_arguments, map),
     "machine": (machine_arguments, machine),
     "effects": (effects_arguments, effects),
+    "studio": (studio_arguments, studio),
 }

@@ -27,17 +27,16 @@ from toolpath_stiff.errors import FileError, TpsError, harmless
 
 @dataclass(frozen=True)
 class Command:
-    """A command: its name, its line in the help, its group, whose module does the work but where another is named."""
+    """A command: its name, its line in the help, its group, whose module does the work."""
 
     name: str
     help: str
     group: str
-    module: str = ""
 
     @property
     def parts(self) -> tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]:
         """What declares its arguments, what runs it and gives the exit code."""
-        module = importlib.import_module(f"toolpath_stiff.cli.{self.module or MODULES[self.group]}")
+        module = importlib.import_module(f"toolpath_stiff.cli.{MODULES[self.group]}")
         found: tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]
         found = module.COMMANDS[self.name]
         return found
@@ -46,9 +45,9 @@ class Command:
 MODULES = {
     "A program": "program",
     "A machine": "machine",
-    "A placement": "placement",
+    "A placement": "program",
     "Measurements": "measurements",
-    "Studio": "studio",
+    "Studio": "machine",
 }
 
 
@@ -71,7 +70,7 @@ COMMANDS = (
         "update", "fit effects to measurements, see how far the error falls, write the machine file", "Measurements"
     ),
     Command("plan", "what to measure next to tell explanations apart, or a first campaign", "Measurements"),
-    Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements", "rig"),
+    Command("rig", "blind exercises: measurements of a simulated machine that hides an effect", "Measurements"),
     Command("studio", "measure, see where the model fails, add what is missing: a case in the browser", "Studio"),
 )
 

@@ -15,11 +15,10 @@ from pathlib import Path
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
-from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves, Program, ToolUse, Unsupported
-from toolpath_stiff.nc.state import START, State
+from toolpath_stiff.nc.state import START, Frames, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
 from toolpath_stiff.nc.words import HEAD_LINES, looks_like_cutter_location, read_lines, split_lines
 from toolpath_stiff.units import Pose, ShopPose, mm_per_min_from_m_per_s, pose_in_mm, pose_in_si
@@ -295,8 +294,7 @@ def _read_cutter_location(asked: _Request) -> Program:
 
 def _second_opinion(error: InputError, asked: _Request) -> Program:
     """What the built-in interpreter refused with `error`, by the second one if it is there and the program harmless."""
-    from toolpath_stiff.nc.linuxcnc import refusal
-    from toolpath_stiff.nc.linuxcnc.runner import find_rs274
+    from toolpath_stiff.nc.linuxcnc import find_rs274, refusal
 
     refused = refusal(asked.lines, asked.name)
     if refused is not None:

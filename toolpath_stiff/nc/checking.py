@@ -25,12 +25,11 @@ from toolpath_stiff.nc import (
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning, would_change
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, plain, switches_on
-from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Jump, Moves, Program, Unsupported
-from toolpath_stiff.nc.state import Flow, State, Then
+from toolpath_stiff.nc.state import Flow, Frames, State, Then
 from toolpath_stiff.nc.tables import WORK_OFFSETS, Offsets
 from toolpath_stiff.nc.words import Block, looks_like_cutter_location
 from toolpath_stiff.units import Pose, m_from_mm, pose_in_mm, pose_in_si

@@ -3,7 +3,7 @@
 Most of a big program is such lines. `plain_words` reads them many times faster than `words.read_block` reads blocks; a
 line that it does not take as a whole is not plain and is left to `read_block`, with every error.
 
-The lines become moves by the codes' own rules (`codes`, `frames`) on arrays, digit for digit. Here is only what a mode
+The lines become moves by the codes' own rules (`codes`, `state`) on arrays, digit for digit. Here is only what a mode
 does along lines: a word holds until the next one. What a number, a feed, a point, an arc means is decided by the
 functions that the interpreter calls. A line about which there is anything to say (a word that nothing takes, an arc
 that does not fit) ends the run before it: the interpreter then executes it and reports it. mm, degrees, mm/min inside.
@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.modes import SLOWEST, bare_feed_is_open, length_of_move, rotary_feed
 from toolpath_stiff.nc.codes.motion import (
     ARCS,
+    CYCLES,
     STILL,
     center_by_offsets,
     center_by_radius,

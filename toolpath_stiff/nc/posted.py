@@ -14,7 +14,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.kinematics import (
     HEAD,
@@ -30,6 +29,7 @@ from toolpath_stiff.nc.kinematics import (
     turned,
 )
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves, Program, ToolUse
+from toolpath_stiff.nc.state import Frames
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.units import Pose, deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 

@@ -19,10 +19,10 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
 from toolpath_stiff.nc.moves import Program
-from toolpath_stiff.placement.document import FIGURES, placement_of
+from toolpath_stiff.placement import FIGURES, placement_of
 from toolpath_stiff.placement.evaluator import Keepout
 from toolpath_stiff.placement.paths import DrawnPath, drawn_path
-from toolpath_stiff.report import machine_text, number, plain
+from toolpath_stiff.report import machine_text, number, plain, render
 from toolpath_stiff.report.figure import (
     BLUE,
     COLOUR_MAP,
@@ -34,7 +34,6 @@ from toolpath_stiff.report.figure import (
     page_colours,
     picture,
 )
-from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.profile import profile_curve
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
@@ -240,7 +239,7 @@ def names(plots: bool = True) -> tuple[str, ...]:
 
 def files(placed: Placed, *, plots: bool = True) -> dict[str, Content]:
     """The front as a table, everything as JSON, and with `plots` page, pictures and set-up sheet."""
-    from toolpath_stiff.placement.document import COLUMNS
+    from toolpath_stiff.placement import COLUMNS
 
     summary = placed.summary
     rows = [[_cell(row[name]) for name in COLUMNS] for row in summary["front"]]

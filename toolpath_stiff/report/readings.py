@@ -10,7 +10,18 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.report import DEVIATION, MINUS_IS_SOFTER, number, plain, shortened
+from toolpath_stiff.report import (
+    DEVIATION,
+    MINUS_IS_SOFTER,
+    bullets,
+    markup,
+    number,
+    picture,
+    plain,
+    section,
+    shortened,
+    table,
+)
 from toolpath_stiff.report.explanations import AS_GIVEN, best_explanation, figure_of, name_text, percent
 from toolpath_stiff.report.figure import (
     BLUE,
@@ -24,7 +35,6 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.pages import bullets, markup, picture, section, table
 from toolpath_stiff.report.painting import add_scales, painted_axes
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.history import history_lines

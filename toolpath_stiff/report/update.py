@@ -14,7 +14,21 @@ from markupsafe import Markup
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine import machine_toml
-from toolpath_stiff.report import DEVIATION, MINUS_IS_SOFTER, machine_text, number, plain, shortened
+from toolpath_stiff.report import (
+    DEVIATION,
+    MINUS_IS_SOFTER,
+    bullets,
+    hint_list,
+    machine_text,
+    markup,
+    number,
+    picture,
+    plain,
+    readings_page,
+    section,
+    shortened,
+    table,
+)
 from toolpath_stiff.report.explanations import figure_of, percent, significant
 from toolpath_stiff.report.figure import (
     BLUE,
@@ -26,19 +40,18 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.pages import bullets, hint_list, markup, picture, readings_page, section, table
 from toolpath_stiff.report.readings import before_after_png
+from toolpath_stiff.updating.correction import bar_curve_csv
 from toolpath_stiff.updating.correction.document import residuals_csv
-from toolpath_stiff.updating.correction.strut_law import bar_curve_csv
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from toolpath_stiff.machine import Machine
+    from toolpath_stiff.updating.correction import BarCurve
     from toolpath_stiff.updating.correction.document import LawEntry, StepEntry, UpdateDocument
     from toolpath_stiff.updating.correction.ladder import Update
-    from toolpath_stiff.updating.correction.strut_law import BarCurve
 
 VERDICTS = {
     "updated": "The machine is updated",

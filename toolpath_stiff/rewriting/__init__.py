@@ -22,14 +22,12 @@ import numpy as np
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Switches, switches_on
-from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, Program
-from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.state import Frames, State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, Offsets, ToolEntry
 from toolpath_stiff.nc.words import CORNERS, Block, read_block, read_text, split_lines
 from toolpath_stiff.rewriting.blocks import rewrite_block
-from toolpath_stiff.rewriting.controls import Controls
-from toolpath_stiff.rewriting.turn import Turn
+from toolpath_stiff.rewriting.controls import Controls, Turn
 from toolpath_stiff.units import Pose, ShopPose, deg_from_rad, mm_from_m, pose_in_mm
 
 __all__ = ["OffsetBlocks", "Rewritten", "check_decimals", "check_rewritable", "offset_blocks", "rewrite_program"]

@@ -27,8 +27,19 @@ from numpy.random import Generator
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, platform_points, rotations, true_poses
-from toolpath_stiff.rig.structure import Geometry, Links, Rows, Solved, secant_compliance, solved
+from toolpath_stiff.rig.structure import (
+    Geometry,
+    Links,
+    Nominal,
+    Rows,
+    Solved,
+    commanded_lengths,
+    platform_points,
+    rotations,
+    secant_compliance,
+    solved,
+    true_poses,
+)
 from toolpath_stiff.rig.unknowns import UNKNOWNS, State, Unknown
 from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_mm, n_per_mm_from_n_per_m, um_from_m
 

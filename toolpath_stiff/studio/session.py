@@ -10,11 +10,10 @@ from typing import Any
 import toolpath_stiff as tps
 from toolpath_stiff.api import one_of
 from toolpath_stiff.api.case import Case
-from toolpath_stiff.api.steps import Step
+from toolpath_stiff.api.case_results import Step
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import command_line, options
-from toolpath_stiff.studio.editing import Editing
-from toolpath_stiff.studio.work import Job
+from toolpath_stiff.studio.work import Editing, Job
 
 MOST_POSES, MOST_SEED = 60, 2**31 - 1
 SUFFIXES = {".csv": "data", ".xlsx": "data", ".py": "effects", ".toml": "machine"}

@@ -27,14 +27,19 @@ from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, load_pa
 from toolpath_stiff.tables import Table, parse_table, read_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.dates import day_of, days_since_first
-from toolpath_stiff.updating.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, assumed_sd, offsets
 from toolpath_stiff.updating.rows import (
     COLUMNS,
+    INDICATOR_SD,
     LABELS,
+    LOAD_SHARE,
     OPTIONAL,
+    WIDEST,
+    LoopColumns,
     Row,
     RowFile,
+    assumed_sd,
     duplicates,
+    offsets,
     read_rows,
     with_dates,
 )

@@ -35,7 +35,6 @@ from toolpath_stiff.tables import Table, heading_key
 from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.dates import Order, day_of, short_dates
 from toolpath_stiff.updating.history import HistoryDocument, Readings, history
-from toolpath_stiff.updating.raw_files import raw_tables
 from toolpath_stiff.updating.raw_labels import labelled, settled
 from toolpath_stiff.updating.raw_layouts import UNIT_WORDS
 from toolpath_stiff.updating.raw_records import (
@@ -46,6 +45,7 @@ from toolpath_stiff.updating.raw_records import (
     Loop,
     Shape,
     is_table,
+    raw_tables,
     read_raw,
     read_stiffnesses,
     shape_of,

@@ -17,8 +17,10 @@ from toolpath_stiff.errors import TableError
 from toolpath_stiff.tables import (
     FORCES,
     LENGTHS,
+    SPREADSHEET_ERROR,
     STIFFNESSES,
     Columns,
+    Grid,
     Table,
     grid_table,
     heading_key,
@@ -26,7 +28,6 @@ from toolpath_stiff.tables import (
 from toolpath_stiff.updating.dates import REDUCED, like_date, read_dates
 from toolpath_stiff.updating.raw_labels import BARE, KEYED_DATE, STRUT, WORDS, keyed_dates, strut_label
 from toolpath_stiff.updating.rows import DATE
-from toolpath_stiff.workbook import SPREADSHEET_ERROR, Grid
 
 QUANTITIES = {
     **dict.fromkeys(("force", "forces", "load", "loads", "f", "kraft", "last"), "force"),

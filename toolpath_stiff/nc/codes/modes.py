@@ -41,9 +41,8 @@ from toolpath_stiff.nc.codes import (
 )
 from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
 from toolpath_stiff.nc.controller import MILLISECONDS, SECONDS
-from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
-from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, State
+from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, Numbers, State
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 

@@ -3,6 +3,8 @@
 Codes and modal groups follow LinuxCNC (its manual, "G-Code Overview", modal groups), because its interpreter is what
 the results are compared with; polar words and rotation, which it does not have, follow Fanuc's controls. Codes that
 leave the path alone, and codes that are refused with the reason, have their rows here.
+
+M70 to M73: modes saved and restored, as LinuxCNC has them (manual, "M-Codes", M70 - M73).
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from toolpath_stiff.nc.codes import (
     M_COOLANT,
     M_OVERRIDES,
     M_SPINDLE,
+    M_STATE,
     M_TAPPING,
     MOTION,
     ONCE,
@@ -34,18 +37,85 @@ from toolpath_stiff.nc.codes import (
     m_codes,
 )
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
-from toolpath_stiff.nc.codes.drilling import DRILLING_CODES
 from toolpath_stiff.nc.codes.modes import FEED_CODES, FLOW_CODES, MODE_ALIASES, MODE_CODES, OTHER_CODES, OTHER_REFUSED
-from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, STRAIGHT_CODES, SYNCHRONISED_CODES
-from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_CODES
-from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES
-from toolpath_stiff.nc.codes.saved import SAVED_CODES
-from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.nc.codes.motion import ARC_CODES, CORNER_CODES, DRILLING_CODES, STRAIGHT_CODES, SYNCHRONISED_CODES
+from toolpath_stiff.nc.codes.offsets import OFFSET_CODES, TOOL_ALIASES, TOOL_CODES, take_offset
+from toolpath_stiff.nc.codes.points import POLAR_CODES, ROTATION_CODES, forget_polar
+from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, SavedModes, State
+
+OTHER_CONTROLS = "is an M code of the machine's builder on other controls"
 
 # -- codes that leave the path alone, and refused ones -----------------------------------------------------------------
 
 
 WAIT_FOR_INPUT = 66  # LinuxCNC, M-Codes, M66: P or E, and L with the kind of wait
+
+
+def save_modes(state: State, block: CurrentBlock, code: str) -> None:
+    """M70: save the modes at this level of calls; M73: the same, and restore them where the subprogram returns."""
+    _check_block(state, block, code)
+    state.saved[state.level] = SavedModes(
+        state.inch, state.plane, state.absolute, state.arc_absolute, state.feed_mode, state.feed, state.speed,
+        state.retract, state.frames.active, state.frames.tool, state.frames.tip_held, code == "M73",
+    )  # fmt: skip
+
+
+def forget_modes(state: State, block: CurrentBlock, code: str) -> None:
+    """M71: what was saved at this level does not hold any more."""
+    _check_block(state, block, code)
+    state.saved.pop(state.level, None)
+
+
+def restore_modes(state: State, block: CurrentBlock, code: str) -> None:
+    """M72: the modes saved at this level hold again."""
+    _check_block(state, block, code)
+    saved = state.saved.get(state.level)
+    if saved is None:
+        raise block.fail(block.codes[code], "and nothing was saved at this level of calls", "M70 or M73 before it")
+    found = _restore(state, saved)
+    if found:
+        raise block.fail(block.codes[code], f"where {found}", "G40, G49, G69 and G15 before it")
+
+
+def leave_level(state: State, level: int) -> str:
+    """A subprogram of that level returns: after M73 its caller's modes hold again. What forbids that; "" if nothing."""
+    saved = state.saved.pop(level, None)
+    return _restore(state, saved) if saved is not None and saved.at_return else ""
+
+
+def _restore(state: State, saved: SavedModes) -> str:
+    frames = state.frames
+    if frames.tool != saved.tool or frames.tip_held != saved.tip_held:
+        return "the tool length in force is another one than where the modes were saved"
+    if frames.tool and state.inch != saved.inch:
+        return "the unit would change while a tool length is in force"
+    if state.cutter is not None or frames.rotation is not None or state.polar is not None:
+        return "cutter compensation, G68 or G16 is in force"
+    state.inch, state.absolute, state.arc_absolute = saved.inch, saved.absolute, saved.arc_absolute
+    state.speed, state.retract, state.feed_mode = saved.speed, saved.retract, saved.feed_mode
+    state.feed = None if saved.feed_mode == "G93" else saved.feed
+    if state.plane != saved.plane:
+        state.plane = saved.plane
+        forget_polar(state)
+    take_offset(state, saved.offset)
+    return ""
+
+
+def _check_block(state: State, block: CurrentBlock, code: str) -> None:
+    word = block.codes[code]
+    if state.dialect.name != "linuxcnc":
+        raise block.fail(word, OTHER_CONTROLS, hint="name the control with --dialect linuxcnc if it saves modal state")
+    if len(block.codes) > 1 or block.values:
+        raise block.fail(word, "beside other words", "a block of its own")
+
+
+_SAVED = m_codes("M70 - M73")
+SAVED_CODES = (
+    Code("M70", M_STATE, save_modes, "modes saved", _SAVED, ("linuxcnc",)),
+    Code("M71", M_STATE, forget_modes, "saved modes forgotten", _SAVED, ("linuxcnc",)),
+    Code("M72", M_STATE, restore_modes, "saved modes restored", _SAVED, ("linuxcnc",)),
+    Code("M73", M_STATE, save_modes, "modes saved, restored at the return", _SAVED, ("linuxcnc",)),
+)
 
 
 def path_control(state: State, block: CurrentBlock, code: str) -> None:
@@ -162,7 +232,6 @@ PASSIVE_CODES = (
         for code in ("M48", "M49", "M50", "M51", "M52", "M53")
     ),
 )  # fmt: skip
-
 _OTHER_PLANE = ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C", g_codes("G17 - G19.1"))
 _PROBING = ("probing", "leave probing out", g_codes("G38.2 - G38.5"))
 _POCKET = (
@@ -206,7 +275,6 @@ REFUSED_CODES = (
     Refused("G87", "back boring", _MOVES, g_codes("G87")),
     Refused("G88", "boring with manual feed out", _MOVES, g_codes("G88")),
 )  # fmt: skip
-
 
 # -- the table ---------------------------------------------------------------------------------------------------------
 
@@ -255,6 +323,7 @@ CHANGES = {
     "G7": "the size of X",
 }
 BY_CODE = {code: changes for codes, changes in CHANGES.items() for code in codes.split()}
+
 # What a code that is read and not acted upon would change.
 LISTED_CHANGES = {
     **dict.fromkeys(("G61", "G61.1", "G64", "G9"), "corners, which a control rounds or stops at, and so the time"),
@@ -343,6 +412,7 @@ def codes_table() -> str:
 
 HEADING = ("code", "group", "meaning", "function in `nc/codes`", "dialects", "source", "against LinuxCNC")
 SAME_PATH, NOT_THERE, NOT_HELD = "same path", "has none", "not held"
+
 # LinuxCNC's, and in no program whose path is compared with LinuxCNC's. The others are in such programs: the random ones
 # of `benchmarks/hunt.md`, or those of the tests against rs274 (`tests/nc/test_code_registry.py` looks them up).
 WITHOUT_WITNESS = ("M7", "M19", "M53", "M71")

@@ -2,8 +2,8 @@
 
 Here is the table of words: word to function, meaning, who writes it, source; and how it is used. A word that acts is
 a row beside its function in `modes` and `motion`; those that need no function of their own, because they are listed,
-doubted or refused, are rows here. `statements` splits lines; a function takes the `state` and a statement; `state`
-also makes moves of what `geometry` computes.
+doubted or refused, are rows here. A function takes the `state` and a statement; `state` splits lines into
+statements and makes moves of what `geometry` computes.
 
 A file is read to `Program`, the same contract as the reader of G code, or checked, with all its errors.
 """
@@ -42,10 +42,8 @@ from toolpath_stiff.nc.cutter_location.state import (
     VERICUT,
     Act,
     State,
-    Word,
-)
-from toolpath_stiff.nc.cutter_location.statements import (
     Statement,
+    Word,
     frame_in_comment,
     is_number,
     plain_point,

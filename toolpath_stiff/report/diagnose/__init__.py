@@ -11,7 +11,21 @@ from markupsafe import Markup
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.files import Content
-from toolpath_stiff.report import DEVIATION, MINUS_IS_SOFTER, machine_text, number, plain, shortened
+from toolpath_stiff.report import (
+    DEVIATION,
+    MINUS_IS_SOFTER,
+    bullets,
+    hint_list,
+    machine_text,
+    markup,
+    number,
+    page,
+    picture,
+    plain,
+    section,
+    shortened,
+    table,
+)
 from toolpath_stiff.report.diagnose.pictures import confounding_png, detectable_png, envelope_png, ladder_png
 from toolpath_stiff.report.explanations import (
     HEADLINES,
@@ -48,7 +62,6 @@ from toolpath_stiff.report.figure import (
     house_style,
     new_figure,
 )
-from toolpath_stiff.report.pages import bullets, hint_list, markup, page, picture, section, table
 from toolpath_stiff.report.readings import before_after_png, loops_section
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 from toolpath_stiff.updating.inference.fits import deviation_percent
@@ -379,7 +392,7 @@ def portrait_png(document: DiagnosisDocument, data: Measurements, portrait: Port
 
 def _points(axes: Axes, data: Measurements, portrait: Portrait) -> None:
     """Every reading before (hollow) and after (dots), over the variable or, of a constant, over the term's change."""
-    from toolpath_stiff.updating.portrait.words import variable_label
+    from toolpath_stiff.updating.portrait import variable_label
 
     assert portrait.before is not None and portrait.after is not None and portrait.signature is not None
     label, si = variable_label(portrait.terms[0].term)

@@ -27,7 +27,7 @@ from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m
 from toolpath_stiff.updating.comparison.residuals import directions, radius
 from toolpath_stiff.updating.inference.covariances import Covariance
-from toolpath_stiff.updating.inference.repeats import repeat_groups
+from toolpath_stiff.updating.inference.noise import repeat_groups
 from toolpath_stiff.updating.measurements import Measurements, measured_path
 
 SAME = 1e-3  # m, poses and joints closer than this are one

@@ -12,9 +12,8 @@ from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
 from toolpath_stiff.updating.comparison.residuals import directions
-from toolpath_stiff.updating.correction import Correction
+from toolpath_stiff.updating.correction import Correction, StrutLawSearch
 from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
-from toolpath_stiff.updating.correction.strut_law import StrutLawSearch
 from toolpath_stiff.updating.diagnosis.document import HeldErrors, RoundedErrors, interval, rounded_errors
 from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent, errors_text, gain_in_standard_errors

@@ -46,7 +46,7 @@ from toolpath_stiff.updating.planning.document import plan_rows
 from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
 from toolpath_stiff.updating.portrait import Portrait, draw_portrait
-from toolpath_stiff.updating.portrait.alike import Alike, looks_the_same
+from toolpath_stiff.updating.portrait.choice import Alike, looks_the_same
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc import Program

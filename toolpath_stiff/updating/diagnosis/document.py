@@ -29,7 +29,7 @@ from toolpath_stiff.updating.inference.evidence import Fit
 from toolpath_stiff.updating.inference.fits import error_figures, gain_in_standard_errors
 from toolpath_stiff.updating.inference.gates import DrawnEntry
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, Detectable, Family, Unexcluded, averaged_interval
-from toolpath_stiff.updating.portrait.words import PortraitEntry, SameEntry, alike_entry, portrait_entry
+from toolpath_stiff.updating.portrait import PortraitEntry, SameEntry, alike_entry, portrait_entry
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.comparison.residuals import LoopsDocument

@@ -17,9 +17,9 @@ from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
 from toolpath_stiff.updating.inference.fits import errors_text
 from toolpath_stiff.updating.inference.gates import Drawn, seen_readings
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, MATTERS, Unexcluded
-from toolpath_stiff.updating.inference.repeats import OUTLIERS
+from toolpath_stiff.updating.inference.noise import OUTLIERS
 from toolpath_stiff.updating.planning import INDICATORS
-from toolpath_stiff.updating.portrait.words import alike_text
+from toolpath_stiff.updating.portrait import alike_text
 
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has all

@@ -22,8 +22,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.effects import known_effects
 from toolpath_stiff.stiffness.effects.contract import Effect, Parameter
 from toolpath_stiff.stiffness.model import ActiveEffect
-from toolpath_stiff.updating.inference.covariances import Precision
-from toolpath_stiff.updating.inference.numerics import Spline
+from toolpath_stiff.updating.inference.covariances import Precision, Spline
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements
 

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.updating.inference.candidates import Candidate, Component
-from toolpath_stiff.updating.inference.covariances import Groups, Precision
+from toolpath_stiff.updating.inference.covariances import Groups, Precision, bounded_step
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.noise import NormalEquations, Scatter, gauss_newton, scaled_inverse
-from toolpath_stiff.updating.inference.numerics import bounded_step
 
 STEPS = 8
 TOLERANCE = 1e-3  # of a standard deviation

@@ -46,11 +46,11 @@ from toolpath_stiff.updating.inference.covariances import (
     gaussian_kernel,
     linear_kernel,
     same_kernel,
+    surprise,
 )
 from toolpath_stiff.updating.inference.evidence import Fit, Problem
 from toolpath_stiff.updating.inference.fits import held_out
 from toolpath_stiff.updating.inference.noise import Noise, Scatter
-from toolpath_stiff.updating.inference.numerics import surprise
 from toolpath_stiff.updating.inference.prediction import Predictor
 from toolpath_stiff.updating.measurements import Measurements, reading_marks
 

@@ -21,9 +21,9 @@ from toolpath_stiff.updating.inference.candidates import (
     log_usual,
     table_of,
 )
+from toolpath_stiff.updating.inference.covariances import bounded_step, normal_below
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.updating.inference.gates import Forms, Structure, set_wild_aside
-from toolpath_stiff.updating.inference.numerics import bounded_step, normal_below
 
 NOTHING = -1e9  # log evidence of what cannot be
 

@@ -19,10 +19,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.units import min_from_s
 from toolpath_stiff.updating.inference import NAMED
-from toolpath_stiff.updating.loops import LoopColumns
 from toolpath_stiff.updating.measurements import Measurements, with_offsets
 from toolpath_stiff.updating.planning.rivals import Forecast
 from toolpath_stiff.updating.planning.visits import Costs, Menu, Visits
+from toolpath_stiff.updating.rows import LoopColumns
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.planning.rivals import Rival
