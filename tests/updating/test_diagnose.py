@@ -148,7 +148,7 @@ def test_where_nothing_is_missing_the_detectable_sizes_are_named():
 @pytest.mark.parametrize("verdict", CASES)
 def test_what_is_not_excluded_is_told_beside_the_verdict_and_changes_none(verdict):
     told = found(verdict)
-    assert ("neither show nor exclude" in told["text"]) == bool(told["not_excluded"])
+    assert ("neither show nor exclude" in told["not_excluded_text"]) == bool(told["not_excluded"])
     for one in told["not_excluded"]:
         assert one["effect"] not in told["plausible"]
         assert one["rms_percent"] >= 5.0 and 0.0 < one["probability"] < 0.3 and one["would_tell"]

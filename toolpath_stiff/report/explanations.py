@@ -280,6 +280,7 @@ def text(document: DiagnosisDocument) -> str:
         *_table(document),
         "",
         *_entry("plausible", plausible_text(explanations(document))),
+        *_listed("beside it", [str(document.get("not_excluded_text") or "")]),
         *_by_noise(document),
         *_listed("beside the tip", [str(one["text"]) for one in entries(document.get("loops", {}), "by_loop")]),
         *_listed("cannot test", ["; ".join(missing_text(e) for e in entries(document, "cannot_test"))]),

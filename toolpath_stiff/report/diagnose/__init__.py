@@ -149,7 +149,7 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
         title=f"Diagnosis: {files or verdict}",
         verdict=verdict,
         headline=headline(document),
-        text=document.get("text") or "",
+        text=" ".join(filter(None, (document.get("text"), _beside(document)))),
         about=about,
         figures=_figures(document),
         warnings=entries(document, "warnings"),
@@ -371,6 +371,12 @@ def _row(one: Mapping[str, Any]) -> list[str]:
         str(one["words"]), str(one["link"]), f"{one['variable']} ({one['shape']})", size,
         percent(figure_of(one, "rms_percent")),
     ]  # fmt: skip
+
+
+def _beside(document: DiagnosisDocument) -> str:
+    """What the readings neither show nor exclude, as a sentence of the page."""
+    said = document.get("not_excluded_text")
+    return f"May be there beside it: {said}." if said else ""
 
 
 def portrait_png(document: DiagnosisDocument, data: Measurements, portrait: Portrait | None) -> Drawing | None:

@@ -14,6 +14,7 @@ from toolpath_stiff.units import certain, json_number, mm_from_m, n_per_um_from_
 from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.diagnosis.words import (
     assumptions,
+    beside_text,
     doubts,
     next_steps,
     row_words,
@@ -246,6 +247,7 @@ class DiagnosisDocument(TypedDict):
     portrait: PortraitEntry | None
     looks_the_same: SameEntry | None
     not_excluded: list[NotExcluded]
+    not_excluded_text: str
     assumptions: list[str]
     warnings: list[str]
     notes: list[str]
@@ -296,6 +298,7 @@ def document(diagnosis: Diagnosis) -> DiagnosisDocument:
             None if diagnosis.alike is None else alike_entry(diagnosis.explanations[0], diagnosis.alike)
         ),
         "not_excluded": [_not_excluded(one) for one in diagnosis.unexcluded],
+        "not_excluded_text": beside_text(diagnosis.unexcluded),
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],

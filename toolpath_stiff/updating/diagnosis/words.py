@@ -28,18 +28,19 @@ MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has
 def verdict_text(diagnosis: Diagnosis) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
     same = [] if diagnosis.alike is None else [alike_text(diagnosis.explanations[0], diagnosis.alike)]
-    beside = [beside_text(diagnosis.unexcluded)] if diagnosis.unexcluded else []
-    return " ".join([_verdict_text(diagnosis), *same, *beside, *(f"{_capital(one)}." for one in doubts(diagnosis))])
+    return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(one)}." for one in doubts(diagnosis))])
 
 
 def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
-    """What the readings neither show nor exclude beside what is said, and where an indicator would tell."""
+    """What is neither shown nor excluded beside what is said, and where an indicator would tell; or nothing."""
+    if not unexcluded:
+        return ""
     told, more = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE
     effects = [f"{one.effect.name} ({up_to(one)}, {100.0 * one.rms:.2g} % of the tip's stiffness)" for one in told]
     effects += [f"{more} more"] if more > 0 else []
     places = dict.fromkeys(indicator_for(one).split(":")[0] for one in told if indicator_for(one))
     tells = f"; an indicator {' or '.join(places)} would tell" if places else ""
-    return f"The readings neither show nor exclude {joined(effects)}, which the fit takes up{tells}."
+    return f"{joined(effects)}: the readings neither show nor exclude {'it' if len(unexcluded) == 1 else 'them'}{tells}"
 
 
 def up_to(one: Unexcluded) -> str:
