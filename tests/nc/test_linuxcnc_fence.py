@@ -341,3 +341,18 @@ def test_it_is_started_without_a_shell_in_a_home_of_its_own(tmp_path, monkeypatc
     assert run.canon.splitlines()[-1] == home and home != os.environ.get("HOME")
     assert "SECRET" not in run.canon
     assert not Path(home).exists()
+
+
+@pytest.mark.parametrize("handles", [True, False])
+def test_its_end_is_noticed_whether_the_kernel_tells_or_not(handles, monkeypatch):
+    if not handles:
+        monkeypatch.delattr(os, "pidfd_open", raising=False)
+    process = subprocess.Popen(["cat"], stdin=subprocess.PIPE)  # it ends with its input
+    try:
+        assert not linuxcnc._ended(process, 0.01)
+        process.stdin.close()
+        assert linuxcnc._ended(process, 60)
+        assert process.wait() == 0
+    finally:
+        process.kill()
+        process.wait()

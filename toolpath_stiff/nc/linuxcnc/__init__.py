@@ -12,6 +12,7 @@ import contextlib
 import copy as copying
 import os
 import re
+import select
 import shutil
 import signal
 import subprocess
@@ -466,13 +467,28 @@ def _wait(process: subprocess.Popen[bytes], folder: Path, limits: Limits) -> int
     end = time.monotonic() + 2 * limits.seconds + 5
     pause = 0.01
     while time.monotonic() < end:
-        try:
-            return process.wait(timeout=pause)
-        except subprocess.TimeoutExpired:
-            pause = min(2 * pause, 0.25)
+        if _ended(process, pause):
+            return process.wait()
+        pause = min(2 * pause, 0.25)
         if any(path.stat().st_size >= limits.file_bytes for path in (folder / CANON, folder / ERRORS) if path.exists()):
             return -signal.SIGXFSZ
     return -signal.SIGKILL
+
+
+def _ended(process: subprocess.Popen[bytes], seconds: float) -> bool:
+    """Whether it ends within a time: at once when it does, where the kernel tells (`wait` looks every so often)."""
+    try:
+        handle = os.pidfd_open(process.pid)
+    except (AttributeError, OSError):  # Linux before 5.3, or not Linux
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=seconds)
+        return process.returncode is not None
+    try:
+        ends = select.poll()  # `select` takes no handle above 1023
+        ends.register(handle, select.POLLIN)
+        return bool(ends.poll(1e3 * seconds))
+    finally:
+        os.close(handle)
 
 
 def _limiter(limits: Limits) -> list[str]:
