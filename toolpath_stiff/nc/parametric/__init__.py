@@ -46,8 +46,8 @@ MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
 MOST_IDLE = 100_000  # blocks of loops that run without a move between; a program that works out values needs far fewer
 # What a control gathers and no block reads: left out where one pass of a loop is compared with another.
 GATHERED = frozenset(
-    {"recorder", "used_tools", "tip_held", "unsupported", "warnings", "assumptions", "bare", "pointed", "trace", "turning"}
-)
+    ("recorder", "used_tools", "tip_held", "unsupported", "warnings", "assumptions", "bare", "pointed", "trace")
+) | {"turning"}
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
 SHOWN = 40  # characters of the program in a message
 LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
@@ -217,7 +217,7 @@ class ParametricRun(ProgramRun):
         elif self._steps - self._idle[1] > MOST_IDLE:
             raise self._fail(
                 at,
-                f"more than {MOST_IDLE:,} blocks have run without a move, back to line {self._place(to)[1]} again and again",
+                f"more than {MOST_IDLE:,} blocks of loops without a move, back to line {self._place(to)[1]} each time",
                 "a loop that ends: see whether its condition becomes false",
             )
 
