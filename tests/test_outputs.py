@@ -135,7 +135,7 @@ def test_a_user_s_file_of_the_name_is_kept_and_the_tool_s_is_not(here, capsys):
     ):
         Path(file).write_text("mine")
         assert main([*words, file]) == main([*words, file]) == 0
-        assert Path(f"{file}.old").read_text() == "mine" != Path(file).read_text()
+        assert Path(f"{file}.old").read_bytes() == b"mine" != Path(file).read_bytes()
         assert not Path(f"{file}.old2").exists()
         assert capsys.readouterr().out.count(f"kept the old {file} as {file}.old") == 1
     assert main(["machine", "show", "nist", "--out", "a.png"]) == 0  # at another pose

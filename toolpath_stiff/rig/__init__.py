@@ -350,7 +350,7 @@ def new_exercise(
 
 
 def measure_again(folder: str | Path, plan_file: str, out: str | Path, visit: int = 1) -> int:
-    """Measure the hidden machine of an exercise at a plan into a file (`measured_again`); returns the number of rows."""
+    """Write what `measured_again` measures to a file; returns the number of rows."""
     text, count = measured_again(folder, plan_file, visit)
     write_atomically(out, text)
     return count
