@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: the stiffness routes, start-up, many programs, cost over size, with the bars to clear.
+"""`python -m benchmarks`: the stiffness routes, whole commands, many programs, cost over size, with the bars to clear.
 
 One core: the thread pools are limited before numpy loads. Rounds interleave the methods, each ratio is taken within
 its round, the medians are printed. Absolute times depend on the machine; the ratios hardly do.
@@ -18,10 +18,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from benchmarks.growth import measure_growth, picture, table
-from benchmarks.many import measure_many
+from benchmarks.many import measure_many, measure_pictures
 from benchmarks.processes import describe_machine
 from benchmarks.routes import measure_routes
-from benchmarks.startup import measure_startup
+from benchmarks.whole_commands import measure_commands
 
 BARS = "A bar that is not cleared is marked; the exit code is then 1."
 
@@ -43,21 +43,19 @@ def main() -> int:
             f"{' and '.join(missing)} not installed; pip install 'toolpath-stiff[test]' brings all that is timed"
         )
     route_lines, routes_pass = measure_routes(rounds)
-    startup_lines, startup_pass = measure_startup(rounds)
+    command_lines, commands_pass = measure_commands(rounds)
     many_lines, many_pass = measure_many(1)
+    picture_lines, pictures_pass = measure_pictures()
     costs = measure_growth(args.full)
     drawn = [f"![CPU and memory over the size]({Path(args.out).with_suffix('.png').name})", ""] if args.out else []
-    text = "\n".join(
-        [
-            *("# Benchmark", "", describe_machine(), "", *route_lines, "", *startup_lines, "", *many_lines, ""),
-            *("## Cost over size", "", *drawn, *table(costs), "", BARS, ""),
-        ]
-    )
+    tables = [*route_lines, "", *command_lines, "", *many_lines, "", *picture_lines, ""]
+    growth = ["## Cost over size", "", *drawn, *table(costs), "", BARS, ""]
+    text = "\n".join(["# Benchmark", "", describe_machine(), "", *tables, *growth])
     print(text)
     if args.out:
         picture(costs, Path(args.out).with_suffix(".png"))
         Path(args.out).write_text(f"{text}\nMade by `python -m benchmarks --out {args.out}`.\n", encoding="utf-8")
-    return 0 if routes_pass and startup_pass and many_pass else 1
+    return 0 if routes_pass and commands_pass and many_pass and pictures_pass else 1
 
 
 if __name__ == "__main__":

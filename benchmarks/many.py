@@ -9,8 +9,9 @@ from pathlib import Path
 
 from benchmarks.processes import whole_process
 
-PROGRAMS = 2000
+PROGRAMS, WITH_PICTURES = 2000, 200
 BAR = 1.2  # times the CPU of the analyses
+PICTURES_BAR = 0.15  # s of CPU a program for two pictures and a page
 THEMSELVES = """
 import sys
 from pathlib import Path
@@ -48,6 +49,24 @@ def measure_many(rounds: int, programs: int = PROGRAMS) -> tuple[list[str], bool
         "| --- | ---: | ---: | --- |",
         f"| {name} | {statistics.median(seconds):.1f} | {ratio:.2f} "
         f"| at most {BAR:g}{'' if clears else ': NOT CLEARED'} |",
+    ], clears
+
+
+def measure_pictures(programs: int = WITH_PICTURES) -> tuple[list[str], bool]:
+    """What two pictures and a page cost a program: lines of the table, and whether the bar is cleared."""
+    command = [sys.executable, "-m", "toolpath_stiff", "analyze", "programs", "--jobs", "1"]
+    seconds = []
+    for words in (["--no-plots"], []):
+        with tempfile.TemporaryDirectory() as folder:
+            write_programs(Path(folder) / "programs", programs)
+            seconds.append(whole_process([*command, *words], folder)[0] / programs)
+    without, drawn = seconds[0], seconds[1] - seconds[0]
+    clears = drawn <= PICTURES_BAR
+    return [
+        "| command | CPU seconds a program without pictures | two pictures and a page | bar |",
+        "| --- | ---: | ---: | --- |",
+        f"| `tps analyze FOLDER --jobs 1`, {programs:,} small programs | {without:.3f} | {drawn:.3f} "
+        f"| at most {PICTURES_BAR:g}{'' if clears else ': NOT CLEARED'} |",
     ], clears
 
 

@@ -284,3 +284,13 @@ def test_no_import_circle():
 
 def test_the_search_for_circles_finds_one():
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) != []
+
+
+def test_no_package_calls_a_builtin_that_a_module_of_its_own_hides():
+    # importing `report.map` binds `map` in `report`: from then on the name means the module there
+    hidden = []
+    for file in PACKAGE.rglob("__init__.py"):
+        inside = {path.stem for path in file.parent.iterdir()} & set(dir(builtins))
+        names = (node for node in ast.walk(ast.parse(file.read_text("utf-8"))) if isinstance(node, ast.Name))
+        hidden += [f"{file.parent.name}: {node.id}, line {node.lineno}" for node in names if node.id in inside]
+    assert not hidden, hidden

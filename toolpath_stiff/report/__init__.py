@@ -179,9 +179,9 @@ def render_pieces(
     template: str, *, styles: Sequence[str] = (), scripts: Sequence[str] = (), data: Any = None, **values: Any
 ) -> Iterator[str]:
     """The same in pieces: the data of a long program are most of a page, and stand in memory once."""
-    script = '\n"use strict";\n(() => {\n' + "".join(map(asset, scripts)) + "})();\n" if scripts else ""
+    script = '\n"use strict";\n(() => {\n' + "".join(asset(one) for one in scripts) + "})();\n" if scripts else ""
     text = _templates().get_template(template).render(
-        style=Markup("".join(map(asset, ("page.css", *styles)))),
+        style=Markup("".join(asset(one) for one in ("page.css", *styles))),
         script=Markup(script),
         script_hash=script_hash(script),
         data=None if data is None else DATA,
@@ -256,7 +256,7 @@ def _json(value: Any) -> str:
 
 def markup(template: str, *values: object) -> Markup:
     """A bit of HTML with values in the place of {}: as a template, for what is smaller than one."""
-    return Markup(template).format(*map(_shown, values))
+    return Markup(template).format(*(_shown(value) for value in values))
 
 
 # -- parts -------------------------------------------------------------------------------------------------------------
