@@ -216,17 +216,6 @@ def test_no_function_is_long():
     assert long == []
 
 
-def test_no_room_takes_a_builtin_s_name_from_itself():
-    """Once `report.map` is imported, `map` in `report/__init__.py` is that module."""
-    taken = []
-    for path in modules():
-        if path.name == "__init__.py":
-            inside = {one.stem for one in (PACKAGE / path).parent.iterdir()} & set(dir(builtins))
-            loads = ast.walk(tree((PACKAGE / path).read_text("utf-8"))) if inside else ()
-            taken += [f"{path}: {node.id}" for node in loads if isinstance(node, ast.Name) and node.id in inside]
-    assert taken == []
-
-
 def test_array_types_stand_in_one_place():
     again = [
         str(path)

@@ -497,7 +497,9 @@ class NextVisit(Result):
         return "\n".join([*self._document["text"], *(f"note: {note}" for note in self._document["notes"])])
 
     def _short(self) -> str:
-        return f"{self._document['readings']} readings, {'settled' if self.settled else 'open'}"
+        from toolpath_stiff.report import counted
+
+        return f"{counted(self._document['readings'], 'reading')}, {'settled' if self.settled else 'open'}"
 
 
 def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ()) -> NextVisit:
