@@ -257,6 +257,16 @@ def test_importing_the_package_loads_nothing_heavy():
     assert found.stdout.strip() == "[]"
 
 
+def test_a_machine_and_readings_show_themselves_as_json_and_in_notebooks(tmp_path):
+    machine, data = tps.Machine.load("nist"), tps.Measurements.read("nist-table1")
+    assert pd.DataFrame(machine.to_dict()["figures"]).equals(machine.to_frame())
+    found = json.loads(json.dumps(data.to_dict(), allow_nan=False))
+    assert pd.DataFrame(found["readings"])["stiffness_N_per_mm"].equals(data.to_frame()["stiffness_N_per_mm"])
+    assert machine.title in machine._repr_html_() and "stiffness_N_per_mm" in data._repr_html_()
+    checked = tps.check(tps.Program.from_text(SLOT))
+    assert checked.save(tmp_path / "check.json").read_text("utf-8") == checked.to_json()
+
+
 def test_shop_units_at_the_door():
     slot = tps.Program.from_text(SLOT)
     found = tps.analyze("nist", slot, step_mm=5, origin_mm_deg=(0, 0, 800)).to_frame()

@@ -124,6 +124,35 @@ def test_earlier_results_are_written_over_and_other_files_kept(here, capsys):
     assert load_machine("better.toml").origins["strut_law"] == "fitted"
 
 
+def test_a_user_s_file_of_the_name_is_kept_and_the_tool_s_is_not(here, capsys):
+    assert main(["rig", "new", "--seed", "1", "--layout", "paper", "--out", "ex"]) == 0
+    Path("plan.csv").write_text("x_mm,y_mm,z_mm,direction,stiffness_N_per_mm\n0,0,900,X,\n")
+    for words, file in (
+        (["machine", "show", "nist", "--pose", "0,0,800", "--out"], "a.png"),
+        (["machine", "check", "machine.toml", "--out"], "b.png"),
+        (["reduce", "raw.csv", "--no-plots", "--out"], "c.csv"),
+        (["rig", "measure", "ex", "--at", "plan.csv", "--out"], "d.csv"),
+    ):
+        Path(file).write_text("mine")
+        assert main([*words, file]) == main([*words, file]) == 0
+        assert Path(f"{file}.old").read_bytes() == b"mine" != Path(file).read_bytes()
+        assert not Path(f"{file}.old2").exists()
+        assert capsys.readouterr().out.count(f"kept the old {file} as {file}.old") == 1
+    assert main(["machine", "show", "nist", "--out", "a.png"]) == 0  # at another pose
+    assert main(["rig", "measure", "ex", "--at", "plan.csv", "--out", "d.csv", "--visit", "2"]) == 0
+    assert not Path("a.png.old2").exists() and Path("d.csv.old2").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_device_or_a_named_pipe_is_refused_at_once(here, capsys):
+    os.mkfifo("pipe")
+    for words in (["compare"], ["check"], ["reduce"], ["pose", "--csv"]):
+        for name in ("/dev/zero", "pipe"):
+            assert main([*words, name]) == 2
+            told = capsys.readouterr().err
+            assert told.endswith("it is not a regular file\n") and told.count("\n") == 1, told
+
+
 def test_the_check_itself(tmp_path):
     one, two = tmp_path / "one", tmp_path / "two"
     one.write_text("1")

@@ -335,6 +335,7 @@ def is_file(path: str | Path) -> bool:
 def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
     """Content of a file; `what` names it in messages, `most` are the bytes that it may have. Raises `InputError`."""
     try:
+        check_regular(Path(path), pipes=True)
         with Path(path).open("rb") as stream:
             content = _read(stream, most)
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
@@ -345,8 +346,20 @@ def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
     return content
 
 
+def check_regular(path: Path, pipes: bool = False) -> None:
+    """Refuse what reading may never come to the end of: a device, or a named pipe that waits for its writer.
+
+    With `pipes`, those of the shell (`/dev/stdin`, `<(command)`) pass, as their writer is there. A folder passes: the
+    system's own error says that it is one. Raises `OSError`.
+    """
+    mode = path.stat().st_mode
+    shell = pipes and stat.S_ISFIFO(mode) and path.is_absolute() and path.parts[1] in ("dev", "proc")
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or shell):
+        raise OSError(errno.EINVAL, "it is not a regular file")
+
+
 def _read(stream: BinaryIO, most: int) -> bytes:
-    """All of it, or a little more than it may have; a device may go on for ever."""
+    """All of it, or a little more than it may have, of a pipe."""
     state = os.fstat(stream.fileno())
     if stat.S_ISREG(state.st_mode) and state.st_size <= most:
         return stream.read()

@@ -267,10 +267,34 @@ def test_refused_with_line_and_reason(text, controller, line, says):
     assert error.line == line and says in error.found, error
 
 
+@pytest.mark.parametrize(
+    ("text", "controller", "line"),
+    [
+        ("o1 while [1]\no1 endwhile\n", LINUXCNC, 2),
+        ("F9\no1 while [1]\nG1 X1\nX0\no1 endwhile\n", LINUXCNC, 5),
+        ("F9\nN10 G1 X1\nX0\nGOTO 10\n", FANUC, 4),
+        ("#1=0\nWHILE[#1 LT 3]DO1\n#2=#1+1\nEND1\n", FANUC, 4),
+        ("#1=0\no1 while [1]\n#1=[1-#1]\no2 repeat [5]\no2 endrepeat\no1 endwhile\n", LINUXCNC, 5),
+    ],
+)
+def test_a_loop_in_which_nothing_changes_is_refused_at_once(text, controller, line, monkeypatch):
+    monkeypatch.setattr("toolpath_stiff.nc.parametric.MOST_STEPS", 200)
+    error = refusal(text, controller)
+    assert "never ends" in error.found and error.line == line
+
+
 def test_a_loop_without_an_end_is_stopped(monkeypatch):
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.MOST_STEPS", 500)
-    error = refusal("o1 while [1]\no1 endwhile\n", LINUXCNC)
-    assert "500 blocks" in error.found and error.line in (1, 2)
+    monkeypatch.setattr("toolpath_stiff.nc.parametric.MOST_IDLE", 500)
+    error = refusal("#1=0\no1 while [1]\n#1=[#1+1]\no1 endwhile\n", LINUXCNC)
+    assert "500 blocks of loops" in error.found and error.line == 4
+    monkeypatch.setattr("toolpath_stiff.nc.parametric.MOST_STEPS", 900)
+    error = refusal("F9\n#1=0\no1 while [1]\nG1 X#1\n#1=[#1+1]\no1 endwhile\n", LINUXCNC)
+    assert "900 blocks" in error.found
+
+
+def test_loops_that_read_the_position_end():
+    text = "F9\nG91\no1 while [#5420 lt 40]\nG1 X1\no1 endwhile\no2 repeat [300]\nX1\nX-1\no2 endrepeat\n"
+    assert len(parse_program(text, controller=LINUXCNC).moves) == 40 + 600
 
 
 def test_a_variable_that_no_block_sets_is_an_assumption():

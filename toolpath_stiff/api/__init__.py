@@ -60,9 +60,7 @@ class Result(ABC):
 
     def _repr_html_(self) -> str:
         """For notebooks."""
-        import html
-
-        return f"<pre>{html.escape(str(self))}</pre>"
+        return notebook_text(str(self))
 
     def to_json(self) -> str:
         """`to_dict()` as text, as the command writes it.
@@ -187,6 +185,13 @@ class TextResult(Result):
 
     def _short(self) -> str:
         return self._said
+
+
+def notebook_text(text: str) -> str:
+    """Text as a notebook shows it."""
+    import html
+
+    return f"<pre>{html.escape(text)}</pre>"
 
 
 def json_text(document: Any) -> str:

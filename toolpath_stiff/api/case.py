@@ -200,6 +200,8 @@ class Case(Findings):
         ...     case.data_files, len(case.data.to_frame()), case.question("compare").split()[:2]
         (('data/nist-table1.csv',), 42, ['tps', 'compare'])
         """
+        from toolpath_stiff.report import counted
+
         names = [copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files]
         after = (*self.state.data, *names)
         try:
@@ -208,7 +210,7 @@ class Case(Findings):
             for name in names:
                 (self.folder / name).unlink()
             raise
-        text = f"{', '.join(Path(file).name for file in files)} added: {count} readings in all"
+        text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
         self.record(
             "data",
             text,
@@ -411,6 +413,7 @@ class Case(Findings):
 
     def measure(self, plan_file: str | Path) -> None:
         """Measure the exercise's machine at the poses of a plan; the readings are added."""
+        from toolpath_stiff.report import counted
         from toolpath_stiff.rig import measure_again
 
         name = free_name(self.folder, "data/measured.csv")
@@ -420,7 +423,7 @@ class Case(Findings):
         line = command_line("rig", "measure", self._exercise(), *options(at=plan_file, out=name, visit=visit))
         self.record(
             "measure",
-            f"{count} readings measured",
+            f"{counted(count, 'reading')} measured",
             change={"data": (*self.state.data, name)},
             files=[name],
             command=line,

@@ -90,7 +90,9 @@ class Reduction(Result):
         return f"{name} and {others} more" if others else name
 
     def _short(self) -> str:
-        return f"{self._title}, {len(self.reduced.loops)} loops"
+        from toolpath_stiff.report import counted
+
+        return f"{self._title}, {counted(len(self.reduced.loops), 'loop')}"
 
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
         """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
@@ -382,7 +384,9 @@ class Plan(FolderResult):
         return text(self._document)
 
     def _short(self) -> str:
-        return f"{self._document['kind']}, {len(self._document['visits'])} clampings"
+        from toolpath_stiff.report import counted
+
+        return f"{self._document['kind']}, {counted(len(self._document['visits']), 'clamping')}"
 
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps plan`."""

@@ -5,6 +5,7 @@ At the machine: one pose after another of a plan, each chosen from the readings 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -108,8 +109,33 @@ class Measurements:
 
         return pd.DataFrame(reading_columns(self.on(machine_from(machine))))
 
+    def to_dict(self, machine: Machine | str | Path = MACHINE) -> dict[str, Any]:
+        """The files, and the readings as `to_frame` has them: the unit in each key, None where one does not say.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> found = tps.Measurements.read("nist-table1").to_dict()
+        >>> found["files"], found["readings"][0]["stiffness_N_per_mm"]
+        (['nist-table1'], 56813.0)
+        """
+        from toolpath_stiff.updating.measurements import reading_columns
+
+        columns = reading_columns(self.on(machine_from(machine)))
+        cells = ([None if _is_nan(one) else one for one in values.tolist()] for values in columns.values())
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*cells, strict=True)]
+        return {"files": list(self.files), "readings": rows}
+
     def __repr__(self) -> str:
         return f"<Measurements {', '.join(self.files)}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the readings on the default machine, its first and last rows if they are many."""
+        return str(self.to_frame().to_html(max_rows=20, notebook=True))
+
+
+def _is_nan(value: object) -> bool:
+    return isinstance(value, float) and math.isnan(value)
 
 
 Data = Measurements | str | Path | Sequence[str | Path]
@@ -471,7 +497,9 @@ class NextVisit(Result):
         return "\n".join([*self._document["text"], *(f"note: {note}" for note in self._document["notes"])])
 
     def _short(self) -> str:
-        return f"{self._document['readings']} readings, {'settled' if self.settled else 'open'}"
+        from toolpath_stiff.report import counted
+
+        return f"{counted(self._document['readings'], 'reading')}, {'settled' if self.settled else 'open'}"
 
 
 def next_visit(folder: str | Path, data: Sequence[str | Path] | str | Path = ()) -> NextVisit:

@@ -72,7 +72,9 @@ class EffectCatalogue(Result):
         return effects_table(self.effects, self.broken)
 
     def _short(self) -> str:
-        return f"{len(self.effects)} effects"
+        from toolpath_stiff.report import counted
+
+        return counted(len(self.effects), "effect")
 
 
 def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:

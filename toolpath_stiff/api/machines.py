@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import Result, TextResult, one_of
+from toolpath_stiff.api import Result, TextResult, notebook_text, one_of
 from toolpath_stiff.api.inputs import Program, pose_si, whole
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm, pose_in_si
@@ -357,6 +357,30 @@ class Machine:
 
     def __str__(self) -> str:
         return self.text()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Name, title, source, effects, and its figures as `to_frame` has them, each with its unit and origin.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> found = tps.Machine.load("nist").to_dict()
+        >>> found["name"], found["effects"], found["figures"][-1]["unit"]
+        ('nist', [], 'mm/min')
+        """
+        from toolpath_stiff.report.machine import figure_entries
+
+        return {
+            "name": self.name,
+            "title": self.title,
+            "source": self.source,
+            "effects": self.effects,
+            "figures": figure_entries(self.model.machine),
+        }
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return notebook_text(str(self))
 
     def check(self) -> MachineCheck:
         """Look for slips in the figures: units, signs, mirrored joints; what its effects lack.

@@ -441,6 +441,21 @@ class ProgramCheck(Result):
 
         return pd.DataFrame(self.findings, columns=["line", "column", "code", "text", "severity", "count"])
 
+    def save(self, file: str | Path) -> Path:
+        r"""Write the JSON document to a file, whole or not at all.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     tps.check(tps.Program.from_text("G21\nM2")).save(pathlib.Path(folder) / "check.json").name
+        'check.json'
+        """
+        from toolpath_stiff.files import write_atomically
+
+        return write_atomically(file, self.to_json())
+
     def __str__(self) -> str:
         from toolpath_stiff.report import text
 

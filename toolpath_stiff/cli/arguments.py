@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM
 from toolpath_stiff.defaults import FORCE, LOAD, MACHINE
 from toolpath_stiff.errors import InputError, harmless
-from toolpath_stiff.files import Content, check_outputs, is_file, keep_old, write_atomically
+from toolpath_stiff.files import Content, check_outputs, encoded, is_file, keep_old, read_bytes, write_atomically
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
 from toolpath_stiff.units import ShopPose
 
@@ -35,6 +35,7 @@ SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 ALL_BLOCKS = "all"
 LOADS_HELP = "tangential, axial, normal, softest, radial, x, y, z or DX,DY,DZ"
 LONGEST = 60  # letters of a default folder's name; of more files, the first and how many there are
+PNG, PNG_HEAD_BYTES = b"\x89PNG", 54  # signature, IHDR and pHYs, in which other writers differ
 MARK_BYTES = 4096  # of a file, within which a command knows what it wrote itself
 DESTINATIONS = ("out", "output", "write")
 
@@ -337,6 +338,22 @@ def check_single(args: argparse.Namespace, file: str | None, mark: bytes = b"") 
     except OSError:
         ours = False
     return [] if ours else [Path(file)]
+
+
+def check_made(args: argparse.Namespace, contents: Mapping[Path, Content]) -> list[Path]:
+    """The same for files whose content is made already; what stands there is to be kept unless it is the tool's.
+
+    That is what has the same content, and a picture of the same size and resolution that begins as ours do.
+    """
+    replaced = check_written(args, contents)
+    for file, content in contents.items():
+        made = b"".join(encoded(content))
+        begin = made[:PNG_HEAD_BYTES] if made.startswith(PNG) else made
+        if file not in replaced and is_file(file):
+            found = read_bytes(file, "file")
+            if found != made and not (begin is not made and found.startswith(begin)):
+                replaced.append(file)
+    return replaced
 
 
 def keep(replaced: Iterable[Path], quiet: bool = False) -> None:

@@ -13,6 +13,7 @@ from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_machine_options,
     add_replace_option,
+    check_made,
     check_new,
     check_single,
     check_written,
@@ -256,9 +257,11 @@ def _machine_show(args: argparse.Namespace) -> int:
     else:
         print(machine.text(args.pose))
     if args.out or not args.json:
-        target = args.out or f"reports/{machine.name}.png"
-        keep(check_written(args, [target]), quiet=args.json)
-        written = write_atomically(target, machine.picture(args.pose))
+        target = Path(args.out or f"reports/{machine.name}.png")
+        check_written(args, [target])
+        picture = machine.picture(args.pose)
+        keep(check_made(args, {target: picture}), quiet=args.json)
+        written = write_atomically(target, picture)
         if not args.json:
             print(written_text([written]))
     return 0 if machine.standing(args.pose)[2].reachable[0] else MACHINE_OUT_OF_REACH
@@ -272,12 +275,13 @@ def _machine_check(args: argparse.Namespace) -> int:
     if not Path(args.file).is_file():
         new = command_line("machine", "new", args.file)
         raise InputError(f"cannot read machine file {args.file!r}", hint=f"`{new}` writes a template")
-    target = args.out or f"reports/{Path(args.file).stem}_machine.png"
+    target = Path(args.out or f"reports/{Path(args.file).stem}_machine.png")
     drawn = bool(args.out) or not args.json
-    replaced = check_written(args, [target]) if drawn else []
+    check_written(args, [target] if drawn else [])
     found = Machine.load(Path(args.file), effects=args.effects).check()
-    keep(replaced, quiet=args.json)
-    written = [write_atomically(target, found.picture())] if drawn else []
+    files = {target: found.picture()} if drawn else {}
+    keep(check_made(args, files), quiet=args.json)
+    written = [write_atomically(file, content) for file, content in files.items()]
     if args.json:
         sys.stdout.write(found.to_json())
     else:

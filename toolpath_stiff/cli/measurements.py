@@ -17,6 +17,7 @@ from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_program_options,
     add_replace_option,
+    check_made,
     check_single,
     check_written,
     destination,
@@ -31,6 +32,7 @@ from toolpath_stiff.cli.arguments import (
     written_text,
 )
 from toolpath_stiff.defaults import MACHINE, STRUT_SPREAD
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.results_folder import Rules
 
@@ -182,7 +184,6 @@ def reduce(args: argparse.Namespace) -> int:
     """Reduce, write, print."""
     from toolpath_stiff.api import json_text
     from toolpath_stiff.api.correction import reduce
-    from toolpath_stiff.files import write_atomically
     from toolpath_stiff.tables import split_name
 
     found = reduce(
@@ -190,7 +191,7 @@ def reduce(args: argparse.Namespace) -> int:
     )
     out = Path(args.out or f"{Path(split_name(args.raw[0])[0]).stem}_measurements.csv")
     files = found.files(out, plots=not args.no_plots)
-    keep(check_written(args, files), quiet=args.json)
+    keep(check_made(args, files), quiet=args.json)
     written = [str(write_atomically(name, content)) for name, content in files.items()]
     for note in found.notes:
         print(f"tps: note: {note}", file=sys.stderr)
@@ -542,9 +543,10 @@ def rig(args: argparse.Namespace) -> int:
         print(hint("next", _diagnose(args.out)))
         return 0
     if args.action == "measure":
-        replaced = check_written(args, [args.out], (Path(args.folder) / name for name in FILES))
-        keep(replaced)
-        count = exercises.measure_again(args.folder, args.at, args.out, args.visit)
+        check_written(args, [args.out], (Path(args.folder) / name for name in FILES))
+        text, count = exercises.measured_again(args.folder, args.at, args.visit)
+        keep(check_made(args, {Path(args.out): text}))
+        write_atomically(args.out, text)
         print(f"{args.out}: {count} measurements")
         print(hint("next", _diagnose(args.folder, args.out)))
         return 0

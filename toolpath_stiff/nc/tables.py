@@ -34,7 +34,7 @@ class ToolEntry:
     stick_out: float = math.nan
     material: str = ""
 
-    def __deepcopy__(self, memo: dict[int, object]) -> ToolEntry:
+    def __deepcopy__(self, _memo: dict[int, object]) -> ToolEntry:
         # Every reading copies its tables, field by field at ten times the cost.
         return replace(self)
 
@@ -47,7 +47,7 @@ class WorkOffset:
     rotation: float = 0.0
     given: bool = False
 
-    def __deepcopy__(self, memo: dict[int, object]) -> WorkOffset:
+    def __deepcopy__(self, _memo: dict[int, object]) -> WorkOffset:
         return replace(self, axes=[*self.axes])
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.files import check_regular
 
 NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails does not try shorter numbers
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
@@ -377,6 +378,7 @@ def read_text(path: str | Path) -> tuple[str, str]:
     Raises `InputError` where the file cannot be read or is larger than `LARGEST_FILE`.
     """
     try:
+        check_regular(Path(path))  # no pipe of the shell either: a program is read more than once
         with Path(path).open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
     except OSError as error:

@@ -309,7 +309,7 @@ def readings_page(
         verdict=verdict,
         headline=headline,
         text=document["text"],
-        about=[f"{document['readings']} readings", files, f"machine {machine_text(document)}"],
+        about=[counted(document["readings"], "reading"), files, f"machine {machine_text(document)}"],
         figures=figures,
         warnings=document["warnings"],
         sections=sections,

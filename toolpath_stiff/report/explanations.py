@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from toolpath_stiff.defaults import MEAN_OVER_SD
 from toolpath_stiff.hints import parted
-from toolpath_stiff.report import WIDTH, labelled, machine_text, number, plain, shortened
+from toolpath_stiff.report import WIDTH, counted, labelled, machine_text, number, plain, shortened
 from toolpath_stiff.updating.inference.candidates import choice_text
 
 if TYPE_CHECKING:
@@ -316,7 +316,7 @@ def _hints(label: str, hints: Sequence[object]) -> list[str]:
 def _data(document: DiagnosisDocument) -> str:
     files = ", ".join(str(name) for name in entries(document, "data")) or "-"
     readings = figure_of(document, "readings")
-    count = f"{readings:.0f} readings of " if readings is not None else ""
+    count = f"{counted(readings, 'reading')} of " if readings is not None else ""
     return f"{count}{files}, machine {machine_text(document)}"
 
 
@@ -409,4 +409,4 @@ def _next_readings(document: DiagnosisDocument) -> list[str]:
     reasons = list(dict.fromkeys(str(e["why"]) for e in readings if e.get("why")))
     more = len(reasons) - FEW_REASONS
     said = "; ".join([*reasons[:FEW_REASONS], *([f"{more} more in the file"] if more > 0 else [])])
-    return [f"{len(readings)} readings are proposed in diagnose.json" + (f": {said}" if said else "")]
+    return [f"{counted(len(readings), 'reading')} proposed in diagnose.json" + (f": {said}" if said else "")]

@@ -18,6 +18,7 @@ from toolpath_stiff.report import (
     DEVIATION,
     MINUS_IS_SOFTER,
     bullets,
+    counted,
     hint_list,
     machine_text,
     markup,
@@ -209,7 +210,7 @@ MACHINE_FILE = "machine.toml"
 def text(document: UpdateDocument) -> str:
     """Ladder, errors by direction before and after, parameters, what was turned down."""
     lines = [
-        f"data     {document['readings']} readings of {', '.join(plain(name) for name in document['data'])}, "
+        f"data     {counted(document['readings'], 'reading')} of {', '.join(map(plain, document['data']))}, "
         f"machine {machine_text(document)}",
         fill(f"result   {document['verdict'].upper()}. {plain(document['text'])}", WIDTH, subsequent_indent=" " * 9),
         "",

@@ -74,6 +74,7 @@ __all__ = [
     "effects_of_layout",
     "make_case",
     "measure_again",
+    "measured_again",
     "new_exercise",
     "reveal",
 ]
@@ -349,7 +350,14 @@ def new_exercise(
 
 
 def measure_again(folder: str | Path, plan_file: str, out: str | Path, visit: int = 1) -> int:
-    """Measure the hidden machine of an exercise at a plan; returns the number of rows.
+    """Write what `measured_again` measures to a file; returns the number of rows."""
+    text, count = measured_again(folder, plan_file, visit)
+    write_atomically(out, text)
+    return count
+
+
+def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[str, int]:
+    """Measure the hidden machine of an exercise at a plan: the measurement file as text, and the number of rows.
 
     New clamps and new noise, which depend on the plan's bytes and on `visit` alone. Clamps are numbered on from a
     number that no other plan is likely to get, so that files can be read together.
@@ -365,8 +373,7 @@ def measure_again(folder: str | Path, plan_file: str, out: str | Path, visit: in
         plan["clamp"] = first + (plan["clamp"] if "clamp" in plan else clamp_of(plan) + 1)
     stated_sd = "sd_N_per_mm" in sealed["columns"]
     measured = again(case.nominal, case.machine, case.nuisances, plan, rng, stated_sd)
-    write_atomically(out, csv_text(measured))
-    return len(plan["x_mm"])
+    return csv_text(measured), len(plan["x_mm"])
 
 
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:

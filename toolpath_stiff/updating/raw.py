@@ -482,22 +482,35 @@ def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> st
     """A measurement file, one row a loop; a figure that some loop lacks is left out as a column."""
     shown = [shop_figures(one) for one in figures]
     there = [name for name in FIGURES if all(math.isfinite(one[name]) for one in shown)]
-    alone = [loop.jog is None for loop in loops]
-    place = [n for n in PLACE if any(n in x.place for x in loops)]
-    place = [n for n in place if not all(alone) or any(x.place.get(n) for x in loops)]
+    place = _place_columns(loops)
+    forces = _force_columns(loops)
     conditions = [name for name in CONDITIONS if all(name in loop.conditions for loop in loops)]
     rows = []
     for loop, one, own in zip(loops, figures, shown, strict=True):
-        cells = [loop.place.get(name, "") for name in place]
         force = f"{one.force:.2f}" if math.isfinite(one.force) else ""
+        cells = [loop.place.get(name, "") for name in place]
         cells += [f"{n_per_mm_from_n_per_m(one.stiffness):.1f}"]
-        cells += ([""] if loop.jog is None else [force]) * (not all(alone))
-        cells += ([force] if loop.jog is None else [""]) * any(alone)
+        cells += [force if name == _force_column(loop) else "" for name in forces]
         cells += [f"{loop.conditions[name]:.6g}" for name in conditions]
         cells += [f"{own[name] + 0.0:.3f}" for name in there]
         rows.append(cells)
-    forces = ["force_N"] * (not all(alone)) + ["strut_force_N"] * any(alone)
     return csv_text([*place, "stiffness_N_per_mm", *forces, *conditions, *there], rows)
+
+
+def _place_columns(loops: Sequence[Loop]) -> list[str]:
+    """Columns that say where the loops were; of struts alone those with something in them."""
+    place = [name for name in PLACE if any(name in loop.place for loop in loops)]
+    alone = all(loop.jog is None for loop in loops)
+    return [name for name in place if not alone or any(loop.place.get(name) for loop in loops)]
+
+
+def _force_column(loop: Loop) -> str:
+    """The column of its force: at the tool tip, or along a strut measured alone."""
+    return "strut_force_N" if loop.jog is None else "force_N"
+
+
+def _force_columns(loops: Sequence[Loop]) -> list[str]:
+    return sorted({_force_column(loop) for loop in loops})
 
 
 @dataclass(frozen=True)

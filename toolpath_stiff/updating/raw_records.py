@@ -331,19 +331,7 @@ def _check_heading(heading: list[str], file: str, line: int) -> list[str]:
     """Columns that are not used. Raises `InputError` at the first thing that is wrong."""
     known = (*PLACE, *READINGS, *CONDITIONS, "strut")
     unused = [name for name in heading if name and name not in known]
-    vector = "direction" not in heading
-    angles = ANGLES if any(name in heading for name in ANGLES) else ()
-    asked = (*POSITION, *angles, *(VECTOR if vector else ("direction",)), *READINGS)
-    bench = "strut" in heading or "loop" in heading  # has neither pose nor jog; others say so by record
-    if bench or not any(name in heading for name in (*POSITION, "jog_um")):
-        asked = (*(() if bench else ("strut",)), *READINGS[1:])
-    expected = f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}"
-    for name in asked:
-        if name not in heading:
-            near = next(iter(difflib.get_close_matches(name, unused, n=1, cutoff=0.85)), None)
-            found = "no direction" if vector and name in VECTOR else f"column {name} is missing"
-            hint = f"is it {near!r}?" if near else _to_do(name, unused)
-            raise MeasurementError(found, expected=expected, hint=hint, file=file, line=line)
+    _refuse_missing(heading, unused, file, line)
     for name in heading:
         if heading.count(name) > 1:
             raise MeasurementError(f"column {name} stands twice", file=file, line=line)
@@ -352,9 +340,30 @@ def _check_heading(heading: list[str], file: str, line: int) -> list[str]:
         if near and near not in heading:
             hint = f"did you mean {near}? Otherwise give it another name"
             raise MeasurementError(f"unknown column {name!r}", hint=hint, file=file, line=line)
-    if not vector and any(name in heading for name in VECTOR):
+    if "direction" in heading and any(name in heading for name in VECTOR):
         raise MeasurementError("two directions", expected="direction, or dx,dy,dz", file=file, line=line)
     return unused
+
+
+def _refuse_missing(heading: list[str], unused: list[str], file: str, line: int) -> None:
+    """Raise `InputError` for the first column that is needed and not there."""
+    vector = "direction" not in heading
+    angles = ANGLES if any(name in heading for name in ANGLES) else ()
+    asked = (*POSITION, *angles, *(VECTOR if vector else ("direction",)), *READINGS)
+    bench = "strut" in heading or "loop" in heading  # has neither pose nor jog; others say so by record
+    if bench or not any(name in heading for name in (*POSITION, "jog_um")):
+        asked = (*(() if bench else ("strut",)), *READINGS[1:])
+    name = next((name for name in asked if name not in heading), None)
+    if name is None:
+        return
+    near = next(iter(difflib.get_close_matches(name, unused, n=1, cutoff=0.85)), None)
+    raise MeasurementError(
+        "no direction" if vector and name in VECTOR else f"column {name} is missing",
+        expected=f"x_mm,y_mm,z_mm,direction,{','.join(READINGS)}, or {BENCH}",
+        hint=f"is it {near!r}?" if near else _to_do(name, unused),
+        file=file,
+        line=line,
+    )
 
 
 def _to_do(missing: str, unused: list[str]) -> str:

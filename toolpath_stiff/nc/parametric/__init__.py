@@ -43,6 +43,11 @@ from toolpath_stiff.nc.state import Call, Flow, GoTo, State, Then
 from toolpath_stiff.nc.words import Block, Word, read_lines
 
 MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
+MOST_IDLE = 100_000  # blocks of loops that run without a move between; a program that works out values needs far fewer
+# What a control gathers and no block reads: left out where one pass of a loop is compared with another.
+GATHERED = frozenset(
+    ("recorder", "used_tools", "tip_held", "unsupported", "warnings", "assumptions", "bare", "pointed", "trace")
+) | {"turning"}
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
 SHOWN = 40  # characters of the program in a message
 LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
@@ -96,6 +101,9 @@ class ParametricRun(ProgramRun):
         self._numbers: dict[tuple[int, int], list[int]] | None = None  # N number in a program: lines
         self._counts: list[dict[int, int]] = [{}]  # repeats left, by line, of each call
         self._steps = 0
+        self._passes = 0  # jumps back
+        self._idle = (-1, 0)  # moves at the last jump back after a move, and the blocks that had run by then
+        self._earlier: tuple[list[object], str] | None = None  # the run at an earlier jump back
         self._modal: MacroCall | None = None
         self._at = 0
         self._began = False  # a variable was set, or the flow steered
@@ -182,7 +190,54 @@ class ParametricRun(ProgramRun):
         return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
 
     def _jump(self, at: int, to: int) -> int:
+        if to <= at:
+            self._check_loop(at, to)
         return super()._jump(at, to) if max(at, to) < self._main_lines else to
+
+    def _check_loop(self, at: int, to: int) -> None:
+        """Refuse a loop that cannot end, or makes no move in very many blocks, where it goes back.
+
+        What runs next follows from the run's present state alone: once a state comes again, so does all after it. The
+        state is held against one that is renewed after 2, 4, 8... passes, so that any period is found within about
+        three times its length (Brent, "An improved Monte Carlo factorization algorithm", BIT 20 (1980) 176).
+        """
+        self._passes += 1
+        now = self._values(at)
+        if self._earlier is not None and self._earlier[0] == now and self._earlier[1] == self._modes():
+            raise self._fail(
+                at,
+                f"the loop back to line {self._place(to)[1]} never ends: no variable or position changes in it",
+                "a loop whose condition becomes false",
+            )
+        if self._passes & (self._passes - 1) == 0:
+            self._earlier = now, self._modes()
+        moves = len(self.state.recorder)
+        if moves != self._idle[0]:
+            self._idle = moves, self._steps
+        elif self._steps - self._idle[1] > MOST_IDLE:
+            raise self._fail(
+                at,
+                f"more than {MOST_IDLE:,} blocks of loops without a move, back to line {self._place(to)[1]} each time",
+                "a loop that ends: see whether its condition becomes false",
+            )
+
+    def _values(self, at: int) -> list[object]:
+        """Where the run is, and the numbers that a loop's condition reads."""
+        known = self.variables
+        return [
+            at,
+            [*self.state.frames.position],
+            [(dict(level.numbered), dict(level.named)) for level in known.levels],
+            dict(known.common),
+            dict(known.named),
+            [dict(counts) for counts in self._counts],
+            [(level.first, level.back, level.again) for level in self._levels],
+        ]
+
+    def _modes(self) -> str:
+        """All else that the control keeps, as text: it is large, and rarely compared."""
+        kept = [value for name, value in vars(self.state).items() if name not in GATHERED]
+        return repr((kept, self._modal, self._began))
 
     def _execute(self, block: Block) -> Then:
         try:

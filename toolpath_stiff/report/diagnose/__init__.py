@@ -15,6 +15,7 @@ from toolpath_stiff.report import (
     DEVIATION,
     MINUS_IS_SOFTER,
     bullets,
+    counted,
     hint_list,
     machine_text,
     markup,
@@ -127,7 +128,7 @@ def diagnose_html(document: DiagnosisDocument, pictures: Mapping[str, bytes]) ->
     verdict = str(document.get("verdict") or "-")
     files = ", ".join(str(name) for name in entries(document, "data"))
     readings = figure_of(document, "readings")
-    about = [f"{readings:.0f} readings" if readings is not None else "", files, f"machine {machine_text(document)}"]
+    about = [counted(readings, "reading") if readings is not None else "", files, f"machine {machine_text(document)}"]
     sections = [
         section("Why", bullets(entries(document, "why"))),
         picture("ladder.png", pictures, QUESTIONS),
