@@ -114,7 +114,7 @@ class DateEntry(TypedDict):
 
 
 class StrutEntry(TypedDict):
-    """One strut."""
+    """One strut; `judged_on`: "secant" or "slope beyond the lost motion" of raw records, "" of rows."""
 
     strut: str
     readings: int
@@ -127,6 +127,7 @@ class StrutEntry(TypedDict):
     changes: list[ChangeEntry]
     wild_dates: list[str]
     sides: SidesEntry | None
+    judged_on: str
     text: str
 
 
@@ -442,6 +443,7 @@ def _strut(one: _Series, scale: _Scale, readings: Readings) -> StrutEntry:
         "drift_sd_percent_per_year": 100.0 * error if n > 1 else None,
         "smallest_step_percent": 100.0 * float(np.expm1(least)) if n > 1 else None,
         "dates": dates, "changes": changes, "wild_dates": [readings.text(d) for d in wild], "sides": None,
+        "judged_on": "",
         "text": "; ".join(said),
     }  # fmt: skip
 

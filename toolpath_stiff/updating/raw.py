@@ -42,9 +42,11 @@ from toolpath_stiff.updating.raw_records import (
     CONDITIONS,
     PLACE,
     SAME_JOG,
+    LoadedSlopes,
     Loop,
     Shape,
     is_table,
+    loaded_slopes,
     raw_tables,
     read_raw,
     read_stiffnesses,
@@ -91,7 +93,12 @@ class LoopFigures:
     shape
         Kinks, two slopes, work lost.
     tension, compression
-        N/m, slopes of the two sides of a strut on a bench.
+        N/m, slopes of the two sides of a strut on a bench; beyond the lost motion where there is any.
+    beyond
+        N/m, what the secant of a strut on a bench would be without lost motion: of the loaded branches alone. nan
+        without a closed cycle that reaches both sides.
+    plays
+        Whether the record shows lost motion.
     """
 
     stiffness: float
@@ -104,6 +111,13 @@ class LoopFigures:
     shape: Shape
     tension: float = math.nan
     compression: float = math.nan
+    beyond: float = math.nan
+    plays: bool = False
+
+    @property
+    def elastic(self) -> float:
+        """N/m, the strut's own stiffness: the secant, but the slope beyond lost motion where there is any."""
+        return self.beyond if self.plays else self.stiffness
 
     @property
     def side(self) -> float:
@@ -124,6 +138,7 @@ TENSION = re.compile(
     re.IGNORECASE,
 )
 NO_FIGURES = LoopFigures(*(math.nan,) * 7, Shape())
+BLURRED = "judged on the secant, which its lost motion blurs: not every date has a closed cycle of both sides"
 STEPS = 3.0  # of the indicator, that it misses while it stands still, from which that is told of
 
 
@@ -163,6 +178,9 @@ def reduce_loop(loop: Loop) -> LoopFigures:
     cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
     width = _loop_width(cycle)
     sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width)
+    loaded = _loaded(loop, turns)
+    if loaded.lost_motion:
+        sides = loaded.tension, loaded.compression
     return LoopFigures(
         stiffness=stiffness,
         force=one_side * force if (one_side := side_of(loop)) else force / 2.0,
@@ -174,6 +192,8 @@ def reduce_loop(loop: Loop) -> LoopFigures:
         shape=shape_of(cycle.force, cycle.deflection, _ways(cycle), width),
         tension=sides[0],
         compression=sides[1],
+        beyond=(high - low) / (high / loaded.tension - low / loaded.compression),
+        plays=loaded.lost_motion,
     )
 
 
@@ -230,6 +250,16 @@ def _sides(loop: Loop, turns: list[int], width: float) -> tuple[float, float]:
     sides = sides_of(loop.force, loop.deflection)
     farthest = min(float(loop.force.max()), -float(loop.force.min()))
     return (math.nan, math.nan) if abs(1.0 / sides[0] - 1.0 / sides[1]) * farthest < width else sides
+
+
+def _loaded(loop: Loop, turns: list[int]) -> LoadedSlopes:
+    """The loaded branches of a strut on a bench, of all its closed cycles."""
+    if loop.jog is not None or len(turns) < CLOSED or side_of(loop):
+        return LoadedSlopes(math.nan, math.nan, False)
+    records = closed_cycles(turns)
+    cycles = loop.part(records)
+    way = np.searchsorted(np.array(turns), np.arange(records.start, records.stop), side="right") % 2
+    return loaded_slopes(cycles.force, cycles.deflection, 2.0 * way - 1.0)
 
 
 def _loop_width(loop: Loop) -> float:
@@ -397,10 +427,32 @@ def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDo
             short_dates(loop.place.get(DATE, "") for loop, _, _ in chosen),
         )
 
-    secants = [(loop, one.stiffness, one.side if not len(loop.force) else side_of(loop)) for loop, one in rows]
+    blurred = _blurred(rows)
+    judged = {name: "slope beyond the lost motion" for name, slopes in blurred.items() if slopes}
+    secants = [
+        (
+            loop,
+            one.beyond if loop.place["loop"] in judged else one.stiffness,
+            one.side if not len(loop.force) else side_of(loop),
+        )
+        for loop, one in rows
+    ]
     slopes = [(loop, k, s) for loop, one in rows for k, s in ((one.tension, 1.0), (one.compression, -1.0))]
     slopes = [one for one in slopes if math.isfinite(one[1])]
-    return history(readings(secants), readings(slopes or secants))
+    found = history(readings(secants), readings(slopes or secants))
+    for strut in found["struts"]:
+        name = strut["strut"].split(" alone")[0] + " alone"
+        strut["judged_on"] = judged.get(name, "secant")
+        if name in blurred:
+            so = "judged on the slope beyond its lost motion" if blurred[name] else BLURRED
+            strut["text"] = "; ".join(filter(None, [strut["text"], so]))
+    return found
+
+
+def _blurred(rows: Sequence[tuple[Loop, LoopFigures]]) -> dict[str, bool]:
+    """Struts of which a record shows lost motion: whether all their records give the slope beyond it as well."""
+    names = {loop.place["loop"] for loop, one in rows if one.plays}
+    return {n: all(math.isfinite(one.beyond) for loop, one in rows if loop.place["loop"] == n) for n in sorted(names)}
 
 
 def document(reduction: Reduction) -> list[LoopEntry]:
