@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -34,7 +34,7 @@ from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.tables import Table, heading_key
 from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.dates import Order, day_of, short_dates
-from toolpath_stiff.updating.history import HistoryDocument, Readings, history
+from toolpath_stiff.updating.history import SURE, HistoryDocument, Readings, StrutEntry, history
 from toolpath_stiff.updating.raw_labels import labelled, settled
 from toolpath_stiff.updating.raw_layouts import UNIT_WORDS
 from toolpath_stiff.updating.raw_records import (
@@ -348,7 +348,30 @@ def reduce(
         figures += own
         notes += [*table.notes, *records.notes]
     notes += _stuck(loops, figures)
-    return Reduction(tuple(loops), tuple(figures), tuple(notes), _history(loops, figures))
+    found = _history(loops, figures)
+    return Reduction(tuple(loops), tuple(figures), (*notes, *_to_bear_in_mind(loops, figures, found)), found)
+
+
+def _to_bear_in_mind(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> Iterator[str]:
+    """What stands in the measurement file in place of a secant, and which of its rows are of a strut as it was."""
+    playing = [(loop.title, one) for loop, one in zip(loops, figures, strict=True) if one.plays]
+    if playing:
+        title, one = max(playing, key=lambda pair: pair[1].elastic / pair[1].stiffness)
+        yield (
+            f"{len(playing)} loops show lost motion; their rows hold the slope beyond it, the strut's own stiffness. "
+            f"The secant is at most {100.0 * (1.0 - one.stiffness / one.elastic):.2g} % less: {title}"
+        )
+    both = [one["strut"] for one in history["struts"] if differs(one)]
+    if both:
+        yield f"tension and compression differ: a row of each side for {', '.join(both)}"
+    changed = {one["strut"]: one["changes"][-1]["before"] for one in history["struts"] if one["changes"]}
+    for strut, since in changed.items():
+        yield f"{strut} changed: leave out its rows before {since} for diagnose and update, which take all dates as one"
+
+
+def differs(strut: StrutEntry) -> bool:
+    """Whether a strut is told to differ in tension and compression."""
+    return strut["sides"] is not None and strut["sides"]["p"] < SURE
 
 
 def units_of(text: str) -> dict[str, str]:
@@ -428,6 +451,7 @@ def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDo
         )
 
     blurred = _blurred(rows)
+    recorded = {loop.place["loop"] for loop, _ in rows if len(loop.force)}
     judged = {name: "slope beyond the lost motion" for name, slopes in blurred.items() if slopes}
     secants = [
         (
@@ -442,7 +466,7 @@ def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDo
     found = history(readings(secants), readings(slopes or secants))
     for strut in found["struts"]:
         name = strut["strut"].split(" alone")[0] + " alone"
-        strut["judged_on"] = judged.get(name, "secant")
+        strut["judged_on"] = judged.get(name, "secant" if name in recorded else "")
         if name in blurred:
             so = "judged on the slope beyond its lost motion" if blurred[name] else BLURRED
             strut["text"] = "; ".join(filter(None, [strut["text"], so]))
@@ -463,6 +487,9 @@ def document(reduction: Reduction) -> list[LoopEntry]:
             "stiffness_N_per_mm": n_per_mm_from_n_per_m(one.stiffness),
             "force_N": one.force,
             "deflection_um": um_from_m(one.deflection),
+            "slope_N_per_mm": n_per_mm_from_n_per_m(one.beyond if one.plays else math.nan),
+            "tension_N_per_mm": n_per_mm_from_n_per_m(one.tension),
+            "compression_N_per_mm": n_per_mm_from_n_per_m(one.compression),
             **shop_figures(one),
         }
         shown = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
@@ -493,13 +520,16 @@ class ShapeEntry(TypedDict):
 
 
 class LoopEntry(TypedDict):
-    """A loop as `tps reduce --json` has it."""
+    """A loop as `tps reduce --json` has it; `slope_N_per_mm`: beyond its lost motion, None where it shows none."""
 
     loop: str
     line: int
     stiffness_N_per_mm: float
     force_N: float | None
     deflection_um: float | None
+    slope_N_per_mm: float | None
+    tension_N_per_mm: float | None
+    compression_N_per_mm: float | None
     lost_motion_um: float | None
     loop_width_um: float | None
     linearity_percent: float | None
@@ -530,8 +560,26 @@ def shop_figures(figures: LoopFigures) -> dict[str, float]:
     }
 
 
-def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> str:
-    """A measurement file, one row a loop; a figure that some loop lacks is left out as a column."""
+def _rows_of(reduction: Reduction) -> list[tuple[Loop, LoopFigures]]:
+    """Loops as they stand in a measurement file: struts with their own stiffness, two rows where the sides differ."""
+    sided = {one["strut"] for one in reduction.history["struts"] if differs(one)}
+    found = []
+    for loop, one in zip(reduction.loops, reduction.figures, strict=True):
+        if loop.jog is None and loop.place["loop"] in sided and math.isfinite(one.tension):
+            high, low = float(loop.force.max()), float(loop.force.min())
+            found.append((loop, replace(one, stiffness=one.tension, force=high)))
+            found.append((loop, replace(one, stiffness=one.compression, force=low)))
+        else:
+            found.append((loop, replace(one, stiffness=one.elastic)))
+    return found
+
+
+def measurement_csv(reduction: Reduction) -> str:
+    """A measurement file, one row a loop; of a strut that differs in tension and compression a row of each.
+
+    A figure that some loop lacks is left out as a column.
+    """
+    loops, figures = zip(*_rows_of(reduction), strict=True)
     shown = [shop_figures(one) for one in figures]
     there = [name for name in FIGURES if all(math.isfinite(one[name]) for one in shown)]
     alone = [loop.jog is None for loop in loops]
