@@ -337,7 +337,7 @@ def _changes(day: FloatArray, ln: FloatArray, scale: _Scale, text: DateText) -> 
 
 def _lone(day: FloatArray, ln: FloatArray, scale: _Scale) -> int | None:
     """The date without which nothing is left to tell of, if it lies far from the others."""
-    if len(day) <= SHORT:
+    if len(day) < SHORT:
         return None
     far = np.abs(ln - np.median(ln)) / scale.sd
     i = int(np.argmax(far))

@@ -35,7 +35,7 @@ from toolpath_stiff.tables import Table, heading_key
 from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.dates import Order, day_of, short_dates
 from toolpath_stiff.updating.history import SURE, HistoryDocument, Readings, StrutEntry, history
-from toolpath_stiff.updating.raw_labels import labelled, settled
+from toolpath_stiff.updating.raw_labels import labelled, replaced, serial_number, settled
 from toolpath_stiff.updating.raw_layouts import UNIT_WORDS
 from toolpath_stiff.updating.raw_records import (
     COLUMNS,
@@ -138,6 +138,10 @@ TENSION = re.compile(
     re.IGNORECASE,
 )
 NO_FIGURES = LoopFigures(*(math.nan,) * 7, Shape())
+BEYOND = "slope beyond the lost motion"
+OTHER_SIDE = (
+    1.05  # ratio of two slopes of a loop from which it counts as softer on one side; assumed, twice the scatter
+)
 BLURRED = "judged on the secant, which its lost motion blurs: not every date has a closed cycle of both sides"
 STEPS = 3.0  # of the indicator, that it misses while it stands still, from which that is told of
 
@@ -332,6 +336,7 @@ def reduce(
     loops: list[Loop] = []
     figures: list[LoopFigures] = []
     notes: list[str] = []
+    serials: list[tuple[str, str, str]] = []
     tables = [labelled(table) for table in raw_tables([str(file) for file in raw], COLUMNS, units)]
     for table in settled(tables, date_order):
         if is_table(table):
@@ -346,27 +351,49 @@ def reduce(
             own = reduce_loops(records.loops)
         loops += records.loops
         figures += own
+        serials += [
+            (o.place["loop"], o.place.get(DATE, ""), serial_number(table, o.line))
+            for o in records.loops
+            if o.jog is None
+        ]
         notes += [*table.notes, *records.notes]
-    notes += _stuck(loops, figures)
+    notes += [*_stuck(loops, figures), *replaced(serials)]
     found = _history(loops, figures)
     return Reduction(tuple(loops), tuple(figures), (*notes, *_to_bear_in_mind(loops, figures, found)), found)
 
 
 def _to_bear_in_mind(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> Iterator[str]:
     """What stands in the measurement file in place of a secant, and which of its rows are of a strut as it was."""
-    playing = [(loop.title, one) for loop, one in zip(loops, figures, strict=True) if one.plays]
+    own = {one["strut"] for one in history["struts"] if one["judged_on"] == BEYOND}
+    pairs = zip(loops, figures, strict=True)
+    playing = [(loop.title, one) for loop, one in pairs if one.plays and loop.place["loop"] in own]
     if playing:
         title, one = max(playing, key=lambda pair: pair[1].elastic / pair[1].stiffness)
         yield (
-            f"{len(playing)} loops show lost motion; their rows hold the slope beyond it, the strut's own stiffness. "
-            f"The secant is at most {100.0 * (1.0 - one.stiffness / one.elastic):.2g} % less: {title}"
+            f"{len(playing)} loops show lost motion; the rows of their struts hold the slope beyond it, their own "
+            f"stiffness. The secant is at most {100.0 * (1.0 - one.stiffness / one.elastic):.2g} % less: {title}"
         )
-    both = [one["strut"] for one in history["struts"] if differs(one)]
+    both = sorted(_sided(loops, figures, history))
     if both:
         yield f"tension and compression differ: a row of each side for {', '.join(both)}"
+    for strut, (one, other) in _changing_places(loops, figures).items():
+        yield (
+            f"{strut}: softer in tension on {one}, in compression on {other}: does a file count compression positive? "
+            "Its head may say so (compression positive)"
+        )
     changed = {one["strut"]: one["changes"][-1]["before"] for one in history["struts"] if one["changes"]}
     for strut, since in changed.items():
         yield f"{strut} changed: leave out its rows before {since} for diagnose and update, which take all dates as one"
+
+
+def _changing_places(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> dict[str, tuple[str, str]]:
+    """Struts that are softer in tension on one date and in compression on another: which dates."""
+    softer: dict[str, dict[bool, str]] = {}
+    for loop, one in zip(loops, figures, strict=True):
+        if max(one.tension, one.compression) > OTHER_SIDE * min(one.tension, one.compression):
+            found = softer.setdefault(loop.place["loop"], {})
+            found.setdefault(one.tension < one.compression, loop.place.get(DATE, "") or f"line {loop.line}")
+    return {name: (found[True], found[False]) for name, found in softer.items() if len(found) > 1}
 
 
 def differs(strut: StrutEntry) -> bool:
@@ -452,7 +479,7 @@ def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDo
 
     blurred = _blurred(rows)
     recorded = {loop.place["loop"] for loop, _ in rows if len(loop.force)}
-    judged = {name: "slope beyond the lost motion" for name, slopes in blurred.items() if slopes}
+    judged = {name: BEYOND for name, slopes in blurred.items() if slopes}
     secants = [
         (
             loop,
@@ -562,16 +589,24 @@ def shop_figures(figures: LoopFigures) -> dict[str, float]:
 
 def _rows_of(reduction: Reduction) -> list[tuple[Loop, LoopFigures]]:
     """Loops as they stand in a measurement file: struts with their own stiffness, two rows where the sides differ."""
-    sided = {one["strut"] for one in reduction.history["struts"] if differs(one)}
+    sided = _sided(reduction.loops, reduction.figures, reduction.history)
+    mixed = {one["strut"] for one in reduction.history["struts"] if one["judged_on"] != BEYOND}
     found = []
     for loop, one in zip(reduction.loops, reduction.figures, strict=True):
-        if loop.jog is None and loop.place["loop"] in sided and math.isfinite(one.tension):
+        if loop.place.get("loop") in sided:
             high, low = float(loop.force.max()), float(loop.force.min())
             found.append((loop, replace(one, stiffness=one.tension, force=high)))
             found.append((loop, replace(one, stiffness=one.compression, force=low)))
         else:
-            found.append((loop, replace(one, stiffness=one.elastic)))
+            own = one.stiffness if loop.place.get("loop") in mixed else one.elastic
+            found.append((loop, replace(one, stiffness=own)))
     return found
+
+
+def _sided(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> set[str]:
+    """Struts that differ in tension and compression and whose loops all say so: rows of both would not be alike."""
+    lacking = {loop.place.get("loop") for loop, one in zip(loops, figures, strict=True) if math.isnan(one.tension)}
+    return {one["strut"] for one in history["struts"] if differs(one)} - lacking
 
 
 def measurement_csv(reduction: Reduction) -> str:
