@@ -114,7 +114,7 @@ class DateEntry(TypedDict):
 
 
 class StrutEntry(TypedDict):
-    """One strut; `judged_on`: "secant" or "slope beyond the lost motion" of raw records, "" of rows."""
+    """One strut; `judged_on`: what its dates were compared by, as "secant"; "" of readings that are not raw records."""
 
     strut: str
     readings: int

@@ -142,7 +142,9 @@ BEYOND = "slope beyond the lost motion"
 OTHER_SIDE = (
     1.05  # ratio of two slopes of a loop from which it counts as softer on one side; assumed, twice the scatter
 )
-BLURRED = "judged on the secant, which its lost motion blurs: not every date has a closed cycle of both sides"
+BLURRED = "secant, which its lost motion blurs: not every date has a closed cycle of both sides"
+SECANT, IN_TENSION, IN_COMPRESSION = "secant", "slope in tension", "slope in compression"
+OF_ONE_SIDE = ", which its lost motion blurs in records of one side alone"
 STEPS = 3.0  # of the indicator, that it misses while it stands still, from which that is told of
 
 
@@ -441,20 +443,26 @@ def in_tension(loop: Loop) -> Loop:
     return replace(loop, force=force, displacement=way * loop.displacement)
 
 
+def stuck_at(loop: Loop, figures: LoopFigures) -> tuple[float, float, float] | None:
+    """Where the indicator of a bench stood still while the force went on, as `stands_still`; None where it did not."""
+    if loop.jog is not None or not len(loop.force):
+        return None
+    still = stands_still(loop.force, loop.displacement, turns_of(loop.drive))
+    return still if still and abs(still[2] - still[1]) / figures.stiffness > STEPS * loop.resolution else None
+
+
 def _stuck(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> list[str]:
     """A note where indicators stood still while the force went on."""
-    found = []
-    for loop, one in zip(loops, figures, strict=True):
-        still = None if not len(loop.force) else stands_still(loop.force, loop.displacement, turns_of(loop.drive))
-        if loop.jog is None and still and abs(still[2] - still[1]) / one.stiffness > STEPS * loop.resolution:
-            found.append((loop.title, still))
+    tried = [(loop.title, stuck_at(loop, one)) for loop, one in zip(loops, figures, strict=True)]
+    found = [(title, still) for title, still in tried if still]
     if not found:
         return []
     title, (displacement, start, end) = found[0]
     others = f"; so in {len(found) - 1} further loops" if len(found) > 1 else ""
     return [
         f"{title}: the indicator stands still at {um_from_m(displacement):g} um while the force goes on from "
-        f"{start:.4g} to {end:.4g} N: at the end of its range? The stiffness is too high then{others}"
+        f"{start:.4g} to {end:.4g} N: at the end of its range? The stiffness is too high then, and does not count in "
+        f"the history; leave out its row{others}"
     ]
 
 
@@ -477,33 +485,46 @@ def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDo
             short_dates(loop.place.get(DATE, "") for loop, _, _ in chosen),
         )
 
-    blurred = _blurred(rows)
-    recorded = {loop.place["loop"] for loop, _ in rows if len(loop.force)}
-    judged = {name: BEYOND for name, slopes in blurred.items() if slopes}
-    secants = [
-        (
-            loop,
-            one.beyond if loop.place["loop"] in judged else one.stiffness,
-            one.side if not len(loop.force) else side_of(loop),
-        )
-        for loop, one in rows
-    ]
+    rows = [(loop, one) for loop, one in rows if not stuck_at(loop, one)]
+    judged = {name: _judged(name, rows) for name in lengths}
+    seen = [(loop, *_seen(loop, one, judged[loop.place["loop"]])) for loop, one in rows]
     slopes = [(loop, k, s) for loop, one in rows for k, s in ((one.tension, 1.0), (one.compression, -1.0))]
     slopes = [one for one in slopes if math.isfinite(one[1])]
-    found = history(readings(secants), readings(slopes or secants))
+    found = history(readings(seen), readings(slopes or seen))
     for strut in found["struts"]:
-        name = strut["strut"].split(" alone")[0] + " alone"
-        strut["judged_on"] = judged.get(name, "secant" if name in recorded else "")
-        if name in blurred:
-            so = "judged on the slope beyond its lost motion" if blurred[name] else BLURRED
-            strut["text"] = "; ".join(filter(None, [strut["text"], so]))
+        strut["judged_on"] = judged[strut["strut"].split(" alone")[0] + " alone"]
+        if strut["judged_on"] not in ("", SECANT):
+            strut["text"] = "; ".join(filter(None, [strut["text"], f"judged on the {strut['judged_on']}"]))
     return found
 
 
-def _blurred(rows: Sequence[tuple[Loop, LoopFigures]]) -> dict[str, bool]:
-    """Struts of which a record shows lost motion: whether all their records give the slope beyond it as well."""
-    names = {loop.place["loop"] for loop, one in rows if one.plays}
-    return {n: all(math.isfinite(one.beyond) for loop, one in rows if loop.place["loop"] == n) for n in sorted(names)}
+def _judged(name: str, rows: Sequence[tuple[Loop, LoopFigures]]) -> str:
+    """What all records of a strut can be compared by."""
+    own = [(loop, one) for loop, one in rows if loop.place["loop"] == name]
+    recorded = [(loop, one) for loop, one in own if len(loop.force)]
+    if not recorded:
+        return ""
+    sides = {side_of(loop) for loop, _ in recorded}
+    both = [one for loop, one in recorded if not side_of(loop)]
+    if len(recorded) == len(own):
+        if len(sides) == 2 and 0.0 in sides and all(math.isfinite(one.tension) for one in both):
+            one_side = IN_TENSION if 1.0 in sides else IN_COMPRESSION
+            return one_side + (OF_ONE_SIDE if any(one.plays for one in both) else "")
+        if any(one.plays for one in both) and all(math.isfinite(one.beyond) for _, one in own):
+            return BEYOND
+    return BLURRED if any(one.plays for one in both) else SECANT
+
+
+def _seen(loop: Loop, one: LoopFigures, judged: str) -> tuple[float, float]:
+    """Stiffness in N/m by which a record is compared with others, and the side on which that is."""
+    side = side_of(loop) if len(loop.force) else one.side
+    if judged == BEYOND:
+        return one.beyond, side
+    if judged.startswith(IN_TENSION) and not side:
+        return one.tension, 1.0
+    if judged.startswith(IN_COMPRESSION) and not side:
+        return one.compression, -1.0
+    return one.stiffness, side
 
 
 def document(reduction: Reduction) -> list[LoopEntry]:

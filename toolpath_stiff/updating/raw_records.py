@@ -195,6 +195,7 @@ def read_raw(table: Table) -> RawRecords:
     if not table.rows:
         raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
     groups: dict[tuple[str, ...], list[Record]] = {}
+    names = [name for name in PLACE if name != DATE and (name in table.heading or name == "loop")]
     errors, lost = [], []
     for line, cells in table.rows:
         try:
@@ -208,7 +209,7 @@ def read_raw(table: Table) -> RawRecords:
             continue
         if DATE in record and not record[DATE]:
             errors.append(MeasurementError("no date", expected="one in every record", file=file, line=line))
-        key = (*(record.get(name, "") for name in PLACE if name != DATE), record.get(DATE, "")[:DAY])
+        key = (*(record.get(name, "") for name in names), record.get(DATE, "")[:DAY])
         groups.setdefault(key, []).append((line, record, values))
     if errors:
         raise InputErrors(errors)
