@@ -42,11 +42,11 @@ from toolpath_stiff.updating.raw_records import (
     CONDITIONS,
     PLACE,
     SAME_JOG,
-    LoadedSlopes,
     Loop,
+    Play,
     Shape,
     is_table,
-    loaded_slopes,
+    play_of,
     raw_tables,
     read_raw,
     read_stiffnesses,
@@ -95,7 +95,7 @@ class LoopFigures:
     tension, compression
         N/m, slopes of the two sides of a strut on a bench; beyond the lost motion where there is any.
     beyond
-        N/m, what the secant of a strut on a bench would be without lost motion: of the loaded branches alone. nan
+        N/m, what the secant of a strut on a bench would be without lost motion (`raw_records.play_of`). nan
         without a closed cycle that reaches both sides.
     plays
         Whether the record shows lost motion.
@@ -183,10 +183,11 @@ def reduce_loop(loop: Loop) -> LoopFigures:
         )
     cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
     width = _loop_width(cycle)
-    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width)
-    loaded = _loaded(loop, turns)
-    if loaded.lost_motion:
-        sides = loaded.tension, loaded.compression
+    play = _play(loop, turns)
+    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width, gap=play.shown)
+    beyond = force / (deflection - play.size)
+    if play.shown:
+        sides = _sides_beyond(sides, (high, -low), deflection - play.size)
     return LoopFigures(
         stiffness=stiffness,
         force=one_side * force if (one_side := side_of(loop)) else force / 2.0,
@@ -198,8 +199,8 @@ def reduce_loop(loop: Loop) -> LoopFigures:
         shape=shape_of(cycle.force, cycle.deflection, _ways(cycle), width),
         tension=sides[0],
         compression=sides[1],
-        beyond=(high - low) / (high / loaded.tension - low / loaded.compression),
-        plays=loaded.lost_motion,
+        beyond=beyond,
+        plays=play.shown,
     )
 
 
@@ -248,24 +249,35 @@ def _ways(loop: Loop) -> list[slice]:
     return [slice(one, other + 1) for one, other in pairwise(turns)]
 
 
-def _sides(loop: Loop, turns: list[int], width: float) -> tuple[float, float]:
+def _sides(loop: Loop, turns: list[int], width: float, gap: bool) -> tuple[float, float]:
     """Slopes of the two sides in N/m; nan where they cannot be told from the width of a loop that does not close."""
     if len(turns) >= CLOSED:
         cycles = loop.part(closed_cycles(turns))
-        return sides_of(cycles.force, cycles.deflection, drift=True)
+        return sides_of(cycles.force, cycles.deflection, drift=True, gap=gap)
     sides = sides_of(loop.force, loop.deflection)
     farthest = min(float(loop.force.max()), -float(loop.force.min()))
     return (math.nan, math.nan) if abs(1.0 / sides[0] - 1.0 / sides[1]) * farthest < width else sides
 
 
-def _loaded(loop: Loop, turns: list[int]) -> LoadedSlopes:
-    """The loaded branches of a strut on a bench, of all its closed cycles."""
+def _play(loop: Loop, turns: list[int]) -> Play:
+    """The lost motion of a strut on a bench, of all its closed cycles."""
     if loop.jog is not None or len(turns) < CLOSED or side_of(loop):
-        return LoadedSlopes(math.nan, math.nan, False)
+        return Play(math.nan, False)
     records = closed_cycles(turns)
     cycles = loop.part(records)
     way = np.searchsorted(np.array(turns), np.arange(records.start, records.stop), side="right") % 2
-    return loaded_slopes(cycles.force, cycles.deflection, 2.0 * way - 1.0)
+    return play_of(cycles.force, cycles.deflection, np.where(way == 1, 1.0, -1.0))
+
+
+def _sides_beyond(sides: tuple[float, float], reach: tuple[float, float], deflection: float) -> tuple[float, float]:
+    """Slopes of the two sides in N/m without lost motion, which adds the same to the compliance of both.
+
+    Their difference in compliance is kept; together they give the deflection (m) without it at the forces `reach`.
+    """
+    apart = 1.0 / sides[0] - 1.0 / sides[1]
+    pushed = (deflection - apart * reach[0]) / sum(reach)
+    pulled = pushed + apart
+    return (1.0 / pulled, 1.0 / pushed) if min(pulled, pushed) > 0.0 else (math.nan, math.nan)
 
 
 def _loop_width(loop: Loop) -> float:
@@ -378,9 +390,9 @@ def _to_bear_in_mind(loops: Sequence[Loop], figures: Sequence[LoopFigures], hist
     both = sorted(_sided(loops, figures, history))
     if both:
         yield f"tension and compression differ: a row of each side for {', '.join(both)}"
-    for strut, (one, other) in _changing_places(loops, figures).items():
+    for strut, (pulled, pushed) in _changing_places(loops, figures).items():
         yield (
-            f"{strut}: softer in tension on {one}, in compression on {other}: does a file count compression positive? "
+            f"{strut}: softer in tension on {pulled}, in compression on {pushed}: does a file count compression positive? "
             "Its head may say so (compression positive)"
         )
     changed = {one["strut"]: one["changes"][-1]["before"] for one in history["struts"] if one["changes"]}

@@ -96,7 +96,7 @@ A_SIDE = 3  # records on each side of a kink
 POSITIONS = 4  # of a kink tried between two records
 RESOLUTION = 0.05e-6  # m, rms that no line is believed to fit better than; assumed: half a step of 0.1 um
 SURE = 0.01  # probability below which chance alone is ruled out
-OUTER = 0.5  # of the extreme of a side, from which its branch counts as loaded
+NEARER, FARTHER = 0.15, 0.5  # of an extreme, between which lost motion is read; assumed
 APART = 0.01  # of the deflection: lost motion that is told of; assumed, as much as a bench's two sides differ
 TELLING = 1.15  # ratio of two slopes from which they are told of
 READ = (".csv", ".txt", ".dat", ".asc", ".tsv", ".lvm", ".json", ".xlsx", ".xlsm")  # of a folder
@@ -478,33 +478,33 @@ def shape_of(force: FloatArray, deflection: FloatArray, ways: Sequence[slice], w
     return best
 
 
-def sides_of(force: FloatArray, deflection: FloatArray, drift: bool = False) -> tuple[float, float]:
+def sides_of(force: FloatArray, deflection: FloatArray, drift: bool = False, gap: bool = False) -> tuple[float, float]:
     """Stiffness in N/m under tension (positive force) and under compression; nan without `A_SIDE` records of both.
 
     Slopes of two straight lines that meet at zero force, by least squares over all records; with `drift`, of closed
-    cycles, beside a deflection that goes on steadily from record to record.
+    cycles, beside a deflection that goes on steadily from record to record; with `gap`, beside a jump at zero force.
     """
     if min(len(np.unique(force[force > 0.0])), len(np.unique(force[force < 0.0]))) < A_SIDE:
         return np.nan, np.nan
-    others = [np.ones_like(force)] + [np.arange(len(force), dtype=float)] * drift
+    others = [np.ones_like(force)] + [np.arange(len(force), dtype=float)] * drift + [np.sign(force)] * gap
     pulled, pushed = _left([np.maximum(force, 0.0), np.minimum(force, 0.0)], deflection, others)[1][-2:]
     return (1.0 / float(pulled), 1.0 / float(pushed)) if min(pulled, pushed) > 0.0 else (np.nan, np.nan)
 
 
-class LoadedSlopes(NamedTuple):
-    """Slopes of the loaded branches in N/m, nan without records of both sides, and whether there is lost motion."""
+class Play(NamedTuple):
+    """Lost motion of closed cycles in m, nan without records of both sides, and whether it is more than chance."""
 
-    tension: float
-    compression: float
-    lost_motion: bool
+    size: float
+    shown: bool
 
 
-def loaded_slopes(force: FloatArray, deflection: FloatArray, way: FloatArray) -> LoadedSlopes:
-    """Slopes of the outer half of each side of closed cycles, and whether their lines stand apart at zero force.
+def play_of(force: FloatArray, deflection: FloatArray, way: FloatArray) -> Play:
+    """How far the straight lines of the two sides stand apart at zero force, read just beyond a gap that has closed.
 
-    Friction moves the two ways apart by an even function of the force (Masing 1926): a constant and a square are fitted
-    beside the slopes, and a steady drift. What is left apart at zero force is lost motion: an F test at 1 %, and
-    `APART` of the deflection, as a difference that small does not blur a stiffness.
+    The lines lie between `NEARER` and `FARTHER` of each extreme: closer in a gap may still be open, farther out joints
+    that stick after the turn make both sides stiffer, which looks like a gap. Friction moves the two ways apart by an
+    even function of the force (Masing 1926): a constant and a square are fitted beside the lines, and a steady drift.
+    Shown is what an F test at 1 % finds and what is `APART` of the deflection, as less does not blur a stiffness.
 
     Parameters
     ----------
@@ -512,21 +512,19 @@ def loaded_slopes(force: FloatArray, deflection: FloatArray, way: FloatArray) ->
         (m,) N, tension positive; m; 1 and -1 on successive ways from extreme to extreme.
     """
     high, low = float(force.max()), float(force.min())
-    outer = (force >= OUTER * high) | (force <= OUTER * low)
-    f, y = force[outer], deflection[outer]
-    pulled, pushed = np.maximum(f, 0.0), np.minimum(f, 0.0)
-    if not low < 0.0 < high or min(len(np.unique(f[f > 0.0])), len(np.unique(f[f < 0.0]))) < A_SIDE:
-        return LoadedSlopes(np.nan, np.nan, False)
-    friction = way[outer, None] * np.stack([np.ones_like(f), f**2], axis=1)
-    others = [np.ones_like(f), np.flatnonzero(outer).astype(float), *friction.T]
-    before = _left([pulled, pushed], y, others)[0]
-    after, found = _left([np.sign(f), pulled, pushed], y, others)
-    apart, c, c_pushed = 2.0 * float(found[-3]), float(found[-2]), float(found[-1])
-    if min(c, c_pushed) <= 0.0:
-        return LoadedSlopes(np.nan, np.nan, False)
-    telling = apart >= APART * (c * high - c_pushed * low)
-    shown = telling and _chance(before, after, 1, len(f) - len(others) - 3) < SURE
-    return LoadedSlopes(1.0 / c, 1.0 / c_pushed, shown)
+    share = np.where(force > 0.0, force / high, force / low) if low < 0.0 < high else np.zeros_like(force)
+    inside = (share >= NEARER) & (share <= FARTHER)
+    f, y = force[inside], deflection[inside]
+    if min(len(np.unique(f[f > 0.0])), len(np.unique(f[f < 0.0]))) < A_SIDE:
+        return Play(np.nan, False)
+    lines = [np.maximum(f, 0.0), np.minimum(f, 0.0)]
+    friction = way[inside, None] * np.stack([np.ones_like(f), f**2], axis=1)
+    others = [np.ones_like(f), np.flatnonzero(inside).astype(float), *friction.T]
+    before = _left(lines, y, others)[0]
+    after, found = _left([np.sign(f), *lines], y, others)
+    size = 2.0 * float(found[-3])
+    telling = size >= APART * float(np.ptp(deflection))
+    return Play(size, telling and _chance(before, after, 1, len(f) - len(others) - 3) < SURE)
 
 
 def _averaged(
