@@ -392,8 +392,8 @@ def _to_bear_in_mind(loops: Sequence[Loop], figures: Sequence[LoopFigures], hist
         yield f"tension and compression differ: a row of each side for {', '.join(both)}"
     for strut, (pulled, pushed) in _changing_places(loops, figures).items():
         yield (
-            f"{strut}: softer in tension on {pulled}, in compression on {pushed}: does a file count compression positive? "
-            "Its head may say so (compression positive)"
+            f"{strut}: softer in tension on {pulled}, in compression on {pushed}: does a file count compression "
+            "positive? Its head may say so (compression positive)"
         )
     changed = {one["strut"]: one["changes"][-1]["before"] for one in history["struts"] if one["changes"]}
     for strut, since in changed.items():

@@ -482,11 +482,16 @@ def sides_of(force: FloatArray, deflection: FloatArray, drift: bool = False, gap
     """Stiffness in N/m under tension (positive force) and under compression; nan without `A_SIDE` records of both.
 
     Slopes of two straight lines that meet at zero force, by least squares over all records; with `drift`, of closed
-    cycles, beside a deflection that goes on steadily from record to record; with `gap`, beside a jump at zero force.
+    cycles, beside a deflection that goes on steadily from record to record; with `gap`, of those beyond it, beside a
+    jump at zero force.
     """
     if min(len(np.unique(force[force > 0.0])), len(np.unique(force[force < 0.0]))) < A_SIDE:
         return np.nan, np.nan
-    others = [np.ones_like(force)] + [np.arange(len(force), dtype=float)] * drift + [np.sign(force)] * gap
+    order = np.arange(len(force), dtype=float)
+    if gap:  # nobody knows to which side of it a record within belongs
+        beyond = (force >= NEARER * force.max()) | (force <= NEARER * force.min())
+        force, deflection, order = force[beyond], deflection[beyond], order[beyond]
+    others = [np.ones_like(force)] + [order] * drift + [np.sign(force)] * gap
     pulled, pushed = _left([np.maximum(force, 0.0), np.minimum(force, 0.0)], deflection, others)[1][-2:]
     return (1.0 / float(pulled), 1.0 / float(pushed)) if min(pulled, pushed) > 0.0 else (np.nan, np.nan)
 
