@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import toolpath_stiff as tps
@@ -189,3 +190,99 @@ def test_lost_readings_are_passed_over(reduced):
     found = reduced(written(ramps(2), ramps(2) / K) + "3,2021-03-04,,0\n3,2021-03-04,0,NaN\n")
     assert found.to_dict()["loops"][0]["stiffness_N_per_mm"] == pytest.approx(40_000.0, rel=1e-4)
     assert any("2 records without force or displacement" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2])
+@pytest.mark.parametrize("gap_um", [0.0, 4.0, 10.0])
+def test_lost_motion_does_not_soften_the_strut(reduced, share, gap_um):
+    """A gap beside Masing's friction, which stiffens the outer part of both sides and is no gap."""
+    force = ramps(2)
+    gap = 0.5e-6 * gap_um * np.sign(force)
+    found = reduced(written(force, slips(force, share) + gap)).reduced.figures[0]
+    assert found.plays == (gap_um > 0.0)
+    assert found.elastic == pytest.approx(K, rel=0.01)
+    assert found.stiffness == pytest.approx(2.0 * PEAK / (2.0 * PEAK / K + 1e-6 * gap_um), rel=1e-3)
+
+
+def years(stiffness, gap: float = 0.0, soft: float = 1.0, head: str = "", turned=(), dates=range(2016, 2022)):
+    """Text a date of strut 3 with stiffness(date) N/m in compression and `soft` times that in tension."""
+    force = ramps(2)
+    found = {}
+    for date in dates:
+        k = np.where(force > 0.0, soft, 1.0) * stiffness(date) * (1.0 + 0.001 * (-1.0) ** date)
+        sign = -1.0 if date in turned else 1.0
+        found[date] = head + written(
+            sign * force, sign * (slips(k[0] * force / k) * K / k[0] + 0.5 * gap * np.sign(force))
+        )
+        found[date] = found[date].replace("2021-03-04", f"{date}-03-04")
+    return found
+
+
+@pytest.fixture
+def over_years(tmp_path):
+    def reduce(texts):
+        for date, text in texts.items():
+            (tmp_path / f"{date}.csv").write_text(text, encoding="utf-8")
+        return tps.reduce(tmp_path)
+
+    return reduce
+
+
+def test_a_change_is_told_in_full_beside_lost_motion(over_years):
+    """15 % softer from 2019 on; of the secant with 10 um of play it is 12 %."""
+    found = over_years(years(lambda date: K * (1.0 if date < 2019 else 0.85), gap=10e-6)).to_dict()["history"]
+    (strut,) = found["struts"]
+    assert strut["judged_on"] == "slope beyond the lost motion"
+    assert strut["changes"][0]["change_percent"] == pytest.approx(-15.0, abs=0.3)
+
+
+def test_both_sides_go_on_to_the_measurement_file(over_years, tmp_path):
+    found = over_years(years(lambda date: K, gap=6e-6, soft=0.8))
+    (file,) = (Path(name) for name in found.save(tmp_path / "rows_measurements.csv", plots=False))
+    rows = pd.read_csv(file)
+    assert len(rows) == 12 and sorted(np.sign(rows["strut_force_N"]).unique()) == [-1.0, 1.0]
+    read = rows.groupby(np.sign(rows["strut_force_N"]))["stiffness_N_per_mm"].mean()
+    assert read[-1.0] / read[1.0] == pytest.approx(1.25, rel=0.02)
+
+
+def test_sides_that_change_places_are_asked_about(over_years):
+    found = over_years(years(lambda date: K, soft=0.8, turned=(2020, 2021)))
+    assert any("softer in tension on 2016-03-04, in compression on 2020-03-04" in note for note in found.notes)
+    said = years(lambda date: K, soft=0.8, turned=(2020, 2021))
+    for date in (2020, 2021):
+        said[date] = "Compression positive\n" + said[date]
+    found = over_years(said)
+    assert not any("does a file count" in note for note in found.notes)
+    assert found.to_dict()["history"]["struts"][0]["sides"]["difference_percent"] == pytest.approx(-20.0, abs=1.0)
+
+
+def test_another_serial_number_is_told(over_years):
+    texts = years(lambda date: K)
+    texts = {date: f"Serial no.: SN-{7 if date < 2019 else 8}\n{text}" for date, text in texts.items()}
+    notes = over_years(texts).notes
+    assert [note for note in notes if "serial" in note] == [
+        "strut 3 alone: serial number SN-7 until 2018-03-04, SN-8 from 2019-03-04: another part, so that a change "
+        "between these dates is its replacement"
+    ]
+
+
+def test_the_last_of_four_dates_is_no_drift(over_years):
+    found = over_years(years(lambda date: K * (1.0 if date < 2019 else 0.85), dates=range(2016, 2020)))
+    (strut,) = found.to_dict()["history"]["struts"]
+    assert not strut["changes"] and strut["wild_dates"] == ["2019-03-04"]
+
+
+def test_a_strut_pulled_alone_in_one_year_is_compared_in_tension(over_years):
+    texts = years(lambda date: K, soft=0.8)
+    lines = texts[2021].splitlines()
+    texts[2021] = "\n".join([lines[0], *(line for line in lines[1:] if float(line.split(",")[2]) >= 0.0)])
+    (strut,) = over_years(texts).to_dict()["history"]["struts"]
+    assert strut["judged_on"] == "slope in tension" and not strut["changes"] and not strut["wild_dates"]
+
+
+def test_a_folder_names_its_measurement_file(tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    (folder / "a.csv").write_text(written(ramps(1), ramps(1) / K), encoding="utf-8")
+    monkeypatch.chdir(folder)
+    assert main(["reduce", ".", "--no-plots"]) == 0 and (folder / "bench_measurements.csv").exists()

@@ -189,7 +189,9 @@ def reduce(args: argparse.Namespace) -> int:
     found = reduce(
         *args.raw, date_order=args.date_order, units=args.units, compression_positive=args.compression_positive
     )
-    out = Path(args.out or f"{Path(split_name(args.raw[0])[0]).stem}_measurements.csv")
+    first = Path(split_name(args.raw[0])[0])
+    name = first.stem if first.is_file() else first.resolve().name
+    out = Path(args.out or f"{name or 'raw'}_measurements.csv")
     files = found.files(out, plots=not args.no_plots)
     keep(check_made(args, files), quiet=args.json)
     written = [str(write_atomically(name, content)) for name, content in files.items()]

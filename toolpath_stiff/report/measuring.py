@@ -308,7 +308,7 @@ def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str)
 
 def loop_files(reduction: Reduction, out: Path, title: str, *, plots: bool = True) -> dict[Path, Content]:
     """The measurement file, and with `plots` the loops drawn under `title`; dated struts over their dates."""
-    contents: dict[Path, Content] = {out: measurement_csv(reduction.loops, reduction.figures)}
+    contents: dict[Path, Content] = {out: measurement_csv(reduction)}
     recorded = [i for i, loop in enumerate(reduction.loops) if len(loop.force)]
     if plots:
         if recorded:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -93,6 +94,7 @@ def order_of(text: str | None) -> Order | None:
     return None
 
 
+@lru_cache(maxsize=1024)  # asked of every record
 def day_of(text: str) -> float:
     """Days since 1970-01-01, nan of an empty cell; a time with a zone in UTC, one without as it stands.
 

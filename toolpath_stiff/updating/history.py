@@ -114,7 +114,7 @@ class DateEntry(TypedDict):
 
 
 class StrutEntry(TypedDict):
-    """One strut."""
+    """One strut; `judged_on`: what its dates were compared by, as "secant"; "" of readings that are not raw records."""
 
     strut: str
     readings: int
@@ -127,6 +127,7 @@ class StrutEntry(TypedDict):
     changes: list[ChangeEntry]
     wild_dates: list[str]
     sides: SidesEntry | None
+    judged_on: str
     text: str
 
 
@@ -336,7 +337,7 @@ def _changes(day: FloatArray, ln: FloatArray, scale: _Scale, text: DateText) -> 
 
 def _lone(day: FloatArray, ln: FloatArray, scale: _Scale) -> int | None:
     """The date without which nothing is left to tell of, if it lies far from the others."""
-    if len(day) <= SHORT:
+    if len(day) < SHORT:
         return None
     far = np.abs(ln - np.median(ln)) / scale.sd
     i = int(np.argmax(far))
@@ -442,6 +443,7 @@ def _strut(one: _Series, scale: _Scale, readings: Readings) -> StrutEntry:
         "drift_sd_percent_per_year": 100.0 * error if n > 1 else None,
         "smallest_step_percent": 100.0 * float(np.expm1(least)) if n > 1 else None,
         "dates": dates, "changes": changes, "wild_dates": [readings.text(d) for d in wild], "sides": None,
+        "judged_on": "",
         "text": "; ".join(said),
     }  # fmt: skip
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -34,8 +34,8 @@ from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.tables import Table, heading_key
 from toolpath_stiff.units import certain, n_per_mm_from_n_per_m, um_from_m
 from toolpath_stiff.updating.dates import Order, day_of, short_dates
-from toolpath_stiff.updating.history import HistoryDocument, Readings, history
-from toolpath_stiff.updating.raw_labels import labelled, settled
+from toolpath_stiff.updating.history import SURE, HistoryDocument, Readings, StrutEntry, history
+from toolpath_stiff.updating.raw_labels import labelled, replaced, serial_number, settled
 from toolpath_stiff.updating.raw_layouts import UNIT_WORDS
 from toolpath_stiff.updating.raw_records import (
     COLUMNS,
@@ -43,8 +43,10 @@ from toolpath_stiff.updating.raw_records import (
     PLACE,
     SAME_JOG,
     Loop,
+    Play,
     Shape,
     is_table,
+    play_of,
     raw_tables,
     read_raw,
     read_stiffnesses,
@@ -91,7 +93,12 @@ class LoopFigures:
     shape
         Kinks, two slopes, work lost.
     tension, compression
-        N/m, slopes of the two sides of a strut on a bench.
+        N/m, slopes of the two sides of a strut on a bench; beyond the lost motion where there is any.
+    beyond
+        N/m, what the secant of a strut on a bench would be without lost motion (`raw_records.play_of`). nan
+        without a closed cycle that reaches both sides.
+    plays
+        Whether the record shows lost motion.
     """
 
     stiffness: float
@@ -104,6 +111,13 @@ class LoopFigures:
     shape: Shape
     tension: float = math.nan
     compression: float = math.nan
+    beyond: float = math.nan
+    plays: bool = False
+
+    @property
+    def elastic(self) -> float:
+        """N/m, the strut's own stiffness: the secant, but the slope beyond lost motion where there is any."""
+        return self.beyond if self.plays else self.stiffness
 
     @property
     def side(self) -> float:
@@ -124,6 +138,13 @@ TENSION = re.compile(
     re.IGNORECASE,
 )
 NO_FIGURES = LoopFigures(*(math.nan,) * 7, Shape())
+BEYOND = "slope beyond the lost motion"
+OTHER_SIDE = (
+    1.05  # ratio of two slopes of a loop from which it counts as softer on one side; assumed, twice the scatter
+)
+BLURRED = "secant, which its lost motion blurs: not every date has a closed cycle of both sides"
+SECANT, IN_TENSION, IN_COMPRESSION = "secant", "slope in tension", "slope in compression"
+OF_ONE_SIDE = ", which its lost motion blurs in records of one side alone"
 STEPS = 3.0  # of the indicator, that it misses while it stands still, from which that is told of
 
 
@@ -162,7 +183,11 @@ def reduce_loop(loop: Loop) -> LoopFigures:
         )
     cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
     width = _loop_width(cycle)
-    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width)
+    play = _play(loop, turns)
+    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width, gap=play.shown)
+    beyond = force / (deflection - play.size)
+    if play.shown:
+        sides = _sides_beyond(sides, (high, -low), deflection - play.size)
     return LoopFigures(
         stiffness=stiffness,
         force=one_side * force if (one_side := side_of(loop)) else force / 2.0,
@@ -174,6 +199,8 @@ def reduce_loop(loop: Loop) -> LoopFigures:
         shape=shape_of(cycle.force, cycle.deflection, _ways(cycle), width),
         tension=sides[0],
         compression=sides[1],
+        beyond=beyond,
+        plays=play.shown,
     )
 
 
@@ -222,14 +249,35 @@ def _ways(loop: Loop) -> list[slice]:
     return [slice(one, other + 1) for one, other in pairwise(turns)]
 
 
-def _sides(loop: Loop, turns: list[int], width: float) -> tuple[float, float]:
+def _sides(loop: Loop, turns: list[int], width: float, gap: bool) -> tuple[float, float]:
     """Slopes of the two sides in N/m; nan where they cannot be told from the width of a loop that does not close."""
     if len(turns) >= CLOSED:
         cycles = loop.part(closed_cycles(turns))
-        return sides_of(cycles.force, cycles.deflection, drift=True)
+        return sides_of(cycles.force, cycles.deflection, drift=True, gap=gap)
     sides = sides_of(loop.force, loop.deflection)
     farthest = min(float(loop.force.max()), -float(loop.force.min()))
     return (math.nan, math.nan) if abs(1.0 / sides[0] - 1.0 / sides[1]) * farthest < width else sides
+
+
+def _play(loop: Loop, turns: list[int]) -> Play:
+    """The lost motion of a strut on a bench, of all its closed cycles."""
+    if loop.jog is not None or len(turns) < CLOSED or side_of(loop):
+        return Play(math.nan, False)
+    records = closed_cycles(turns)
+    cycles = loop.part(records)
+    way = np.searchsorted(np.array(turns), np.arange(records.start, records.stop), side="right") % 2
+    return play_of(cycles.force, cycles.deflection, np.where(way == 1, 1.0, -1.0))
+
+
+def _sides_beyond(sides: tuple[float, float], reach: tuple[float, float], deflection: float) -> tuple[float, float]:
+    """Slopes of the two sides in N/m without lost motion, which adds the same to the compliance of both.
+
+    Their difference in compliance is kept; together they give the deflection (m) without it at the forces `reach`.
+    """
+    apart = 1.0 / sides[0] - 1.0 / sides[1]
+    pushed = (deflection - apart * reach[0]) / sum(reach)
+    pulled = pushed + apart
+    return (1.0 / pulled, 1.0 / pushed) if min(pulled, pushed) > 0.0 else (math.nan, math.nan)
 
 
 def _loop_width(loop: Loop) -> float:
@@ -302,6 +350,7 @@ def reduce(
     loops: list[Loop] = []
     figures: list[LoopFigures] = []
     notes: list[str] = []
+    serials: list[tuple[str, str, str]] = []
     tables = [labelled(table) for table in raw_tables([str(file) for file in raw], COLUMNS, units)]
     for table in settled(tables, date_order):
         if is_table(table):
@@ -316,9 +365,54 @@ def reduce(
             own = reduce_loops(records.loops)
         loops += records.loops
         figures += own
+        serials += [
+            (o.place["loop"], o.place.get(DATE, ""), serial_number(table, o.line))
+            for o in records.loops
+            if o.jog is None
+        ]
         notes += [*table.notes, *records.notes]
-    notes += _stuck(loops, figures)
-    return Reduction(tuple(loops), tuple(figures), tuple(notes), _history(loops, figures))
+    notes += [*_stuck(loops, figures), *replaced(serials)]
+    found = _history(loops, figures)
+    return Reduction(tuple(loops), tuple(figures), (*notes, *_to_bear_in_mind(loops, figures, found)), found)
+
+
+def _to_bear_in_mind(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> Iterator[str]:
+    """What stands in the measurement file in place of a secant, and which of its rows are of a strut as it was."""
+    own = {one["strut"] for one in history["struts"] if one["judged_on"] == BEYOND}
+    pairs = zip(loops, figures, strict=True)
+    playing = [(loop.title, one) for loop, one in pairs if one.plays and loop.place["loop"] in own]
+    if playing:
+        title, one = max(playing, key=lambda pair: pair[1].elastic / pair[1].stiffness)
+        yield (
+            f"{len(playing)} loops show lost motion; the rows of their struts hold the slope beyond it, their own "
+            f"stiffness. The secant is at most {100.0 * (1.0 - one.stiffness / one.elastic):.2g} % less: {title}"
+        )
+    both = sorted(_sided(loops, figures, history))
+    if both:
+        yield f"tension and compression differ: a row of each side for {', '.join(both)}"
+    for strut, (pulled, pushed) in _changing_places(loops, figures).items():
+        yield (
+            f"{strut}: softer in tension on {pulled}, in compression on {pushed}: does a file count compression "
+            "positive? Its head may say so (compression positive)"
+        )
+    changed = {one["strut"]: one["changes"][-1]["before"] for one in history["struts"] if one["changes"]}
+    for strut, since in changed.items():
+        yield f"{strut} changed: leave out its rows before {since} for diagnose and update, which take all dates as one"
+
+
+def _changing_places(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> dict[str, tuple[str, str]]:
+    """Struts that are softer in tension on one date and in compression on another: which dates."""
+    softer: dict[str, dict[bool, str]] = {}
+    for loop, one in zip(loops, figures, strict=True):
+        if max(one.tension, one.compression) > OTHER_SIDE * min(one.tension, one.compression):
+            found = softer.setdefault(loop.place["loop"], {})
+            found.setdefault(one.tension < one.compression, loop.place.get(DATE, "") or f"line {loop.line}")
+    return {name: (found[True], found[False]) for name, found in softer.items() if len(found) > 1}
+
+
+def differs(strut: StrutEntry) -> bool:
+    """Whether a strut is told to differ in tension and compression."""
+    return strut["sides"] is not None and strut["sides"]["p"] < SURE
 
 
 def units_of(text: str) -> dict[str, str]:
@@ -361,20 +455,26 @@ def in_tension(loop: Loop) -> Loop:
     return replace(loop, force=force, displacement=way * loop.displacement)
 
 
+def stuck_at(loop: Loop, figures: LoopFigures) -> tuple[float, float, float] | None:
+    """Where the indicator of a bench stood still while the force went on, as `stands_still`; None where it did not."""
+    if loop.jog is not None or not len(loop.force):
+        return None
+    still = stands_still(loop.force, loop.displacement, turns_of(loop.drive))
+    return still if still and abs(still[2] - still[1]) / figures.stiffness > STEPS * loop.resolution else None
+
+
 def _stuck(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> list[str]:
     """A note where indicators stood still while the force went on."""
-    found = []
-    for loop, one in zip(loops, figures, strict=True):
-        still = None if not len(loop.force) else stands_still(loop.force, loop.displacement, turns_of(loop.drive))
-        if loop.jog is None and still and abs(still[2] - still[1]) / one.stiffness > STEPS * loop.resolution:
-            found.append((loop.title, still))
+    tried = [(loop.title, stuck_at(loop, one)) for loop, one in zip(loops, figures, strict=True)]
+    found = [(title, still) for title, still in tried if still]
     if not found:
         return []
     title, (displacement, start, end) = found[0]
     others = f"; so in {len(found) - 1} further loops" if len(found) > 1 else ""
     return [
         f"{title}: the indicator stands still at {um_from_m(displacement):g} um while the force goes on from "
-        f"{start:.4g} to {end:.4g} N: at the end of its range? The stiffness is too high then{others}"
+        f"{start:.4g} to {end:.4g} N: at the end of its range? The stiffness is too high then, and does not count in "
+        f"the history; leave out its row{others}"
     ]
 
 
@@ -397,10 +497,46 @@ def _history(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> HistoryDo
             short_dates(loop.place.get(DATE, "") for loop, _, _ in chosen),
         )
 
-    secants = [(loop, one.stiffness, one.side if not len(loop.force) else side_of(loop)) for loop, one in rows]
+    rows = [(loop, one) for loop, one in rows if not stuck_at(loop, one)]
+    judged = {name: _judged(name, rows) for name in lengths}
+    seen = [(loop, *_seen(loop, one, judged[loop.place["loop"]])) for loop, one in rows]
     slopes = [(loop, k, s) for loop, one in rows for k, s in ((one.tension, 1.0), (one.compression, -1.0))]
     slopes = [one for one in slopes if math.isfinite(one[1])]
-    return history(readings(secants), readings(slopes or secants))
+    found = history(readings(seen), readings(slopes or seen))
+    for strut in found["struts"]:
+        strut["judged_on"] = judged[strut["strut"].split(" alone")[0] + " alone"]
+        if strut["judged_on"] not in ("", SECANT):
+            strut["text"] = "; ".join(filter(None, [strut["text"], f"judged on the {strut['judged_on']}"]))
+    return found
+
+
+def _judged(name: str, rows: Sequence[tuple[Loop, LoopFigures]]) -> str:
+    """What all records of a strut can be compared by."""
+    own = [(loop, one) for loop, one in rows if loop.place["loop"] == name]
+    recorded = [(loop, one) for loop, one in own if len(loop.force)]
+    if not recorded:
+        return ""
+    sides = {side_of(loop) for loop, _ in recorded}
+    both = [one for loop, one in recorded if not side_of(loop)]
+    if len(recorded) == len(own):
+        if len(sides) == 2 and 0.0 in sides and all(math.isfinite(one.tension) for one in both):
+            one_side = IN_TENSION if 1.0 in sides else IN_COMPRESSION
+            return one_side + (OF_ONE_SIDE if any(one.plays for one in both) else "")
+        if any(one.plays for one in both) and all(math.isfinite(one.beyond) for _, one in own):
+            return BEYOND
+    return BLURRED if any(one.plays for one in both) else SECANT
+
+
+def _seen(loop: Loop, one: LoopFigures, judged: str) -> tuple[float, float]:
+    """Stiffness in N/m by which a record is compared with others, and the side on which that is."""
+    side = side_of(loop) if len(loop.force) else one.side
+    if judged == BEYOND:
+        return one.beyond, side
+    if judged.startswith(IN_TENSION) and not side:
+        return one.tension, 1.0
+    if judged.startswith(IN_COMPRESSION) and not side:
+        return one.compression, -1.0
+    return one.stiffness, side
 
 
 def document(reduction: Reduction) -> list[LoopEntry]:
@@ -411,6 +547,9 @@ def document(reduction: Reduction) -> list[LoopEntry]:
             "stiffness_N_per_mm": n_per_mm_from_n_per_m(one.stiffness),
             "force_N": one.force,
             "deflection_um": um_from_m(one.deflection),
+            "slope_N_per_mm": n_per_mm_from_n_per_m(one.beyond if one.plays else math.nan),
+            "tension_N_per_mm": n_per_mm_from_n_per_m(one.tension),
+            "compression_N_per_mm": n_per_mm_from_n_per_m(one.compression),
             **shop_figures(one),
         }
         shown = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
@@ -441,13 +580,16 @@ class ShapeEntry(TypedDict):
 
 
 class LoopEntry(TypedDict):
-    """A loop as `tps reduce --json` has it."""
+    """A loop as `tps reduce --json` has it; `slope_N_per_mm`: beyond its lost motion, None where it shows none."""
 
     loop: str
     line: int
     stiffness_N_per_mm: float
     force_N: float | None
     deflection_um: float | None
+    slope_N_per_mm: float | None
+    tension_N_per_mm: float | None
+    compression_N_per_mm: float | None
     lost_motion_um: float | None
     loop_width_um: float | None
     linearity_percent: float | None
@@ -478,8 +620,34 @@ def shop_figures(figures: LoopFigures) -> dict[str, float]:
     }
 
 
-def measurement_csv(loops: Sequence[Loop], figures: Sequence[LoopFigures]) -> str:
-    """A measurement file, one row a loop; a figure that some loop lacks is left out as a column."""
+def _rows_of(reduction: Reduction) -> list[tuple[Loop, LoopFigures]]:
+    """Loops as they stand in a measurement file: struts with their own stiffness, two rows where the sides differ."""
+    sided = _sided(reduction.loops, reduction.figures, reduction.history)
+    mixed = {one["strut"] for one in reduction.history["struts"] if one["judged_on"] != BEYOND}
+    found = []
+    for loop, one in zip(reduction.loops, reduction.figures, strict=True):
+        if loop.place.get("loop") in sided:
+            high, low = float(loop.force.max()), float(loop.force.min())
+            found.append((loop, replace(one, stiffness=one.tension, force=high)))
+            found.append((loop, replace(one, stiffness=one.compression, force=low)))
+        else:
+            own = one.stiffness if loop.place.get("loop") in mixed else one.elastic
+            found.append((loop, replace(one, stiffness=own)))
+    return found
+
+
+def _sided(loops: Sequence[Loop], figures: Sequence[LoopFigures], history: HistoryDocument) -> set[str]:
+    """Struts that differ in tension and compression and whose loops all say so: rows of both would not be alike."""
+    lacking = {loop.place.get("loop") for loop, one in zip(loops, figures, strict=True) if math.isnan(one.tension)}
+    return {one["strut"] for one in history["struts"] if differs(one)} - lacking
+
+
+def measurement_csv(reduction: Reduction) -> str:
+    """A measurement file, one row a loop; of a strut that differs in tension and compression a row of each.
+
+    A figure that some loop lacks is left out as a column.
+    """
+    loops, figures = zip(*_rows_of(reduction), strict=True)
     shown = [shop_figures(one) for one in figures]
     there = [name for name in FIGURES if all(math.isfinite(one[name]) for one in shown)]
     place = _place_columns(loops)

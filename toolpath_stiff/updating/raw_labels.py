@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, MeasurementError
 from toolpath_stiff.tables import BETWEEN_COMMAS, Table, split_name
-from toolpath_stiff.updating.dates import Order, dates_in, finer, read_dates
+from toolpath_stiff.updating.dates import Order, dates_in, day_of, finer, read_dates
 from toolpath_stiff.updating.rows import DATE, POSITION, with_cells, with_dates
 
 WORDS = ("strut", "leg", "actuator", "limb", "ram", "stab", "bein", "strebe")
@@ -22,6 +23,9 @@ KEYED_DATE = re.compile(
     r"(?:test |measuring |measurement )?dat(?:e|um)(?: of (?:the )?(?:test|measurement))?|(?:measured|tested)(?: on)?"
     r"|prüfdatum|messdatum|year|jahr|date ?(?:/|and) ?time",
     re.IGNORECASE,
+)
+SERIAL = re.compile(
+    r"(?:(?:strut|leg|actuator) )?(?:serial(?: ?(?:no|nr|number|#)\.?)?|s/n|sn|serien(?:nummer|-?nr\.?))", re.IGNORECASE
 )
 ORDER_HINT = "say --date-order dmy (day first) or mdy (date_order=), or write the dates as YYYY-MM-DD"
 ZERO_BASED, ONE_BASED = "0", "6"
@@ -80,6 +84,33 @@ def labelled(table: Table) -> Table:
             )
     rows = tuple((line, (*cells, *found.values())) for line, cells in table.rows)
     return replace(table, heading=(*table.heading, *found), rows=rows, notes=(*table.notes, *notes))
+
+
+def serial_number(table: Table, line: int) -> str:
+    """The serial number that a record's own cells, or else the head, state; "" where neither does."""
+    for i, name in enumerate(table.heading):
+        if SERIAL.fullmatch(name.replace("_", " ").strip()):
+            return next((cells[i].strip() for n, cells in table.rows if n == line and i < len(cells)), "")
+    for _, cells in table.above:
+        for i, cell in enumerate(cells):
+            key, _, value = cell.partition(":")
+            if SERIAL.fullmatch(key.replace("_", " ").strip()):
+                return value.strip() or next((c.strip() for c in cells[i + 1 :] if c.strip()), "")
+    return ""
+
+
+def replaced(found: Sequence[tuple[str, str, str]]) -> list[str]:
+    """Notes where a strut's serial number changes: strut, date and serial number of every record."""
+    notes = []
+    for strut in sorted({name for name, _, _ in found}):
+        own = sorted((day_of(date), date, number) for name, date, number in found if name == strut and number)
+        for (_, last, before), (_, first, after) in pairwise(own):
+            if before != after:
+                notes.append(
+                    f"{strut}: serial number {before} until {last or '?'}, {after} from {first or '?'}: another part, "
+                    "so that a change between these dates is its replacement"
+                )
+    return notes
 
 
 def _distinct(values: list[str], dated: bool) -> list[str]:

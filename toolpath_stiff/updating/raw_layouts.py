@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
+from functools import cached_property
 from typing import NamedTuple
 
 from toolpath_stiff.errors import TableError
@@ -106,7 +107,7 @@ class _Layout:
     groups: Mapping[tuple[str, str], Mapping[str, list[int]]]
     shared: Mapping[str, list[int]]
 
-    @property
+    @cached_property
     def data(self) -> list[int]:
         """Columns of forces, displacements, stiffnesses."""
         return [i for i, head in enumerate(self.heads) if head.quantity in OWN_UNIT]

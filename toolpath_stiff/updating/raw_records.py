@@ -96,6 +96,8 @@ A_SIDE = 3  # records on each side of a kink
 POSITIONS = 4  # of a kink tried between two records
 RESOLUTION = 0.05e-6  # m, rms that no line is believed to fit better than; assumed: half a step of 0.1 um
 SURE = 0.01  # probability below which chance alone is ruled out
+NEARER, FARTHER = 0.15, 0.5  # of an extreme, between which lost motion is read; assumed
+APART = 0.01  # of the deflection: lost motion that is told of; assumed, as much as a bench's two sides differ
 TELLING = 1.15  # ratio of two slopes from which they are told of
 READ = (".csv", ".txt", ".dat", ".asc", ".tsv", ".lvm", ".json", ".xlsx", ".xlsm")  # of a folder
 OWN_OUTPUT = "_measurements.csv"
@@ -193,6 +195,7 @@ def read_raw(table: Table) -> RawRecords:
     if not table.rows:
         raise MeasurementError("no records below the heading", file=file, line=table.heading_line)
     groups: dict[tuple[str, ...], list[Record]] = {}
+    names = [name for name in PLACE if name != DATE and (name in table.heading or name == "loop")]
     errors, lost = [], []
     for line, cells in table.rows:
         try:
@@ -206,7 +209,7 @@ def read_raw(table: Table) -> RawRecords:
             continue
         if DATE in record and not record[DATE]:
             errors.append(MeasurementError("no date", expected="one in every record", file=file, line=line))
-        key = (*(record.get(name, "") for name in PLACE if name != DATE), record.get(DATE, "")[:DAY])
+        key = (*(record.get(name, "") for name in names), record.get(DATE, "")[:DAY])
         groups.setdefault(key, []).append((line, record, values))
     if errors:
         raise InputErrors(errors)
@@ -484,17 +487,58 @@ def shape_of(force: FloatArray, deflection: FloatArray, ways: Sequence[slice], w
     return best
 
 
-def sides_of(force: FloatArray, deflection: FloatArray, drift: bool = False) -> tuple[float, float]:
+def sides_of(force: FloatArray, deflection: FloatArray, drift: bool = False, gap: bool = False) -> tuple[float, float]:
     """Stiffness in N/m under tension (positive force) and under compression; nan without `A_SIDE` records of both.
 
     Slopes of two straight lines that meet at zero force, by least squares over all records; with `drift`, of closed
-    cycles, beside a deflection that goes on steadily from record to record.
+    cycles, beside a deflection that goes on steadily from record to record; with `gap`, of those beyond it, beside a
+    jump at zero force.
     """
     if min(len(np.unique(force[force > 0.0])), len(np.unique(force[force < 0.0]))) < A_SIDE:
         return np.nan, np.nan
-    others = [np.ones_like(force)] + [np.arange(len(force), dtype=float)] * drift
+    order = np.arange(len(force), dtype=float)
+    if gap:  # nobody knows to which side of it a record within belongs
+        beyond = (force >= NEARER * force.max()) | (force <= NEARER * force.min())
+        force, deflection, order = force[beyond], deflection[beyond], order[beyond]
+    others = [np.ones_like(force)] + [order] * drift + [np.sign(force)] * gap
     pulled, pushed = _left([np.maximum(force, 0.0), np.minimum(force, 0.0)], deflection, others)[1][-2:]
     return (1.0 / float(pulled), 1.0 / float(pushed)) if min(pulled, pushed) > 0.0 else (np.nan, np.nan)
+
+
+class Play(NamedTuple):
+    """Lost motion of closed cycles in m, nan without records of both sides, and whether it is more than chance."""
+
+    size: float
+    shown: bool
+
+
+def play_of(force: FloatArray, deflection: FloatArray, way: FloatArray) -> Play:
+    """How far the straight lines of the two sides stand apart at zero force, read just beyond a gap that has closed.
+
+    The lines lie between `NEARER` and `FARTHER` of each extreme: closer in a gap may still be open, farther out joints
+    that stick after the turn make both sides stiffer, which looks like a gap. Friction moves the two ways apart by an
+    even function of the force (Masing 1926): a constant and a square are fitted beside the lines, and a steady drift.
+    Shown is what an F test at 1 % finds and what is `APART` of the deflection, as less does not blur a stiffness.
+
+    Parameters
+    ----------
+    force, deflection, way
+        (m,) N, tension positive; m; 1 and -1 on successive ways from extreme to extreme.
+    """
+    high, low = float(force.max()), float(force.min())
+    share = np.where(force > 0.0, force / high, force / low) if low < 0.0 < high else np.zeros_like(force)
+    inside = (share >= NEARER) & (share <= FARTHER)
+    f, y = force[inside], deflection[inside]
+    if min(len(np.unique(f[f > 0.0])), len(np.unique(f[f < 0.0]))) < A_SIDE:
+        return Play(np.nan, False)
+    lines = [np.maximum(f, 0.0), np.minimum(f, 0.0)]
+    friction = way[inside, None] * np.stack([np.ones_like(f), f**2], axis=1)
+    others = [np.ones_like(f), np.flatnonzero(inside).astype(float), *friction.T]
+    before = _left(lines, y, others)[0]
+    after, found = _left([np.sign(f), *lines], y, others)
+    size = 2.0 * float(found[-3])
+    telling = size >= APART * float(np.ptp(deflection))
+    return Play(size, telling and _chance(before, after, 1, len(f) - len(others) - 3) < SURE)
 
 
 def _averaged(

@@ -21,6 +21,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -511,6 +512,7 @@ class MeasuringLoop:
 TIP = MeasuringLoop()
 
 
+@lru_cache(maxsize=1024)  # asked of every record
 def measuring_loop(text: str) -> MeasuringLoop | None:
     """The loop that a cell of the column `loop` names, an empty one the tip's; None where it names none."""
     words = " ".join(text.lower().split())
