@@ -113,7 +113,7 @@ def methods(tilted: bool) -> list[Method]:
             lambda: closed_form.compliance_along_columns(kernel, columns, loads, turned),
         ),
         ("compiled (numba), whole call", FAST_POSES, route("compiled")),
-        ("compiled (numba), poses last", FAST_POSES, lambda: compiled.tip_compliance_columns(kernel, columns, turned)),
+        ("compiled (numba), kernel alone", FAST_POSES, lambda: compiled.tip_compliance(kernel, position, rotation)),
         (
             "compiled (numba), one direction and lengths, poses last",
             FAST_POSES,
