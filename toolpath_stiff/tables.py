@@ -219,11 +219,8 @@ def grid_table(grid: Grid, file: str, columns: Columns) -> Table:
     body, notes = grid.rows[at + 1 :], list(grid.notes)
     if at:
         notes.append(f"{file}: what stands above the heading in line {line} is not read as rows")
-    units: list[str] = []
-    if body and _is_unit_row(body[0][1], written):
-        units = body[0][1]
-        notes.append(f"{file}: line {body[0][0]} is a row of units")
-        body = body[1:]
+    body, units, told = _without_unit_row(body, written, file)
+    notes += told
     written = _as_wide(grid, written, [written, *(cells for _, cells in body)])
     _refuse_merged(grid, written, file, line)
     factors = [_factor(cell, unit, known) if columns.converted else None for cell, unit in _paired(written, units)]
@@ -235,22 +232,38 @@ def grid_table(grid: Grid, file: str, columns: Columns) -> Table:
     if renamed:
         notes.append(f"{file}: headings are read by their known names: {', '.join(renamed)}")
     rows = [(at_line, _fitted(cells, len(heading), grid.separator == "")) for at_line, cells in body]
-    _refuse_spreadsheet_errors(heading, rows, file)
-    numbers = [i for i, name in enumerate(heading) if name not in columns.texts]
-    if columns.converted:
-        rows, grouped = _without_groups(rows, numbers)
-        notes += [f"{file}: {grouped!r} is read as a thousands separator"] if grouped else []
-    rows, commas = with_points(heading, rows, numbers, grid.separator, file)
-    if commas:
-        notes.append(f"{file}: numbers are read with decimal commas")
-    scales = {i: factor[1:] for i, factor in enumerate(factors) if factor}
-    if scales:
-        rows = [(n, [_scaled(c, *scales[i]) if i in scales else c for i, c in enumerate(row)]) for n, row in rows]
-        told = ", ".join(f"{written[i]!r} to {heading[i]}" for i in scales)
-        notes.append(f"{file}: units are converted: {told}")
+    rows, told = _plain_numbers(rows, heading, grid.separator, columns, file)
+    notes += told
+    if scales := {i: factor[1:] for i, factor in enumerate(factors) if factor}:
+        rows = [(n, _row_in_our_units(row, scales)) for n, row in rows]
+        converted = ", ".join(f"{written[i]!r} to {heading[i]}" for i in scales)
+        notes.append(f"{file}: units are converted: {converted}")
     above = tuple((n, tuple(cells)) for n, cells in grid.rows[:at])
     body_rows = tuple((n, tuple(c)) for n, c in rows)
     return Table(file, tuple(heading), line, body_rows, grid.separator, tuple(notes), above)
+
+
+def _without_unit_row(
+    body: list[tuple[int, list[str]]], written: list[str], file: str
+) -> tuple[list[tuple[int, list[str]]], list[str], list[str]]:
+    """Rows below the heading, the units of the row of units if there is one, and a note on it."""
+    if not body or not _is_unit_row(body[0][1], written):
+        return body, [], []
+    return body[1:], body[0][1], [f"{file}: line {body[0][0]} is a row of units"]
+
+
+def _plain_numbers(
+    rows: list[tuple[int, list[str]]], heading: list[str], separator: str, columns: Columns, file: str
+) -> tuple[list[tuple[int, list[str]]], list[str]]:
+    """Numbers with decimal points and without separators of thousands; notes on what was read so."""
+    _refuse_spreadsheet_errors(heading, rows, file)
+    notes: list[str] = []
+    numbers = [i for i, name in enumerate(heading) if name not in columns.texts]
+    if columns.converted:
+        rows, grouped = _without_groups(rows, numbers)
+        notes = [f"{file}: {grouped!r} is read as a thousands separator"] if grouped else []
+    rows, commas = with_points(heading, rows, numbers, separator, file)
+    return rows, [*notes, *([f"{file}: numbers are read with decimal commas"] if commas else [])]
 
 
 def _heading_row(grid: Grid, known: Mapping[str, str]) -> int:
@@ -360,6 +373,10 @@ def _factor(written: str, unit: str, known: Mapping[str, str]) -> tuple[str, int
             (up, down), (own_up, own_down) = scale[stated], scale[own]
             return name, up * own_down, down * own_up
     return None
+
+
+def _row_in_our_units(row: list[str], scales: Mapping[int, tuple[int, int]]) -> list[str]:
+    return [_scaled(cell, *scales[i]) if i in scales else cell for i, cell in enumerate(row)]
 
 
 def _scaled(cell: str, up: int, down: int) -> str:

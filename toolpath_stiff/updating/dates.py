@@ -272,6 +272,17 @@ def _settled(found: dict[str, _Read], order: Order | None, remedy: str) -> Dates
     """One reading of each; raises `InputError` where there are two."""
     doubtful = [text for text, read in found.items() if read.iso[0] != read.iso[1]]
     sure = {name: [t for t in doubtful if not found[t].iso[1 - k]] for k, name in enumerate(ORDERS)}
+    chosen = _order_of(found, doubtful, sure, order, remedy)
+    which = 0 if chosen is None else ORDERS.index(chosen)
+    iso = {text: read.iso[which] or text for text, read in found.items()}
+    shown_by = sure[chosen or "dmy"][0] if doubtful and order is None else ""
+    return Dates({text: one for text, one in iso.items() if text != one}, _notes_on(found, iso, chosen, shown_by))
+
+
+def _order_of(
+    found: dict[str, _Read], doubtful: list[str], sure: dict[Order, list[str]], order: Order | None, remedy: str
+) -> Order | None:
+    """The order of day and month: as asked, or as the dates of the set show; None where none is in doubt."""
     if order is None and sure["dmy"] and sure["mdy"]:
         raise MeasurementError(
             f"date {sure['dmy'][0]!r} has the day first and {sure['mdy'][0]!r} the month",
@@ -284,19 +295,22 @@ def _settled(found: dict[str, _Read], order: Order | None, remedy: str) -> Dates
         raise MeasurementError(
             f"date {doubtful[0]!r} could be {one} or {other}, and no other date of the set tells", hint=remedy
         )
-    which = 0 if chosen is None else ORDERS.index(chosen)
-    iso = {text: read.iso[which] or text for text, read in found.items()}
+    return chosen
+
+
+def _notes_on(found: dict[str, _Read], iso: dict[str, str], chosen: Order | None, shown_by: str) -> list[str]:
+    """What was taken for granted; `shown_by`: the date that tells the order of the others, if one had to."""
     notes = []
-    if doubtful and order is None:
+    if shown_by:
         first = "day" if chosen == "dmy" else "month"
-        notes.append(f"dates are read with the {first} first, as {sure[chosen or 'dmy'][0]!r} shows")
+        notes.append(f"dates are read with the {first} first, as {shown_by!r} shows")
     if any(read.serial for read in found.values()):
         text = next(text for text, read in found.items() if read.serial)
         notes.append(f"a spreadsheet's numbers of days are read as dates: {text} as {iso[text]}")
     short = [one for one in iso.values() if REDUCED.fullmatch(one)]
     if short:
         notes.append(f"a year or a month alone counts as its middle: {short[0]} as {date_text(day_of(short[0]))}")
-    return Dates({text: one for text, one in iso.items() if text != one}, notes)
+    return notes
 
 
 def dates_in(name: str) -> list[str]:

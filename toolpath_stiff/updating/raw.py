@@ -516,15 +516,21 @@ def _judged(name: str, rows: Sequence[tuple[Loop, LoopFigures]]) -> str:
     recorded = [(loop, one) for loop, one in own if len(loop.force)]
     if not recorded:
         return ""
-    sides = {side_of(loop) for loop, _ in recorded}
     both = [one for loop, one in recorded if not side_of(loop)]
+    play = any(one.plays for one in both)
     if len(recorded) == len(own):
-        if len(sides) == 2 and 0.0 in sides and all(math.isfinite(one.tension) for one in both):
-            one_side = IN_TENSION if 1.0 in sides else IN_COMPRESSION
-            return one_side + (OF_ONE_SIDE if any(one.plays for one in both) else "")
-        if any(one.plays for one in both) and all(math.isfinite(one.beyond) for _, one in own):
+        if side := _shared_side({side_of(loop) for loop, _ in recorded}, both):
+            return side + (OF_ONE_SIDE if play else "")
+        if play and all(math.isfinite(one.beyond) for _, one in own):
             return BEYOND
-    return BLURRED if any(one.plays for one in both) else SECANT
+    return BLURRED if play else SECANT
+
+
+def _shared_side(sides: set[float], both: Sequence[LoopFigures]) -> str:
+    """The side that every record has, where some have no other (`both`: those with either); else nothing."""
+    if len(sides) != 2 or 0.0 not in sides or not all(math.isfinite(one.tension) for one in both):
+        return ""
+    return IN_TENSION if 1.0 in sides else IN_COMPRESSION
 
 
 def _seen(loop: Loop, one: LoopFigures, judged: str) -> tuple[float, float]:

@@ -8,7 +8,7 @@ loops of a machine, is left as it is.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
@@ -165,19 +165,26 @@ def _of_tokens(tokens: list[str]) -> Head | None:
             found["unit"] = found["unit"] or unit
             i += length
             continue
-        elif token in QUANTITIES and (not found["quantity"] or found["quantity"] == "strut" or len(token) > 1):
-            if found["quantity"] in ("", "strut"):
-                found["quantity"] = QUANTITIES[token]
-        elif re.fullmatch(r"\d|[a-f]", token) and (found["quantity"] or found["strut"]):
-            found["strut"] = found["strut"] or token.upper()
-        elif re.fullmatch(r"(?:19|20)\d{2}", token):
-            found["date"] = token
-        elif token in RAW_UNITS:
-            found["unit"] = token
-        elif not (token in FILLERS or token in TIMES or token == "per"):
+        elif not _taken(token, found):
             return None
         i += 1
     return Head(**found, worded=worded)
+
+
+def _taken(token: str, found: dict[str, str]) -> bool:
+    """Whether a word of a heading is understood on its own; what it tells is put into `found`."""
+    if token in QUANTITIES and (not found["quantity"] or found["quantity"] == "strut" or len(token) > 1):
+        if found["quantity"] in ("", "strut"):
+            found["quantity"] = QUANTITIES[token]
+    elif re.fullmatch(r"\d|[a-f]", token) and (found["quantity"] or found["strut"]):
+        found["strut"] = found["strut"] or token.upper()
+    elif re.fullmatch(r"(?:19|20)\d{2}", token):
+        found["date"] = token
+    elif token in RAW_UNITS:
+        found["unit"] = token
+    else:
+        return token in FILLERS or token in TIMES or token == "per"
+    return True
 
 
 def _is_quantity(tokens: list[str]) -> bool:
@@ -392,8 +399,7 @@ def _records(body: Rows, layout: _Layout, units: Units) -> tuple[_Records, Rows]
     last = max((k for k, (_, cells) in enumerate(body) if _has_numbers(cells, layout)), default=-1)
     for k, (line, cells) in enumerate(body):
         data = layout.readings(cells)
-        numbers = any(is_number(cell) or SPREADSHEET_ERROR.fullmatch(cell) for cell in data)
-        if numbers and not _is_footer(cells, layout):
+        if _is_record(cells, layout):
             words = [cell for i, cell in enumerate(cells) if i not in layout.data]
             (tare if any(TARE.fullmatch(word) for word in words) else kept).append((line, cells))
         elif k < last and (_layout_at(body, k, units) or _other_block((line, cells), own_strut)):
@@ -404,9 +410,18 @@ def _records(body: Rows, layout: _Layout, units: Units) -> tuple[_Records, Rows]
             kept.append((line, cells))
         else:
             passed.append(line)
+    return _Records(kept, tare, _passed_note(passed)), rest
+
+
+def _passed_note(passed: list[int]) -> list[str]:
     many = f"{len(passed)} lines without readings are" if len(passed) > 1 else "a line without readings is"
-    notes = [f"{many} passed over, from line {passed[0]}"] if passed else []
-    return _Records(kept, tare, notes), rest
+    return [f"{many} passed over, from line {passed[0]}"] if passed else []
+
+
+def _is_record(cells: list[str], layout: _Layout) -> bool:
+    """Whether a row has readings, and is no summary of others."""
+    numbers = any(is_number(cell) or SPREADSHEET_ERROR.fullmatch(cell) for cell in layout.readings(cells))
+    return numbers and not _is_footer(cells, layout)
 
 
 def _after(body: Rows, at: int, read: set[int]) -> int:
@@ -498,7 +513,25 @@ Long = tuple[list[str], Rows, list[str]]
 
 def _long(records: _Records, layout: _Layout, units: Units, file: str) -> Long:
     """One group: known columns by their names, others as they stand."""
-    heading, notes = list(layout.texts), []
+    heading, notes = _known_names(layout, units, file), []
+    heading = [_time(name, i, layout, records.rows) for i, name in enumerate(heading)]
+    needed = [*layout.data, *layout.shared.get("strut", []), *layout.shared.get(DATE, [])]
+    rows = [(n, _fitted(cells, len(heading), needed)) for n, cells in records.rows]
+    dated = next((i for i, head in enumerate(layout.heads) if head == Head() and _holds_dates(i, records.rows)), None)
+    if DATE not in heading and dated is not None:
+        notes.append(f"column {heading[dated]!r} is read as date")
+        heading[dated] = DATE
+    several = layout.shared.get("displacement", [])
+    if len(several) > 1:
+        notes.append(_averaged_note(several, layout))
+        rows = [(n, _averaged(cells, several)) for n, cells in rows]
+        heading = [name for i, name in enumerate(heading) if i not in several[1:]]
+    return heading, _tared(rows, records.tare, notes), notes
+
+
+def _known_names(layout: _Layout, units: Units, file: str) -> list[str]:
+    """The heading with known columns by their names. Raises `InputError` where forces have no strut."""
+    heading = list(layout.texts)
     for quantity in OWN_UNIT:
         own = layout.shared.get(quantity, [])
         own = [i for i in own if not (quantity == "force" and _is_strut_force(layout, i))] or own
@@ -516,19 +549,7 @@ def _long(records: _Records, layout: _Layout, units: Units, file: str) -> Long:
     for i, head in enumerate(layout.heads):
         if head.quantity in ("strut", DATE) and not head.unit:
             heading[i] = head.quantity
-    heading = [_time(name, i, layout, records.rows) for i, name in enumerate(heading)]
-    needed = [*layout.data, *layout.shared.get("strut", []), *layout.shared.get(DATE, [])]
-    rows = [(n, _fitted(cells, len(heading), needed)) for n, cells in records.rows]
-    dated = next((i for i, head in enumerate(layout.heads) if head == Head() and _holds_dates(i, records.rows)), None)
-    if DATE not in heading and dated is not None:
-        notes.append(f"column {heading[dated]!r} is read as date")
-        heading[dated] = DATE
-    several = layout.shared.get("displacement", [])
-    if len(several) > 1:
-        notes.append(_averaged_note(several, layout))
-        rows = [(n, _averaged(cells, several)) for n, cells in rows]
-        heading = [name for i, name in enumerate(heading) if i not in several[1:]]
-    return heading, _tared(rows, records.tare, notes), notes
+    return heading
 
 
 def _holds_dates(i: int, rows: Rows) -> bool:
@@ -599,29 +620,52 @@ def _unpivoted(records: _Records, layout: _Layout, units: Units, file: str) -> L
     strut, date = _row_column(layout, "strut", records, of_strut), _row_column(layout, DATE, records, of_date)
     columns = {group: _parts(layout, group, wanted, file) for group in layout.groups}
     carried = [i for i, text in enumerate(layout.texts) if text in CARRIED]
-    named = []
-    for k in range(len(wanted)):
-        own = sorted({i for parts in columns.values() for i in parts[k]})
-        names = {_named(wanted[k], layout.heads[i], units, layout.texts[i], file, layout.line) for i in own}
-        if len(names) > 1:
-            raise TableError(f"columns in different units: {', '.join(sorted(names))}", file=file, line=layout.line)
-        named.append(names.pop())
+    named = [
+        _common_name(quantity, sorted({i for parts in columns.values() for i in parts[k]}), layout, units, file)
+        for k, quantity in enumerate(wanted)
+    ]
     with_strut, with_date = of_strut or strut is not None, of_date or date is not None
     heading = ["strut"] * with_strut + [DATE] * with_date + named + [layout.texts[i] for i in carried]
+
+    def who(group: tuple[str, str], cells: list[str]) -> list[str]:
+        label, day = group
+        return [label or cells[strut or 0]] * with_strut + [day or cells[date or 0]] * with_date
+
+    rows = _group_rows(records, layout, columns, who, carried, table, file)
+    notes = [f"{len(columns)} groups of columns side by side are read one by one: {_listed(columns)}"]
+    return heading, _tared(rows, records.tare, notes), notes
+
+
+def _group_rows(
+    records: _Records, layout: _Layout, columns: Mapping[tuple[str, str], list[list[int]]],
+    who: Callable[[tuple[str, str], list[str]], list[str]], carried: Sequence[int], table: bool, file: str,
+) -> Rows:  # fmt: skip
+    """Rows of every group, one group below the other; `who`: strut and date of a row, `table`: of stiffnesses."""
     rows: Rows = []
-    for (label, day), parts in columns.items():
+    for group, parts in columns.items():
         for line, written in records.rows:
-            cells = _fitted(written, len(layout.texts), ())
-            if len(cells) > len(layout.texts):
-                expected = f"{len(layout.texts)} as in the heading"
-                raise TableError(f"row with {len(cells)} cells", expected=expected, file=file, line=line)
+            cells = _no_wider(written, len(layout.texts), file, line)
             values = [_mean([cells[i] for i in part]) for part in parts]
             if not any(values) or (table and values[0].lower() in MISSING):
                 continue  # columns of different lengths, or a strut without a reading
-            who = [label or cells[strut or 0]] * with_strut + [day or cells[date or 0]] * with_date
-            rows.append((line, [*who, *values, *(cells[i] for i in carried)]))
-    notes = [f"{len(columns)} groups of columns side by side are read one by one: {_listed(columns)}"]
-    return heading, _tared(rows, records.tare, notes), notes
+            rows.append((line, [*who(group, cells), *values, *(cells[i] for i in carried)]))
+    return rows
+
+
+def _no_wider(written: list[str], width: int, file: str, line: int) -> list[str]:
+    """A row as long as the heading; raises `InputError` where it is longer."""
+    cells = _fitted(written, width, ())
+    if len(cells) > width:
+        raise TableError(f"row with {len(cells)} cells", expected=f"{width} as in the heading", file=file, line=line)
+    return cells
+
+
+def _common_name(quantity: str, own: list[int], layout: _Layout, units: Units, file: str) -> str:
+    """The name with unit of the columns of one quantity; raises `InputError` where the units differ."""
+    names = {_named(quantity, layout.heads[i], units, layout.texts[i], file, layout.line) for i in own}
+    if len(names) > 1:
+        raise TableError(f"columns in different units: {', '.join(sorted(names))}", file=file, line=layout.line)
+    return names.pop()
 
 
 def _parts(layout: _Layout, group: tuple[str, str], wanted: Sequence[str], file: str) -> list[list[int]]:

@@ -732,14 +732,19 @@ def _json_blocks(value: Any, above: list[str]) -> Iterator[tuple[list[str], list
             for one in value:
                 yield from _json_blocks(one, above)
     elif isinstance(value, dict):
-        plain = [f"{key}: {one}" for key, one in value.items() if not isinstance(one, dict | list)]
-        lists = {k: one for k, one in value.items() if isinstance(one, list) and one and not _holds_more({k: one[0]})}
-        if len(lists) > 1 and len({len(one) for one in lists.values()}) == 1:
-            yield [*above, *plain], list(lists), [list(row) for row in zip(*lists.values(), strict=True)]
-            return
-        for key, one in value.items():
-            if isinstance(one, dict | list):
-                yield from _json_blocks(one, [*above, *plain, _json_head(key)])
+        yield from _json_columns(value, above)
+
+
+def _json_columns(value: dict[str, Any], above: list[str]) -> Iterator[tuple[list[str], list[str], list[list[Any]]]]:
+    """The same of an object: lists of one length are the columns of a table."""
+    plain = [f"{key}: {one}" for key, one in value.items() if not isinstance(one, dict | list)]
+    lists = {k: one for k, one in value.items() if isinstance(one, list) and one and not _holds_more({k: one[0]})}
+    if len(lists) > 1 and len({len(one) for one in lists.values()}) == 1:
+        yield [*above, *plain], list(lists), [list(row) for row in zip(*lists.values(), strict=True)]
+        return
+    for key, one in value.items():
+        if isinstance(one, dict | list):
+            yield from _json_blocks(one, [*above, *plain, _json_head(key)])
 
 
 def _holds_more(value: Mapping[str, Any]) -> bool:

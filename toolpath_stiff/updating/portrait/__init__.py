@@ -308,6 +308,13 @@ def _cause(term: Term) -> str:
     if term.action == "coupling":
         pair = f"{term.constants['first']:.0f} and {term.constants['second']:.0f}"
         return f"struts {pair} are coupled: force in one stretches the other"
+    if term.action in ("strut factor", "strut", "turning", *PINS):
+        return _cause_in_struts(term)
+    return _cause_in_link(term)
+
+
+def _cause_in_struts(term: Term) -> str:
+    """The same of struts and their joints: all, or one."""
     if term.action == "strut factor":
         side = "softer" if term.size >= 0.0 else "stiffer"
         return f"strut {term.where} is {side}" if term.where else f"the struts are {side}"
@@ -315,9 +322,12 @@ def _cause(term: Term) -> str:
         return f"the joints of strut {term.where} give way" if term.where else "the joints of the struts give way"
     if term.action == "turning":
         return f"the joints of strut {term.where} resist turning" if term.where else "the joints resist turning"
-    if term.action in PINS:
-        which = f"joint of strut {term.where} gives" if term.where else "joints of the struts give"
-        return f"the {term.action.removesuffix(' pin')} {which} way along a pin that stands {PINNED[term.direction]}"
+    which = f"joint of strut {term.where} gives" if term.where else "joints of the struts give"
+    return f"the {term.action.removesuffix(' pin')} {which} way along a pin that stands {PINNED[term.direction]}"
+
+
+def _cause_in_link(term: Term) -> str:
+    """The same of a link that gives way, or of its vertices."""
     if term.action == "vertex":
         which = f"{term.link} vertex {term.where} gives" if term.where else f"the vertices of the {term.link} give"
         return f"{which} way {GIVES[term.direction]}"

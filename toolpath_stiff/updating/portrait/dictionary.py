@@ -382,18 +382,23 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "")
         return _signs(signed) if len(different) > 1 else []
     if len(different) < 2 or different[-1] - different[0] <= 1e-9 * max(abs(different[-1]), 1e-9):
         return []
-    sides = (1.0,) if signed else (1.0, -1.0)
     low, high = float(different[0]), float(different[-1])
-    many, place = len(different), variable in (*PLACE, "strut length")
+    many = len(different)
     found: list[tuple[str, Constants]] = []
     if variable in ("load", "strut force") and not (signed and many == 2):
         # Of what may change to both sides, less of what friction holds is play.
         play = variable == "strut force" and not signed
         found += _of_a_force(low, high, float(np.median(values)), many > 2, play)
     found += _slopes(low, high, signed, many > 4)
-    if many == 2:
-        return found
-    found += _squares(low, high, place)
+    return found if many == 2 else found + _bent(variable, different, signed, column)
+
+
+def _bent(variable: str, different: FloatArray, signed: bool, column: str) -> list[tuple[str, Constants]]:
+    """Shapes that are no straight lines, over three values or more of a variable, ascending."""
+    sides = (1.0,) if signed else (1.0, -1.0)
+    low, high = float(different[0]), float(different[-1])
+    many, place = len(different), variable in (*PLACE, "strut length")
+    found = _squares(low, high, place)
     if column in SWINGS:
         found.append(("square", (("centre", 0.0), ("reach", high))))
     edges = [0.0] if column in AXES else _edges(different, MOST_EDGES if place else 3)
