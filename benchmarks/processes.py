@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import subprocess
 import sys
 from pathlib import Path
 
+# A small process starts what is measured: the largest memory of a process counts what it was forked from.
+LAUNCHER = """
+import os, subprocess, sys
+child = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL)
+_, status, usage = os.wait4(child.pid, 0)
+print(os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime, usage.ru_maxrss)
+"""
+
 
 def whole_process(command: list[str], folder: str = ".", allowed: tuple[int, ...] = (0,)) -> tuple[float, float]:
     """CPU seconds (user and system) and peak memory (MB) of a process."""
-    child = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(child.pid, 0)
-    child.returncode = os.waitstatus_to_exitcode(status)
-    if child.returncode not in allowed:
-        raise SystemExit(f"{' '.join(command)} ended with {child.returncode}")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0
+    launch = [sys.executable, "-I", "-S", "-c", LAUNCHER, *command]
+    told = subprocess.run(launch, cwd=folder, stdout=subprocess.PIPE, text=True, check=True).stdout.split()
+    if int(told[0]) not in allowed:
+        raise SystemExit(f"{' '.join(command)} ended with {told[0]}")
+    return float(told[1]), float(told[2]) / 1024.0
 
 
 def whole_command(arguments: list[str], folder: str = ".", allowed: tuple[int, ...] = (0,)) -> tuple[float, float]:
