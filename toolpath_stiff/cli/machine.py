@@ -1,7 +1,4 @@
-"""The commands on a machine: pose, map, machine, effects.
-
-`tps studio`: a case in the browser.
-"""
+"""The commands on a machine: pose, map, machine, effects; studio, a case of it in the browser."""
 
 from __future__ import annotations
 

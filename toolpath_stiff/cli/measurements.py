@@ -1,7 +1,4 @@
-"""The commands on measurements: reduce, compare, diagnose, update, plan.
-
-`tps rig`: blind exercises on a simulated machine that hides an effect.
-"""
+"""The commands on measurements: reduce, compare, diagnose, update, plan; rig, the blind exercises."""
 
 from __future__ import annotations
 

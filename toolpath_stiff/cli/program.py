@@ -1,7 +1,4 @@
-"""The commands on a program: analyze, path, check.
-
-The commands on a placement: place, case-study.
-"""
+"""The commands on a program and on its placement: analyze, path, check; place, case-study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Machines of six struts: their files here; model, kinematics, limits and symmetry in the modules beside.
+"""Machines of six struts: their files here; model, kinematics with symmetry, and limits in the modules beside.
 
 A machine file is TOML in shop units; it becomes a `Machine` in SI, checked key by key. `SECTIONS` lists what it may
 hold: sections, keys, units, bounds. Each section names the origin of its figures ("published", "recovered",

@@ -2,7 +2,7 @@
 
 mm, degrees, mm/min.
 
-Coordinates of a control: program, work offsets, G92 and G52, tool length, machine. mm and degrees.
+Its coordinates: program, work offsets, G92 and G52, tool length, machine.
 
 As LinuxCNC: control = Rz(rotation) (program + g92) + offset, and the spindle nose = control + tool length; G68 turns
 the program's X and Y about its own centre before all that. The "control" coordinates are those in which the work

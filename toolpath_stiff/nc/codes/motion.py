@@ -6,7 +6,7 @@ is known.
 G33 and G33.1 are moves whose feed the spindle's turns give, as LinuxCNC has them (manual, "G-Codes", G33, G33.1).
 mm, degrees.
 
-Drilling, tapping and boring cycles (G73 G74 G76 G81 to G86, G89), expanded to their moves; G98 and G99. mm.
+Drilling, tapping and boring cycles (G73 G74 G76 G81 to G86, G89), expanded to their moves; G98 and G99.
 
 Sources: LinuxCNC's manual ("G80-G89 Canned Cycles", "G73") and interp_cycles.cc; Fanuc's operator's manuals ("Canned
 cycle") where a dialect follows them.

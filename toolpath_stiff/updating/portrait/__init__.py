@@ -1,14 +1,12 @@
 """A portrait of what is missing: which link of the load path, along what, with what it varies, how large.
 
 Where no effect of the catalogue explains the readings, or where the best explanation leaves something, one to three
-terms of a dictionary of machine mechanics (`dictionary`, `terms`) are chosen (`selection`) and put in words (`words`).
+terms of a dictionary of machine mechanics (`dictionary`, `terms`) are chosen (`selection`) and put in words.
 What else would look the same is said by probabilities over the whole dictionary, summed by link and by variable.
 
 The yardstick of a description is what a smooth unknown one reaches at points that it has not seen: the discrepancy as a
 Gaussian process with one of the forms of covariance of `inference.gates` (Kennedy and O'Hagan 2001, Bayesian
 calibration of computer models), its amplitude the likeliest; left-out points in closed form.
-
-A portrait in an engineer's words, and as part of diagnose.json, in shop units.
 """
 
 from __future__ import annotations
