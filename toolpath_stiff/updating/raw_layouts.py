@@ -464,8 +464,8 @@ def _tables(
         keep = [i for i, name in enumerate(heading) if name and heading.index(name) == i]
         for n, cells in rows:
             if len(cells) <= max(keep, default=0):
-                found, expected = f"row with {len(cells)} cells", f"{len(heading)} as in the heading"
-                raise TableError(found, expected=expected, file=file, line=n)
+                expected = f"{len(heading)} as in the heading"
+                raise TableError(f"row with {len(cells)} cells", expected=expected, file=file, line=n)
         heading, rows = [heading[i] for i in keep], [(n, [c[i] for i in keep]) for n, c in rows]
     known = Grid([(layout.line, heading), *rows], grid.separator, grid.notes)
     table = grid_table(known, file, columns)
