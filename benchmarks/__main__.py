@@ -19,6 +19,7 @@ from pathlib import Path
 
 from benchmarks.growth import measure_growth, picture, table
 from benchmarks.many import measure_many, measure_pictures
+from benchmarks.pages import write_page
 from benchmarks.processes import describe_machine
 from benchmarks.routes import measure_routes
 from benchmarks.whole_commands import measure_commands
@@ -54,7 +55,7 @@ def main() -> int:
     print(text)
     if args.out:
         picture(costs, Path(args.out).with_suffix(".png"))
-        Path(args.out).write_text(f"{text}\nMade by `python -m benchmarks --out {args.out}`.\n", encoding="utf-8")
+        write_page(args.out, f"{text}\nMade by `python -m benchmarks --out {args.out}`.")
     return 0 if routes_pass and commands_pass and many_pass and pictures_pass else 1
 
 

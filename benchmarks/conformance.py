@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from benchmarks.pages import write_page
 from toolpath_stiff.errors import InputError, TpsError
-from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc import Moves, Program, read_program
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.moves import RAPID
@@ -236,7 +236,7 @@ def main() -> int:
     text = table(rows)
     print(text)
     if args.out:
-        write_atomically(args.out, text)
+        write_page(args.out, text)
     return 1 if any(row.verdict == OTHER for row in rows) else 0
 
 

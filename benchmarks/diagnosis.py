@@ -39,6 +39,7 @@ from benchmarks.diagnosis_tables import (
     two_table,
     verdicts_table,
 )
+from benchmarks.pages import write_page
 from toolpath_stiff import rig
 
 FIRST_SEED = 41_000_000  # chosen once, before the first run
@@ -182,7 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     print(text)
     if args.out:
-        args.out.write_text(text, encoding="utf-8")
+        write_page(args.out, text, of_records=args.table_only)
     return 0 if cleared else 1
 
 

@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.pages import write_page
 from benchmarks.processes import describe_machine, whole_command
 from toolpath_stiff import rig
 
@@ -110,7 +111,7 @@ def main() -> int:
                 lines.append(line)
                 print(line, flush=True)
     if given.write:
-        TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        write_page(TABLE, "\n".join(lines))
     return 0 if passed else 1
 
 

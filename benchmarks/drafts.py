@@ -29,6 +29,7 @@ from benchmarks.case_loop import Record, add_run_arguments, case_loop, document,
 from benchmarks.diagnosis_bars import Figure, share
 from benchmarks.diagnosis_cases import machine
 from benchmarks.diagnosis_tables import bars_table, summary
+from benchmarks.pages import write_page
 from toolpath_stiff import rig
 from toolpath_stiff.rig import UNKNOWNS
 from toolpath_stiff.rig.hidden import Nuisances
@@ -187,7 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     text, cleared = report(records, f"python -m benchmarks.drafts{options}")
     print(text)
-    args.out.write_text(text, encoding="utf-8")
+    write_page(args.out, text, of_records=args.table_only)
     return 0 if cleared else 1
 
 

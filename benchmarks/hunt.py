@@ -21,9 +21,9 @@ import numpy as np
 
 from benchmarks.hunt_compensation import Beside, Tolerances
 from benchmarks.hunt_programs import Cam, Harsh, Parametric, Zeros
+from benchmarks.pages import write_page
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
-from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc import MOTION_NAMES, Program, read_program
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
@@ -180,7 +180,7 @@ def main() -> int:
     text = table(counts, args.programs, args.seed)
     print(text)
     if args.out:
-        write_atomically(args.out, text)
+        write_page(args.out, text)
     return 1 if counts[OTHER] else 0
 
 

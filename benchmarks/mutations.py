@@ -26,12 +26,12 @@ from importlib import resources
 from pathlib import Path
 from types import FrameType
 
+from benchmarks.pages import write_page
 from toolpath_stiff.api.effects import effect_template
 from toolpath_stiff.api.machines import machine_from_linuxcnc, machine_template
 from toolpath_stiff.api.poses import read_poses
 from toolpath_stiff.cli.main import main as tps
 from toolpath_stiff.errors import EffectFault, InputError, InputErrors
-from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
 from toolpath_stiff.nc.controller import DIALECTS, Controller, read_controller
@@ -332,7 +332,7 @@ def main() -> int:
     print("\n".join([text, *wrong[:40]]))
     if out:
         command = f"python -m benchmarks.mutations --n {args.n} --seed {args.seed}"
-        write_atomically(out, text + f"\nMade by `{command} --out {args.out}`.\n")
+        write_page(out, text + f"\nMade by `{command} --out {args.out}`.\n")
     return int(bool(wrong) or growth > GROWTH_BAR)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.pages import write_page
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine import load_machine
@@ -207,8 +208,7 @@ def main() -> int:
         lines.append(row)
         passed &= clears
     if args.out:
-        text = "\n".join([*lines, "", f"Made by `python -m benchmarks.placement --out {args.out}`.", ""])
-        Path(args.out).write_text(text, encoding="utf-8")
+        write_page(args.out, "\n".join([*lines, "", f"Made by `python -m benchmarks.placement --out {args.out}`."]))
     return 0 if passed else 1
 
 

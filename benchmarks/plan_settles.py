@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from toolpath_stiff.files import write_atomically
+from benchmarks.pages import write_page
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.rig import csv_text, read_plan
 from toolpath_stiff.rig.case import Case, again, draw_case
@@ -162,7 +162,7 @@ def main() -> None:
     text = report(cases(args.cases, args.seed))
     print(text)
     if args.out:
-        write_atomically(args.out, text)
+        write_page(args.out, text)
 
 
 if __name__ == "__main__":

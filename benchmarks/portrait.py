@@ -19,6 +19,7 @@ from pathlib import Path
 
 from benchmarks.case_loop import Record, add_run_arguments, case_loop, document, read_records
 from benchmarks.diagnosis_tables import bars_table, summary
+from benchmarks.pages import write_page
 from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
 from benchmarks.portrait_cases import LAYOUTS, make_jobs, run
 from toolpath_stiff.rig import UNKNOWNS
@@ -91,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options += f" --only {' '.join(args.only)}" if args.only else ""
     text, cleared = report(records, f"python -m benchmarks.portrait{options}")
     print(text)
-    args.out.write_text(text, encoding="utf-8")
+    write_page(args.out, text, of_records=args.table_only)
     return 0 if cleared else 1
 
 

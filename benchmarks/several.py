@@ -21,6 +21,7 @@ from pathlib import Path
 from benchmarks.case_loop import Record, add_run_arguments, case_loop, document, read_records
 from benchmarks.diagnosis_bars import JUST_SEEN, holds_truth
 from benchmarks.diagnosis_tables import bars_table, summary
+from benchmarks.pages import write_page
 from benchmarks.several_bars import false_name, figures, named_rows, slip_found, slip_visible, strongest_right
 from benchmarks.several_cases import GROUPS, make_jobs, run
 
@@ -139,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options += f" --only {' '.join(args.only)}" if tuple(args.only) != GROUPS else ""
     text, cleared = report(records, f"python -m benchmarks.several{options}")
     print(text)
-    args.out.write_text(text, encoding="utf-8")
+    write_page(args.out, text, of_records=args.table_only)
     return 0 if cleared else 1
 
 

@@ -24,6 +24,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from benchmarks.pages import write_page
 from benchmarks.processes import describe_machine, whole_command
 from benchmarks.size_programs import KINDS, program
 from toolpath_stiff.nc import parse_program
@@ -216,9 +217,7 @@ def main() -> int:
     report.add("", "A bar that is not cleared is marked; the exit code is then 1.")
     if args.out:
         text = "\n".join(report.lines)
-        Path(args.out).write_text(
-            f"{text}\n\nMade by `python -m benchmarks.size --out {args.out}`.\n", encoding="utf-8"
-        )
+        write_page(args.out, f"{text}\n\nMade by `python -m benchmarks.size --out {args.out}`.")
     return 0 if report.passed else 1
 
 

@@ -20,6 +20,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from benchmarks.pages import write_page
+
 ANSWER_BAR, FRAME_BAR = 100.0, 50.0  # ms, medians
 ROUNDS = 40
 PATIENCE = 600_000  # ms
@@ -156,9 +158,8 @@ def main() -> int:
     text = "\n".join(lines) + "\n"
     print(text)
     if args.out:
-        args.out.write_text(
-            f"# The studio's answers\n\n{text}\n{load()}\n\nMade by `python -m benchmarks.studio --out {args.out}`.\n"
-        )
+        made = f"Made by `python -m benchmarks.studio --out {args.out}`."
+        write_page(args.out, f"# The studio's answers\n\n{text}\n{load()}\n\n{made}")
     return 0 if all(clears for _, clears in rows) else 1
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 from benchmarks.drafts import FIRST_SEED, NOISE, confirmed, figures, make_jobs, report
+from benchmarks.pages import write_page
 from toolpath_stiff.rig import UNKNOWNS
 
 
@@ -50,3 +53,14 @@ def test_more_jobs_leave_the_first_ones_and_all_kinds_come_in_turn() -> None:
     few, many = make_jobs(FIRST_SEED, 5, 2), make_jobs(FIRST_SEED, len(UNKNOWNS), 3)
     assert set(few) <= set(many)
     assert {job.hidden for job in many} == {*UNKNOWNS, NOISE}
+
+
+def test_every_page_names_the_day_and_the_commit_of_its_run(tmp_path):
+    write_page(tmp_path / "page.md", "# A page\n")
+    pages = [tmp_path / "page.md", *(Path(__file__).parents[1] / "benchmarks").glob("*.md")]
+    assert len(pages) > 10
+    for page in pages:
+        last = page.read_text(encoding="utf-8").splitlines()[-1]
+        assert re.fullmatch(
+            r"Run on 20\d\d-\d\d-\d\d.*, (committed as|commit) ([0-9a-f]{7,}(-dirty)?|unknown)\.", last
+        ), page

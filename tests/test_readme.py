@@ -29,16 +29,14 @@ def shown(command: str) -> list[str]:
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 COMMANDS = [line[2:] for line in README.splitlines() if line.startswith("$ tps ")]
-FILES = ("mine.toml", "kinematics.hal")  # of the reader: nothing to run
 
 
 def test_commands_print_what_is_shown(tmp_path, monkeypatch, capsys):
     """In the order of the README, in one test: one command may need what an earlier one wrote."""
     (tmp_path / "programs").symlink_to(ROOT / "programs")
     monkeypatch.chdir(tmp_path)
-    commands = [command for command in COMMANDS if not any(name in command for name in FILES)]
-    assert len(commands) > 4
-    for command in commands:
+    assert len(COMMANDS) > 8
+    for command in COMMANDS:
         arguments = command.split("#")[0].split()[1:]
         if arguments[0] in ("analyze", "place", "diagnose", "update"):
             arguments.append("--no-plots")
@@ -79,6 +77,15 @@ def test_python_example_runs(tmp_path, monkeypatch, capsys):
         exec(compile(code, "README.md", "exec"), {})
         out = capsys.readouterr().out
     assert "stiffness_N_per_mm" in out
+
+
+def test_the_first_screen_says_what_it_is_and_what_to_do():
+    screen = README.splitlines()[:12]
+    assert sum(line.startswith("![") for line in screen) == 1
+    assert [line.split()[:2] for line in screen if line.startswith("    ")] == [["make", "demo"], ["make", "test"]]
+    assert [line.split()[2] for line in screen if line.startswith("- `tps ")] == ["analyze", "place", "diagnose"]
+    between = README.split("**1. ", 1)[1].split("**2. ", 1)[0].split("```")[-1]
+    assert len(between.strip().splitlines()) <= 3
 
 
 def test_links_lead_somewhere():

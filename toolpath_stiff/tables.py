@@ -87,7 +87,7 @@ Cell = tuple[int, str, str]  # line, column, text
 SPREADSHEET_ERROR = re.compile(r"#[A-ZÄÖÜ][A-ZÄÖÜ0-9/_]*[!?]|#N/A|#N/?V")
 ZIP, OLD_EXCEL = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 LARGEST_BYTES = 200_000_000  # unpacked
-LARGEST_CELLS = 5_000_000
+LARGEST_CELLS = 500_000  # of a sheet, empty ones among them: openpyxl makes an object of each
 SAVE_AS = "save it as .xlsx or CSV"
 
 
@@ -577,7 +577,7 @@ def sheet_grid(content: bytes, file: str, sheet: str = "") -> Grid:
     cells = [list(row) for row in chosen.values]
     if any(value is None for row in cells for value in row):
         _refuse_formulas(cells, _open(content, file, values=False)[chosen.title], file)
-    hidden = sum(bool(chosen.row_dimensions[i].hidden) for i in range(1, chosen.max_row + 1))
+    hidden = sum(bool(row.hidden) for i, row in chosen.row_dimensions.items() if i <= len(cells))
     if hidden:
         notes.append(f"{file}: {hidden} hidden rows of sheet {chosen.title!r} are read as well")
     merged = _fill_merged(chosen, cells)
@@ -590,16 +590,25 @@ def sheet_names(content: bytes, file: str) -> list[str]:
     if content.startswith(OLD_EXCEL):
         raise TableError("an old or a protected Excel file", expected="an .xlsx workbook", hint=SAVE_AS, file=file)
     _refuse_large(content, file)
-    return [one.title for one in _filled(_open(content, file, values=True))]
+    return [one.title for one in _filled(_open(content, file, values=True), file)]
 
 
-def _filled(workbook: Any) -> list[Any]:
-    return [one for one in workbook.worksheets if any(v is not None for row in one.values for v in row)]
+def _filled(workbook: Any, file: str) -> list[Any]:
+    """Sheets with something in them. Raises `InputError` where one is too large to be looked through."""
+    for sheet in workbook.worksheets:
+        if sheet.max_row * sheet.max_column > LARGEST_CELLS:
+            raise _too_large(f"sheet {sheet.title!r} has {sheet.max_row} rows and {sheet.max_column} columns", file)
+    return [sheet for sheet in workbook.worksheets if any(v is not None for row in sheet.values for v in row)]
+
+
+def _too_large(found: str, file: str) -> InputError:
+    expected = f"at most {LARGEST_CELLS:,} cells, empty ones among them"
+    return TableError(found, expected=expected, hint="delete the empty ones, or save the sheet as CSV", file=file)
 
 
 def _chosen_sheet(workbook: Any, file: str, sheet: str) -> tuple[Any, list[str]]:
     """The sheet of that name, or the first that is not empty, and a note where there are others."""
-    filled = _filled(workbook)
+    filled = _filled(workbook, file)
     names = [one.title for one in filled]
     if not filled:
         raise TableError("the workbook is empty", file=file)
@@ -607,12 +616,6 @@ def _chosen_sheet(workbook: Any, file: str, sheet: str) -> tuple[Any, list[str]]
         found = f"the workbook has no sheet {sheet!r} with cells"
         raise TableError(found, expected=f"one of {', '.join(names)}", file=file)
     chosen = filled[names.index(sheet) if sheet else 0]
-    if chosen.max_row * chosen.max_column > LARGEST_CELLS:
-        raise TableError(
-            f"sheet {chosen.title!r} has {chosen.max_row} rows and {chosen.max_column} columns",
-            hint="delete the empty ones, or save the sheet as CSV",
-            file=file,
-        )
     if len(filled) == 1 or sheet:
         return chosen, []
     others = ", ".join(names[1:])
@@ -626,12 +629,16 @@ def _refuse_large(content: bytes, file: str) -> None:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = archive.namelist()
             size = sum(part.file_size for part in archive.infolist())
+            sheets = [name for name in names if name.startswith("xl/worksheets/") and size <= LARGEST_BYTES]
+            cells = sum(len(re.findall(rb"<c[ >/]", archive.read(name))) for name in sheets)
     except Exception:  # a damaged one, or of a kind that the library does not know
         raise TableError("a damaged Excel workbook", hint=SAVE_AS, file=file) from None
     if "xl/workbook.xml" not in names:
         raise TableError("neither text nor an Excel workbook", hint=SAVE_AS, file=file)
     if size > LARGEST_BYTES:
         raise TableError(f"a workbook of {size / 1e6:.0f} MB unpacked", hint="save the sheet as CSV", file=file)
+    if cells > LARGEST_CELLS:
+        raise _too_large(f"a workbook of {cells:,} cells", file)
 
 
 def _open(content: bytes, file: str, values: bool) -> Any:
@@ -648,7 +655,10 @@ def _open(content: bytes, file: str, values: bool) -> Any:
             warnings.simplefilter("ignore")  # what it leaves out (validations, pictures) is nothing of ours
             return openpyxl.load_workbook(io.BytesIO(content), data_only=values)
     except Exception as error:  # whatever a damaged file makes of the library
-        raise TableError(f"an Excel workbook that cannot be read: {error}", hint=SAVE_AS, file=file) from None
+        reason = (
+            str(error.__cause__ or error).partition("\n")[0] or type(error).__name__
+        )  # the library's has three lines
+        raise TableError(f"an Excel workbook that cannot be read: {reason}", hint=SAVE_AS, file=file) from None
 
 
 def _refuse_formulas(cells: list[list[Any]], written: Any, file: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from datetime import datetime
 
 import numpy as np
@@ -189,6 +190,36 @@ def test_what_is_wrong_in_a_workbook_is_named_by_row_and_column(tmp_path, rows, 
     with pytest.raises((InputError, InputErrors)) as caught:
         read_measurements(str(file), nist())
     assert told in str(caught.value)
+
+
+def part_replaced(content: bytes, old: bytes, new: bytes) -> bytes:
+    """A workbook with other text in its only sheet."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as source, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as target:
+        for name in source.namelist():
+            part = source.read(name)
+            target.writestr(name, part.replace(old, new) if name.endswith("sheet1.xml") else part)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (b'r="A2"', b'r="A1e400"', "an Excel workbook that cannot be read: invalid literal"),
+        (b'r="A2"', b'r="A100000"', "sheet 'Data' has 100000 rows and 6 columns; expected at most 500,000 cells"),
+        (b"</row>", b"</row>" + 90_000 * (b"<row>" + 6 * b"<c/>" + b"</row>"), "a workbook of 1,080,012 cells"),
+    ],
+)
+def test_a_broken_or_endless_sheet_is_refused_in_one_line(tmp_path, monkeypatch, old, new, told):
+    """Nothing is looked through cell by cell before its size is known."""
+    file = tmp_path / "a.xlsx"
+    file.write_bytes(part_replaced(workbook(("Data", [HEADING, [0, 0, 800, "X", 40000, "a"]])), old, new))
+    monkeypatch.setattr(
+        "openpyxl.worksheet.worksheet.Worksheet.values", property(lambda _: pytest.fail("looked through"))
+    )
+    with pytest.raises(InputError) as caught:
+        read_measurements(str(file), nist())
+    assert told in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_cells_merged_below_each_other_hold_their_value_in_each(tmp_path):

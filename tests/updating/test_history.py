@@ -222,3 +222,46 @@ def test_wrong_bench_records_are_named(text, message, tmp_path):
     file.write_text(text)
     with pytest.raises((InputError, InputErrors), match=message):
         tps.reduce(file)
+
+
+# -- tables of stiffnesses ---------------------------------------------------------------------------------------------
+
+
+def stiffness_table(dates: list[str], values=lambda i: 40_000 + 10 * (i % 7)) -> str:
+    rows = [f"{i % 6 + 1},{date},{values(i)}" for i, date in enumerate(d for d in dates for _ in range(6))]
+    return "\n".join(["strut,date,stiffness_N_per_mm", *rows]) + "\n"
+
+
+@pytest.mark.parametrize("dates", [["2021-01", "2022-01"], ["2021", "2022", "2023"]])
+def test_months_and_years_are_drawn(dates, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("short.csv").write_text(stiffness_table(dates))
+    assert main(["reduce", "short.csv"]) == 0
+    assert Path("short_measurements_history.png").read_bytes().startswith(b"\x89PNG")
+    drawn = tps.reduce("short.csv").plot().axes[0].lines[0].get_xdata()
+    assert [str(day)[: len(date)] for day, date in zip(drawn, dates, strict=True)] == dates
+
+
+def test_failed_tests_are_set_aside_and_struts_are_printed(tmp_path):
+    """40 of 2,941 rows of a bench stood near zero, and the whole table was refused."""
+    file = tmp_path / "bench.csv"
+    dates = [f"{2015 + i // 50}-{i % 50 // 5 + 1:02d}-{i % 5 + 1:02d}" for i in range(490)]
+    file.write_text(stiffness_table(dates, lambda i: (-3.0, 0, 55)[i % 3] if i % 73 == 5 else 40_000 + 10 * (i % 7)))
+    found = tps.reduce(file)
+    (note,) = found.notes
+    assert (
+        note
+        == f"{file}: 41 of 2940 rows with a stiffness within 100 N/mm of zero are left out as failed tests, from line 7"
+    )
+    assert len(found.to_dict()["loops"]) == 2940 - 41
+    assert all(
+        one["stiffness_N_per_mm"] == pytest.approx(40_030, abs=3) for one in found.to_dict()["history"]["struts"]
+    )
+    assert len(str(found).splitlines()) < 20 and str(found).count("strut 6 alone") == 1
+
+
+def test_a_table_near_zero_is_in_another_unit(tmp_path):
+    file = tmp_path / "bench.csv"
+    file.write_text(stiffness_table(["2021-01-01", "2022-01-01"], lambda i: 40 if i else 40_000))
+    with pytest.raises(InputErrors, match=r"bench.csv:3: 11 of 12 rows .* the first 40. Is the unit right"):
+        tps.reduce(file)

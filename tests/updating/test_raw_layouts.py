@@ -175,7 +175,10 @@ def test_files_of_other_tools_are_refused_with_what_to_do(start, message, tmp_pa
     ("text", "message"),
     [("force_N,disp_um\n0,0\n3,12,5\n", "row with 3 cells"), ("F1_N,d1_um,F2_N\n0,0,0\n", "displacement of strut 2"),
      ("F1_N,d1_um,F2_kN,d2_um\n0,0,0,0\n", "different units"),
-     ("force_N,disp_um\n0,0\n5,1.2.3\n", "displacement_um = ")],
+     ("force_N,disp_um\n0,0\n5,1.2.3\n", "displacement_um = "),
+     # One heading less than columns, and a line broken in the middle of a number.
+     ("  date   force_N  displacement_um\n" + 2 * " 1  2021-01-01  100  2.500\n" + " 1  2021-01-01  -20\r0  -5.0\n",
+      "csv:5: row with 2 cells; expected 4")],
 )  # fmt: skip
 def test_what_cannot_be_read_is_refused(text, message, reduced):
     with pytest.raises((InputError, InputErrors), match=message):

@@ -72,16 +72,26 @@ class Reduction(Result):
         return pd.DataFrame(self.to_dict()["loops"])
 
     def plot(self) -> Figure:
-        """Force against deflection of each loop."""
-        from toolpath_stiff.report.measuring import loops_png
+        """Force against deflection of each loop; without records the struts over their dates."""
+        from toolpath_stiff.report.measuring import loops_png, recorded
+        from toolpath_stiff.report.readings import dated, history_png
 
-        return loops_png.figure(self.reduced.loops, self.reduced.figures, self._title)
+        loops, figures = recorded(self.reduced)
+        if loops:
+            return loops_png.figure(loops, figures, self._title)
+        if not dated(self.reduced.history):
+            raise InputError("nothing to draw: neither records nor several dates")
+        return history_png.figure(self.reduced.history)
 
     def __str__(self) -> str:
         from toolpath_stiff.report.measuring import loops_text
         from toolpath_stiff.report.readings import history_text
 
-        return "\n".join([loops_text(self.to_dict()["loops"]), *history_text(self.reduced.history)])
+        pairs = zip(self.to_dict()["loops"], self.reduced.loops, strict=True)
+        recorded = [entry for entry, loop in pairs if len(loop.force)]
+        if not recorded:  # a table of stiffnesses has nothing to say of its rows that they do not say themselves
+            return "\n".join(history_text(self.reduced.history, undated=True)).lstrip("\n")
+        return "\n".join([loops_text(recorded), *history_text(self.reduced.history)])
 
     @property
     def _title(self) -> str:

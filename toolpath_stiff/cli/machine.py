@@ -173,7 +173,7 @@ examples:
   tps machine show nist --out hexapod.png           figures with their origin; the machine at the paper's pose
   tps machine new mine.toml                         a commented template to edit
   tps machine check mine.toml
-  tps machine from-linuxcnc kinematics.hal -o mine.toml
+  tps machine from-linuxcnc programs/hexapod.hal --units mm -o hexapod.toml
   tps machine recover                               the NIST geometry from the paper's Table 1, fitted anew
 """
 MACHINE_OUT_OF_REACH = NOT_GOOD = 1

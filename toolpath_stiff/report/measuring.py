@@ -306,13 +306,18 @@ def loops_png(loops: Sequence[Loop], figures: Sequence[LoopFigures], title: str)
         return figure
 
 
+def recorded(reduction: Reduction) -> tuple[list[Loop], list[LoopFigures]]:
+    """Loops with their records, and what they say; rows of a table of stiffnesses have none."""
+    pairs = [pair for pair in zip(reduction.loops, reduction.figures, strict=True) if len(pair[0].force)]
+    return [loop for loop, _ in pairs], [one for _, one in pairs]
+
+
 def loop_files(reduction: Reduction, out: Path, title: str, *, plots: bool = True) -> dict[Path, Content]:
     """The measurement file, and with `plots` the loops drawn under `title`; dated struts over their dates."""
     contents: dict[Path, Content] = {out: measurement_csv(reduction)}
-    recorded = [i for i, loop in enumerate(reduction.loops) if len(loop.force)]
     if plots:
-        if recorded:
-            loops, figures = [reduction.loops[i] for i in recorded], [reduction.figures[i] for i in recorded]
+        loops, figures = recorded(reduction)
+        if loops:
             contents[out.with_name(f"{out.stem}_loops.png")] = loops_png(loops, figures, title)
         if dated(reduction.history):
             contents[out.with_name(f"{out.stem}_history.png")] = history_png(reduction.history)

@@ -37,6 +37,7 @@ from toolpath_stiff.report.figure import (
 )
 from toolpath_stiff.report.painting import add_scales, painted_axes
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.updating.dates import date_text, day_of
 from toolpath_stiff.updating.history import history_lines
 from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent
 
@@ -392,9 +393,9 @@ def _remark(history: HistoryDocument) -> list[str]:
     return [f"scatter from date to date {history['scatter_percent']:.2g} %: {history['scatter_from']}"]
 
 
-def history_text(history: HistoryDocument) -> list[str]:
-    """Lines for the terminal; none without dates and without both signs of the force."""
-    if not _shown(history):
+def history_text(history: HistoryDocument, undated: bool = False) -> list[str]:
+    """Lines for the terminal; without dates and without both signs of the force only where `undated` are wanted."""
+    if not (undated or _shown(history)):
         return []
     rows = [HISTORY_HEAD, *_rows(history)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HISTORY_HEAD))]
@@ -439,10 +440,13 @@ def _strut(axes: Axes, one: StrutEntry) -> None:
     """One strut: dates as points, changes in orange."""
     from datetime import date
 
-    days = [date.fromisoformat(entry["date"]) for entry in one["dates"]]
+    def day(text: str) -> date:
+        return date.fromisoformat(date_text(day_of(text)))  # a year or a month alone is its middle
+
+    days = [day(entry["date"]) for entry in one["dates"]]
     axes.plot(days, [entry["stiffness_N_per_mm"] for entry in one["dates"]], "o", color=MUTED, markersize=4.0)  # type: ignore[arg-type]
     for change in one["changes"]:
-        ends = [date.fromisoformat(change["after"]), date.fromisoformat(change["before"])]
+        ends = [day(change["after"]), day(change["before"])]
         levels = [change["from_N_per_mm"], change["to_N_per_mm"]]
         if change["kind"] == "step":
             axes.axvspan(ends[0], ends[1], color=SECOND_ORANGE, alpha=0.25, linewidth=0.0)  # type: ignore[arg-type]

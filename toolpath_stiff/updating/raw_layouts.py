@@ -462,6 +462,10 @@ def _tables(
     notes += [f"{file}: {note}" for note in more]
     if "" in heading or len(set(heading)) < len(heading):
         keep = [i for i, name in enumerate(heading) if name and heading.index(name) == i]
+        for n, cells in rows:
+            if len(cells) <= max(keep, default=0):
+                expected = f"{len(heading)} as in the heading"
+                raise TableError(f"row with {len(cells)} cells", expected=expected, file=file, line=n)
         heading, rows = [heading[i] for i in keep], [(n, [c[i] for i in keep]) for n, c in rows]
     known = Grid([(layout.line, heading), *rows], grid.separator, grid.notes)
     table = grid_table(known, file, columns)

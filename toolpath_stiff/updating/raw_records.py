@@ -57,6 +57,8 @@ from toolpath_stiff.updating.rows import (
     DATE,
     LABELS,
     POSITION,
+    SOFTEST,
+    STIFFEST,
     VECTOR,
     direction_of,
     loop_of,
@@ -78,6 +80,7 @@ PLACE = (
 )  # what one loop has in common
 CONDITIONS = ("time_min", "temperature_C")
 STIFFNESS = ("stiffness_N_per_mm", "strut_force_N")  # of a table of struts that were reduced elsewhere
+FAILED = 0.05  # of the rows of such a table: tests that may have failed, near zero; of more the unit is wrong; assumed
 COLUMNS = Columns(
     numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", "length_mm", *READINGS, *CONDITIONS, *STIFFNESS),
     texts=("direction", *LABELS, DATE, "strut"),
@@ -244,6 +247,8 @@ def is_table(table: Table) -> bool:
 def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]]]:
     """Struts alone of a table of stiffnesses: loops without records, and of each N/m and N (nan where not given).
 
+    A few rows with a stiffness near zero are failed tests: they are left out, with a note.
+
     Raises
     ------
     InputError, InputErrors
@@ -260,7 +265,7 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
         )
     known = ("strut", *LABELS, DATE, "length_mm", *STIFFNESS)
     notes = [f"{table.file}: column {name} is not used" for name in heading if name not in known]
-    loops, figures = [], []
+    loops, figures, failed = [], [], []
     for line, cells in table.rows:
         try:
             record = table.record(cells)
@@ -268,6 +273,9 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
                 raise MeasurementError("a row of no strut", expected="strut 1 to 6")
             day_of(record.get(DATE, ""))
             optional_number(record, "length_mm")
+            if abs(number(record, STIFFNESS[0], (-STIFFEST, STIFFEST))) < SOFTEST:
+                failed.append((line, record[STIFFNESS[0]]))
+                continue
             own = n_per_m_from_n_per_mm(number(record, STIFFNESS[0])), optional_number(record, STIFFNESS[1])
         except InputError as error:
             errors.append(
@@ -278,6 +286,13 @@ def read_stiffnesses(table: Table) -> tuple[RawRecords, list[tuple[float, float]
         place = {name: record[name] for name in PLACE if record.get(name)}
         loops.append(Loop(place, {}, None, none, none, line, table.file))
         figures.append(own)
+    many = f"{len(failed)} of {len(table.rows)} rows with a stiffness within {SOFTEST:g} N/mm of zero"
+    if len(failed) > FAILED * len(table.rows):
+        line, cell = failed[0]
+        hint = f"is the unit right? At most {100 * FAILED:g} % are left out as failed tests"
+        errors.append(MeasurementError(f"{many}, the first {cell}", hint=hint, file=table.file, line=line))
+    elif failed:
+        notes.append(f"{table.file}: {many} are left out as failed tests, from line {failed[0][0]}")
     if errors:
         raise InputErrors(errors)
     if not loops:

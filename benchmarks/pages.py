@@ -1,0 +1,39 @@
+"""The pages that benchmarks write: what they found, the day and the commit."""
+
+from __future__ import annotations
+
+import subprocess
+from datetime import UTC, datetime
+from pathlib import Path
+
+from toolpath_stiff.files import write_atomically
+
+
+def commit() -> str:
+    """The commit of this checkout, with -dirty where files differ from it; "unknown" without git."""
+    command = ["git", "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return done.stdout.strip()
+
+
+STARTED = datetime.now(UTC).date(), commit()  # a run takes hours, in which the checkout may move on
+
+
+def write_page(file: str | Path, text: str, *, of_records: bool = False) -> None:
+    """Write a page, with a last line on the run that made it.
+
+    Parameters
+    ----------
+    file
+        The page.
+    text
+        What it holds, in markdown.
+    of_records
+        Whether it tabulates the records of an earlier run.
+    """
+    what = "Tabulated anew from an earlier run's records" if of_records else "Run"
+    day, name = STARTED
+    write_atomically(file, f"{text.rstrip()}\n\n{what} on {day}, commit {name}.\n")
