@@ -233,6 +233,7 @@ MOST_REPEATS = 9999
 FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
 SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
 HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
+LABEL = re.compile(r"\s*(%\s*\d+)\s*", re.ASCII)
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
 
 
@@ -249,6 +250,16 @@ class Subprogram:
 def beyond_the_end(what: str, at: int, lines: int) -> str:
     """The warning that lines follow what ends a program in line `at` (from 0)."""
     return f"what follows {what} in line {at + 1} is not part of the program (lines: {lines})"
+
+
+def without_label(state: State, lines: tuple[str, ...]) -> tuple[str, ...]:
+    """The lines, without what stands behind the first tape mark in the dialect fanuc, whose controls skip that."""
+    at = next((at for at, line in enumerate(lines) if line.strip()), 0)
+    label = LABEL.fullmatch(lines[at]) if lines and state.dialect.name == "fanuc" else None
+    if label is None:
+        return lines
+    state.note(at + 1, Word("%", 0.0, label.start(1) + 1, label[1]), "program number")
+    return (*lines[:at], "%", *lines[at + 1 :])
 
 
 class ProgramRun:
@@ -269,7 +280,7 @@ class ProgramRun:
     def __init__(
         self, state: State, lines: tuple[str, ...], name: str, switches: frozenset[int], fast: bool = True
     ) -> None:
-        self.state, self.lines, self.name = state, lines, name
+        self.state, self.lines, self.name = state, without_label(state, lines), name
         self._plain: PlainRun | None = None
         if fast and len(lines) >= FEWEST_LINES:
             from toolpath_stiff.nc.plain_lines import PlainRun
@@ -392,12 +403,12 @@ class ProgramRun:
 
     def _enter(self, at: int, call: Call) -> int:
         """The line at which the called subprogram begins."""
+        code = "M98" if not call.local else "M97" if self.state.dialect.local_calls else "M98 Q"
         if call.local:
-            name, repeats, first = f"N{call.number}", call.repeats or 1, self._block_numbered(at, "M97 calls", call)
+            name, repeats, first = f"N{call.number}", call.repeats or 1, self._block_numbered(at, f"{code} calls", call)
         else:
             number, repeats = self._target(at, call)
             name, first = f"O{number}", self._heads()[number] + 1
-        code = "M97" if call.local else "M98"
         if not 1 <= repeats <= MOST_REPEATS:
             raise self._fail(at, f"{code} with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
         if any(level.name == name for level in self._levels):
