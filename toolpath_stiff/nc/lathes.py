@@ -61,7 +61,7 @@ def lathe_program(lines: Sequence[str], name: str) -> InputError | None:
     return ProgramError(
         f"a lathe's program: {', '.join(f'{what} (line {line})' for line, what in signs)}",
         expected="a mill's: on a lathe X is a diameter",
-        hint=f"{LATHE_HINT}; --dialect linuxcnc reads X as LinuxCNC does",
+        hint=f"{LATHE_HINT}; one of LinuxCNC's lathes, whose X is a radius (G8), is read with --dialect linuxcnc",
         file=name,
         line=signs[0][0],
     )

@@ -253,7 +253,7 @@ _FEEDS, _SPINDLE = g_codes("G93 G94 G95"), g_codes("G96 G97")
 FEED_CODES = (
     Code("F", FEED, feed_word, "feed", "LinuxCNC, Other Codes, F: Set Feed Rate"),
     Code("S", SPEED, speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
-    Code("G4", ONCE, dwell, "dwell", g_codes("G4"), step=DWELL),
+    Code("G4", ONCE, dwell, "dwell", f"{g_codes('G4')}; {_FANUC}, Dwell (G04); Marlin, G004", step=DWELL),
     Code("G93", FEED_MODE, feed_mode, "inverse-time feed", _FEEDS),
     Code("G94", FEED_MODE, feed_mode, "feed per minute", _FEEDS),
     Code("G95", FEED_MODE, feed_mode, "feed per revolution", _FEEDS),
