@@ -438,7 +438,7 @@ _LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beg
 
 
 def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
-    """That numbers which counted increments are written as in mm: X10 beside X5.5, and never X10.
+    """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
 
     Where whole numbers are increments, posts end those in mm with their point.
     """

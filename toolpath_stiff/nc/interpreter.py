@@ -5,7 +5,7 @@ The meaning of each code is a function in `codes`, found in the table of `codes.
 
 Subprograms are those of Fanuc's controls: O numbers within the file, after the main program or before it, called by
 `M98 P1000 L2` or, with the repeats before the four digits of the number, `M98 P21000`; they end with M99. LinuxCNC
-reads the first form alike. `M97 P100` (Haas) calls the block N100 of the file, up to an M99. Modal state goes through
+reads the first form alike. `M97 P100` (Haas) or `M98 Q100` (Fanuc) calls the block N100 of the file, up to an M99. Modal state goes through
 a call unchanged.
 """
 
@@ -254,12 +254,12 @@ def beyond_the_end(what: str, at: int, lines: int) -> str:
 
 def without_label(state: State, lines: tuple[str, ...]) -> tuple[str, ...]:
     """The lines, without what stands behind the first tape mark in the dialect fanuc, whose controls skip that."""
-    at = next((at for at, line in enumerate(lines) if line.strip()), 0)
-    label = LABEL.fullmatch(lines[at]) if lines and state.dialect.name == "fanuc" else None
+    first = next((index for index, line in enumerate(lines) if line.strip()), 0)
+    label = LABEL.fullmatch(lines[first]) if lines and state.dialect.name == "fanuc" else None
     if label is None:
         return lines
-    state.note(at + 1, Word("%", 0.0, label.start(1) + 1, label[1]), "program number")
-    return (*lines[:at], "%", *lines[at + 1 :])
+    state.note(first + 1, Word("%", 0.0, label.start(1) + 1, label[1]), "program number")
+    return (*lines[:first], "%", *lines[first + 1 :])
 
 
 class ProgramRun:

@@ -71,12 +71,12 @@ def _signs(lines: Iterable[str]) -> list[tuple[int, str]]:
     """Line (from 1) and name of each sign, in the order of lines."""
     blocks = ["".join(_NO_CODE.sub(" ", line).split()).upper() for line in lines]
     text = "\n".join(blocks)
-    found = []
+    signs = []
     for sign in SIGNS:
         if (sign.nowhere and sign.nowhere.search(text)) or (sign.beside and not sign.beside.search(text)):
             continue
         for number, block in enumerate(blocks, 1):
             if sign.pattern.search(block) and not (sign.not_in and sign.not_in.search(block)):
-                found.append((number, sign.what))
+                signs.append((number, sign.what))
                 break
-    return sorted(found)
+    return sorted(signs)

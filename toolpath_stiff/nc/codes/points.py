@@ -328,8 +328,9 @@ def increments_hint(state: State) -> str:
     """What to do about an arc that fits nowhere, once numbers without a point were counted in increments."""
     if INCREMENTS.format(state.dialect.name) not in state.assumptions:
         return ""
-    unit = "0.0001 inch" if state.inch else "0.001 mm"
-    return f"numbers without a point are read in {unit} (--dialect {state.dialect.name}); leave it out if X10 means 10"
+    step, unit = ("0.0001", "inch") if state.inch else ("0.001", "mm")
+    name = state.dialect.name
+    return f"numbers without a point are read in {step} {unit} (--dialect {name}); without it X10 is 10 {unit}"
 
 
 def watches_points(state: State) -> bool:
