@@ -5,8 +5,8 @@ The meaning of each code is a function in `codes`, found in the table of `codes.
 
 Subprograms are those of Fanuc's controls: O numbers within the file, after the main program or before it, called by
 `M98 P1000 L2` or, with the repeats before the four digits of the number, `M98 P21000`; they end with M99. LinuxCNC
-reads the first form alike. `M97 P100` (Haas) or `M98 Q100` (Fanuc) calls the block N100 of the file, up to an M99. Modal state goes through
-a call unchanged.
+reads the first form alike. `M97 P100` (Haas) and `M98 Q100` (Fanuc) call the block N100 of the file, up to an M99.
+Modal state goes through a call unchanged.
 """
 
 from __future__ import annotations
