@@ -112,6 +112,9 @@ def test_an_effect_that_is_sound_adds_what_it_says(tmp_path):
 WRONG_DECLARATIONS = [
     ([("1e-9", '"nano"')], 14, "parameter c: si = 'nano'; expected the SI value of one nm/N"),
     ([("1e-9", "-1e-9")], 14, "si = -1e-09"),
+    ([("1e-9", "1" + 400 * "0")], 14, "si = 1000000000... (401 characters); expected the SI value of one nm/N"),
+    ([("1e-9", "10**5000")], 14, "si = a number of thousands of digits; expected the SI value of one nm/N"),
+    ([("(0.0, 100.0)", "(0, 10**400)")], 14, "bounds = (0, 100000... (406 characters); expected two numbers"),
     ([("(0.0, 100.0)", "(100.0, 0.0)")], 14, "low < high with the neutral value between them"),
     ([("(0.0, 100.0)", "100.0")], 14, "bounds = 100.0; expected two numbers"),
     ([("(1.0, 5.0)", "(1.0, 500.0)")], 14, "typical (1.0, 500.0)"),

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import parse_program, read_program
+from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.controller import DIALECTS, Controller, read_controller
 from toolpath_stiff.rewriting import rewrite_program
 
@@ -69,6 +70,10 @@ def test_what_was_counted_is_said_and_a_mixed_program_is_warned_of():
         ("G20 G4 X1500", FANUC, 1.5),
         ("G4 P1500", HAAS, 1.5),
         ("G4 P1.5", HAAS, 1.5),
+        ("G4 S2", PLAIN, 2.0),  # Marlin
+        ("G4 X1.5", PLAIN, 1.5),  # Fanuc
+        ("G4", PLAIN, 0.0),  # an exact stop (Fanuc)
+        ("G4", FANUC, 0.0),
         ("G82 Z-1. R1. P500", FANUC, 0.5),
         ("G82 Z-1. R1. P0.5", PLAIN, 0.5),
     ],
@@ -116,6 +121,14 @@ def test_subprograms_with_repeats_in_p():
         ("G1 X1. F10", HAAS, "parameters"),
         ("G20 G1 X1. F10", FANUC, "parameters"),
         ("G4 P1.5", FANUC, "decimal point"),
+        ("G4 X2", PLAIN, "X2. alone, for seconds"),
+        ("G4 X2. Y3", PLAIN, "X2. alone, for seconds"),
+        ("G4 S2", LINUXCNC, "needs its time"),
+        ("G4", LINUXCNC, "needs its time"),
+        ("%00229", PLAIN, "a program's name behind `%`.*--dialect fanuc"),
+        ("%00229", HAAS, "a program's name behind `%`"),
+        ("M98 Q10\nM30\nN10 M99", PLAIN, "Q10 beside M98 .*--dialect fanuc"),
+        ("M98 P5 Q10\nM30\nO5\nX1.\nN10 M99", FANUC, "Q10 beside M98 .* a subprogram of its own"),
         ("G1 X1. F10. ; G1 X2.", FANUC, "ends the block"),
         ("/0 G1 X1 F10", PLAIN, "block-delete switch"),
         ("/12 G1 X1 F10", PLAIN, "block-delete switch"),
@@ -124,6 +137,31 @@ def test_subprograms_with_repeats_in_p():
 def test_refusals_of_a_dialect(text, controller, words):
     with pytest.raises(InputError, match=words):
         parse_program(text + "\nG1 F10. X3.", "part.nc", controller=controller)
+
+
+def test_a_number_behind_the_tape_mark_and_a_call_by_n_number_are_fanuc_s():
+    text = "%00229\nG1 F10. X1.\nM98 Q10 L2\nX5.\nM30\nN10 G91 Y1.\nG90 M99\n%\n"
+    program = parse_program(text, "p.nc", controller=FANUC)
+    assert (program.moves.end[:, :2] * 1e3).round(6).tolist() == [[1, 0], [1, 1], [1, 2], [5, 2]]
+    assert program.source[0] == "%00229" and program.unsupported[0].word == "%00229"
+    assert any("M98 Q" in text for text in program.assumptions)
+    with pytest.raises(InputError, match="M98 Q calls N10, and the file has no such block"):
+        parse_program(text.replace("\nN10 ", "\n"), "p.nc", controller=FANUC)
+
+
+def test_numbers_in_increments_that_look_like_millimetres():
+    arc = "G0 X10 Y5\nG1 F100. X30\nG2 X40.5 Y15.5 R10.5\nM30\n"
+    with pytest.raises(InputError, match=r"cannot reach .* without a point are read in 0\.001 mm .--dialect fanuc"):
+        parse_program(arc, "p.nc", controller=FANUC)
+    with pytest.raises(InputError) as pointed:
+        parse_program("G1 F100. X1.\nG2 X40.5 Y15.5 R10.5\n", "p.nc", controller=FANUC)
+    assert not pointed.value.hint
+    for text, warned in ((".5", True), (".", False), ("", False)):
+        lines = f"G1 F100. X10 (Y5.5)\nY20{text}\n"
+        warnings = parse_program(lines, "p.nc", controller=FANUC).warnings
+        assert any("X10 stands beside numbers with decimals" in w for w in warnings) is warned
+        findings = check_lines(tuple(lines.splitlines()), "p.nc", controller=FANUC).findings
+        assert any("X10 stands beside numbers with decimals" in f.text for f in findings) is warned
 
 
 def test_a_controller_file(tmp_path):
@@ -229,6 +267,10 @@ def test_the_options_of_the_command_line(tmp_path, capsys):
         ("N5 TRANS X10 Y20\n", "Siemens", 1),
         ("N5 CYCLE81(10,0,2,-5)\n", "Siemens", 1),
         ("G0 X1\n" * 60 + "R1=5\n", "Siemens", 61),
+        ("G21\nN10 #SLOPE[TYPE=STEP]\n", "ISG", 2),
+        ("SLOPE[TYPE=HSC]\n", "ISG", 1),
+        (': (PGM, NAME="1001")\n: G90 G40 G94\n', "Acramatic", 1),
+        ("sub _tool_change[#tool] {\nG90\n}\n", "neither LinuxCNC's", 1),
     ],
 )
 def test_other_languages_are_refused_by_name(text, language, line):

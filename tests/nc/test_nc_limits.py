@@ -56,6 +56,17 @@ def test_many_lines_at_a_time_refuse_them_alike(word):
     assert caught.value.line == 63
 
 
+@pytest.mark.parametrize("lines", [1, 60])
+def test_an_arc_that_leaves_every_machine_is_refused_before_it_is_sampled(lines):
+    """Its ends lie where the program's do; of an outside program with a slip of unit in its I and K."""
+    plain = "".join(f"G1 X{i}.5 Y1.5\n" for i in range(lines))
+    with pytest.raises(InputError, match=r"goes 2e\+06 mm away from its start; expected at most 100000 mm") as caught:
+        parse_program(f"{HEAD}{plain}G3 Y1.6 I1000000 J0\n{plain}", "p.nc")
+    assert caught.value.line == lines + 3
+    nearly_straight = parse_program(f"{HEAD}{plain}G2 X{lines}.5 Y1.5 R1000000\n", "p.nc")
+    assert nearly_straight.moves.arc_sweep[-1] == pytest.approx(-1e-6, rel=1e-3)
+
+
 def test_a_tab_within_a_word_is_a_blank_to_both_ways_of_reading():
     lines = [HEAD.strip(), *(f"G1 X\t{i}5 Y 1 {i}." for i in range(1, 60))]
     many = parse_program("\n".join(lines), "p.nc")

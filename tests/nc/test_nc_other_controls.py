@@ -1,5 +1,7 @@
 """Words and codes of Fanuc's and Haas' controls that change no path, or as their manuals say: read, and listed."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,8 +12,9 @@ from toolpath_stiff.nc import parse_program, read_program
 from toolpath_stiff.nc.checking import check_lines
 from toolpath_stiff.nc.codes.registry import would_change
 from toolpath_stiff.nc.controller import Controller, dialect_named
+from toolpath_stiff.nc.lathes import lathe_program
 from toolpath_stiff.nc.moves import FEED, RAPID
-from toolpath_stiff.nc.words import read_block
+from toolpath_stiff.nc.words import read_block, read_lines
 
 HEAD = "G21 G90 F600.\nG0 Z5.\n"
 
@@ -341,6 +344,52 @@ def test_what_looks_like_a_lathe_s_program_gives_a_warning():
         assert any("looks like a lathe's program" in finding.text for finding in checked.findings)
     for blocks in ("G96 S100\nG1 X1. Y1.", "G95 S100 F.1\nG1 X1.\nG2 X3. I1.", "G1 X1.\nG50"):
         assert not any("lathe" in text for text in read(blocks).warnings)
+
+
+LATHE = {  # a sign alone, which is no more than doubted, and its name
+    "T0101\nG1 X1. Z-3.": "T with four digits and no M6",
+    "G18\nG1 X1. Z-3.": "G18 and never Y",
+    "G99\nG1 X1. F.1": "G99 and a feed below 1 a revolution",
+    "G28 U0 W0\nG1 X1. F9.": "G28 with U or W",
+    "G96 S200\nG1 X1. F9.": "G96 and never Y",
+}
+
+
+@pytest.mark.parametrize("pair", [(a, b) for a in LATHE for b in LATHE if a < b])
+def test_two_signs_of_a_lathe_are_refused_by_name(pair):
+    text = HEAD + "\n".join(pair)
+    for interpreter in ("builtin", "auto"):
+        with pytest.raises(InputError, match=r"a lathe's program: .*X is a diameter") as refusal:
+            parse_program(text, "p.nc", interpreter=interpreter)
+    assert all(LATHE[blocks] in str(refusal.value) for blocks in pair) and refusal.value.line in (3, 4)
+    checked = check_lines(tuple(text.splitlines()), "p.nc")
+    assert not checked.complete and "a lathe's program" in checked.findings[0].text
+    for blocks in pair:
+        read(blocks)
+
+
+def test_u_and_w_beside_another_sign_are_a_lathe_s():
+    with pytest.raises(InputError, match=r"no M6 \(line 3\), a U or W word \(line 4\)"):
+        read("T0101\nG1 U-2. W1.")
+
+
+@pytest.mark.parametrize(
+    "blocks",
+    [
+        "T0101\nM6\nG28 U0 W0\nG1 X1.",  # the tool is changed
+        "G28 U0 W0\nG99 G81 X1. Z-3. R1. F.5\nG80",  # G99 of a drilling cycle
+        "G18\n(T0101 F.1 G99)\nG2 X2. Z5. I1.",  # a comment
+        "G28 U0 W0\nG18\nG1 X1.\n" + "X2.\nX1.\n" * 1500 + "G17 Y1.",  # Y, far behind
+    ],
+)
+def test_a_mill_s_program_with_one_sign_is_read(blocks):
+    read(blocks)
+
+
+def test_no_packaged_program_looks_like_a_lathe_s():
+    programs = sorted((Path(__file__).parents[2] / "programs").glob("*.nc"))
+    assert len(programs) > 10
+    assert not [p.name for p in programs if lathe_program(read_lines(p), p.name)]
 
 
 def test_a_feed_for_programs_without_one():

@@ -65,7 +65,7 @@ REFUSALS = [
     ("F100\nG82 X1 Z-5 R5", 2, 1, "without its dwell"),
     ("F100\nG81 X1 Z5 R1", 2, 1, "below the bottom"),
     ("F100\nG81 X1 Z-5 R1 L20000", 2, 15, "number of repeats"),
-    ("G4", 1, 1, "needs its time"),
+    ("G4 F2", 1, 1, "needs its time"),
     ("G4 P-1", 1, 1, "needs its time"),
     ("G10 L2 P12 X1", 1, 1, "needs the work offset"),
     ("G10 L5 P1", 1, 1, "with L5"),

@@ -267,6 +267,14 @@ def test_refused_with_line_and_reason(text, controller, line, says):
     assert error.line == line and says in error.found, error
 
 
+@pytest.mark.parametrize("leave", ["break", "continue"])
+@pytest.mark.parametrize("loop", ["while [1]", "repeat [3]", "do"])
+def test_check_goes_on_behind_a_loop_without_its_end(loop, leave):
+    text = f"F100\nG0 X0\no10 {loop}\no10 {leave}\nG1 X1\nM2"
+    findings = check_lines(tuple(text.splitlines()), "p.nc", controller=LINUXCNC).findings
+    assert [(f.line, "has no end" in f.text) for f in findings if f.severity == "error"] == [(3, True), (4, True)]
+
+
 @pytest.mark.parametrize(
     ("text", "controller", "line"),
     [

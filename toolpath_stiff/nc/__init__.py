@@ -14,10 +14,13 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.hints import both_names
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain, switches_on
+from toolpath_stiff.nc.codes.points import increments_hint
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Dialect, Switches, check_plain, plain, switches_on
 from toolpath_stiff.nc.interpreter import ProgramRun
 from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.lathes import lathe_program
 from toolpath_stiff.nc.moves import MOTION_NAMES, RAPID, Moves, Program, ToolUse, Unsupported
+from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.state import START, Frames, State
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
 from toolpath_stiff.nc.words import HEAD_LINES, looks_like_cutter_location, read_lines, split_lines
@@ -34,8 +37,10 @@ __all__ = [
     "feed_assumption",
     "foreign_program",
     "lathe_warning",
+    "millimetre_warning",
     "parse_program",
     "read_program",
+    "refused_program",
 ]
 
 
@@ -43,9 +48,15 @@ __all__ = [
 
 _HEIDENHAIN = "Heidenhain's conversational language"
 _SIEMENS = "Siemens' own language (Sinumerik)"
+_ISG = "ISG's own language (Beckhoff TwinCAT CNC)"
+_ACRAMATIC = "the language of Acramatic controls (Cincinnati, Vickers)"
+_SUB = "neither LinuxCNC's language (o<name> sub) nor Fanuc's"
 HINTS = {
     _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
     _SIEMENS: "post it as ISO G code: no frames (TRANS, ROT), no CYCLE calls, no variables, no X=... words",
+    _ISG: "post it as ISO G code: no # commands, no $IF, no V. variables",
+    _ACRAMATIC: "post it as ISO G code of Fanuc's or LinuxCNC's kind",
+    _SUB: "post it as ISO G code, or write its subprograms as LinuxCNC's O words",
 }
 LONGEST_SIGN = 200  # characters of a line that are looked at
 
@@ -59,6 +70,9 @@ _SIGNS = (
     (_SIEMENS, r"DEF\s+(?:REAL|INT|BOOL|STRING|CHAR|AXIS|FRAME)\b|PROC\s+\w+|EXTERN\s+\w+"),
     (_SIEMENS, r"MSG\s*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+\s*\(|WORKPIECE\s*\("),
     (_SIEMENS, r"A?(?:TRANS|ROT|SCALE|MIRROR)(?:\s|;|$)|TRAORI\b|TRAFOOF\b|SUPA\b|D?R\d+\s*="),
+    (_ISG, r"#\s*SLOPE\b|SLOPE\s*\[|#\s*(?:TRAFO|HSC|RTCP|CS|MCS|SCALE)\s+(?:ON|OFF)\b|\$(?:IF|FOR|WHILE|ENDIF)\b"),
+    (_ACRAMATIC, r":?\s*\(\s*PGM\s*,\s*NAME\s*="),
+    (_SUB, r"SUB\s+\w+\s*\["),
     (_SIEMENS, r"(?:[A-Z]++[\d.+-]*+\s++)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
 )
 
@@ -99,6 +113,12 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
                 line=at + 1,
             )
     return None
+
+
+def refused_program(lines: tuple[str, ...], name: str, dialect: Dialect) -> InputError | None:
+    """The error for a program in another language, or for a lathe; LinuxCNC's lathes have X as a position."""
+    foreign = foreign_program(lines, name)
+    return foreign if foreign is not None or dialect.name == "linuxcnc" else lathe_program(lines, name)
 
 
 # -- programs ----------------------------------------------------------------------------------------------------------
@@ -250,10 +270,11 @@ def _read(asked: _Request) -> Program:
         raise ProgramError("the program is empty", expected="an NC program", file=name)
     if looks_like_cutter_location(lines, name):
         return _read_cutter_location(asked)
-    foreign = foreign_program(lines, name)
-    if foreign is not None:
-        raise foreign
-    if asked.interpreter == "linuxcnc":
+    native = asked.interpreter == "linuxcnc"
+    refused = foreign_program(lines, name) if native else refused_program(lines, name, asked.controller.dialect)
+    if refused is not None:
+        raise refused
+    if native:
         check_plain(asked.block_delete, asked.controller)
         return _read_by_linuxcnc(asked, asked.rs274)
     try:
@@ -385,7 +406,12 @@ def _run_built_in(
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
         unsupported=tuple(state.unsupported),
-        warnings=(*warnings, *state.warnings, *lathe_warning(state.turning, moves)),
+        warnings=(
+            *warnings,
+            *state.warnings,
+            *lathe_warning(state.turning, moves),
+            *millimetre_warning(state, run.lines),
+        ),
         assumptions=(START, *state.assumptions, *feed_assumption(asked.controller, moves)),
         tools=tuple(state.used_tools.values()),
         dialect=asked.controller.label,
@@ -405,6 +431,26 @@ def lathe_warning(signs: Mapping[str, int], moves: Moves | None) -> list[str]:
         f"line {line}: {what} and no move along Y: this looks like a lathe's program. X is read as a position; where "
         "it is a diameter, the path is wrong"
     ]
+
+
+_LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)
+_LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beginning
+
+
+def millimetre_warning(state: State, lines: Sequence[str]) -> list[str]:
+    """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
+
+    Where whole numbers are increments, posts end those in mm with their point.
+    """
+    hint = increments_hint(state)
+    if not hint:
+        return []
+    texts = (split_comments(line)[0] for line in lines[:_LOOKED_AT])
+    words = [word for text in texts for word in _LENGTHS.findall(text)]
+    whole = next((word for word in words if "." not in word and word.strip("XYZIJRxyzijr+-0 \t")), None)
+    if whole is None or not any("." in word for word in words) or any(word[-1] == "." for word in words):
+        return []
+    return [f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}"]
 
 
 def feed_assumption(controller: Controller, moves: Moves | None) -> list[str]:

@@ -20,7 +20,9 @@ from toolpath_stiff.nc import (
     feed_assumption,
     foreign_program,
     lathe_warning,
+    millimetre_warning,
     parse_program,
+    refused_program,
 )
 from toolpath_stiff.nc.codes import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning, would_change
@@ -209,7 +211,7 @@ def check_lines(
     state, frames = run.state, run.state.frames
     warnings, assumptions = [*warnings, *state.warnings], list(state.assumptions)
     moves = state.recorder.moves() if len(state.recorder) else None
-    warnings += lathe_warning(state.turning, moves)
+    warnings += [*lathe_warning(state.turning, moves), *millimetre_warning(state, lines)]
     assumptions += feed_assumption(controller, moves)
     at = frames.origin
     if posted is not None:
@@ -260,7 +262,7 @@ def _parametric_run(
 def _run_to_the_end(run: _CheckingRun) -> tuple[list[InputError], list[str]]:
     """Run a program; its errors, and the warnings of its end. A file in another language has that one error alone."""
     lines, name, warnings = run.lines, run.name, list[str]()
-    foreign = foreign_program(lines, name)
+    foreign = refused_program(lines, name, run.state.dialect)
     if foreign is None:
         try:
             warnings = run.run()

@@ -14,6 +14,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import MM_PER_INCH
 
 Point2 = tuple[float, float]
@@ -117,6 +118,20 @@ def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) 
         )
 
 
+def check_bulge(radius: float, sweep: float) -> None:
+    """Raise `ArcError` if an arc leaves its start further than coordinates may be apart: its ends do not bound it.
+
+    Examples
+    --------
+    >>> check_bulge(1e9, 1e-7)
+    """
+    away = 2.0 * radius * math.sin(min(abs(sweep), math.pi) / 2.0)
+    if away > LARGEST_MM:
+        raise ArcError(
+            f"an arc of radius {radius:g} mm that goes {away:g} mm away from its start", f"at most {LARGEST_MM:g} mm"
+        )
+
+
 def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns: int) -> float:
     """Signed angle in rad (counter-clockwise positive); start = end is a full circle; P words add whole turns.
 
@@ -159,10 +174,11 @@ def arc_sweeps(start: FloatArray, end: FloatArray, center: FloatArray, clockwise
 
 
 def radii_clearly_agree(start: FloatArray, end: FloatArray, center: FloatArray, inch: bool) -> BoolArray:
-    """(n,) whether arcs (n, 2) are so far within the bounds of `check_radii` that no rounding of a radius matters."""
+    """(n,) whether arcs (n, 2) are so far within `check_radii` and `check_bulge` that rounding does not matter."""
     first, last = (np.sqrt(((point - center) ** 2).sum(axis=1)) for point in (start, end))
     least = INCH_TOLERANCE if inch else MM_TOLERANCE
-    return np.asarray((np.minimum(first, last) > 2.0 * SMALLEST_RADIUS) & (np.abs(first - last) < 0.5 * least))
+    small = np.maximum(first, last) < LARGEST_MM / 2.0  # wherever it goes, `check_bulge` allows it
+    return np.asarray((np.minimum(first, last) > 2.0 * SMALLEST_RADIUS) & (np.abs(first - last) < 0.5 * least) & small)
 
 
 def corner(

@@ -5,8 +5,8 @@ The meaning of each code is a function in `codes`, found in the table of `codes.
 
 Subprograms are those of Fanuc's controls: O numbers within the file, after the main program or before it, called by
 `M98 P1000 L2` or, with the repeats before the four digits of the number, `M98 P21000`; they end with M99. LinuxCNC
-reads the first form alike. `M97 P100` (Haas) calls the block N100 of the file, up to an M99. Modal state goes through
-a call unchanged.
+reads the first form alike. `M97 P100` (Haas) and `M98 Q100` (Fanuc) call the block N100 of the file, up to an M99.
+Modal state goes through a call unchanged.
 """
 
 from __future__ import annotations
@@ -233,6 +233,7 @@ MOST_REPEATS = 9999
 FEWEST_LINES = 50  # of a program; below, loading what reads many lines at once costs more than it saves
 SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
 HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
+LABEL = re.compile(r"\s*(%\s*\d+)\s*", re.ASCII)
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
 
 
@@ -249,6 +250,16 @@ class Subprogram:
 def beyond_the_end(what: str, at: int, lines: int) -> str:
     """The warning that lines follow what ends a program in line `at` (from 0)."""
     return f"what follows {what} in line {at + 1} is not part of the program (lines: {lines})"
+
+
+def without_label(state: State, lines: tuple[str, ...]) -> tuple[str, ...]:
+    """The lines, without what stands behind the first tape mark in the dialect fanuc, whose controls skip that."""
+    first = next((index for index, line in enumerate(lines) if line.strip()), 0)
+    label = LABEL.fullmatch(lines[first]) if lines and state.dialect.name == "fanuc" else None
+    if label is None:
+        return lines
+    state.note(first + 1, Word("%", 0.0, label.start(1) + 1, label[1]), "program number")
+    return (*lines[:first], "%", *lines[first + 1 :])
 
 
 class ProgramRun:
@@ -269,7 +280,7 @@ class ProgramRun:
     def __init__(
         self, state: State, lines: tuple[str, ...], name: str, switches: frozenset[int], fast: bool = True
     ) -> None:
-        self.state, self.lines, self.name = state, lines, name
+        self.state, self.lines, self.name = state, without_label(state, lines), name
         self._plain: PlainRun | None = None
         if fast and len(lines) >= FEWEST_LINES:
             from toolpath_stiff.nc.plain_lines import PlainRun
@@ -392,12 +403,12 @@ class ProgramRun:
 
     def _enter(self, at: int, call: Call) -> int:
         """The line at which the called subprogram begins."""
+        code = "M98" if not call.local else "M97" if self.state.dialect.local_calls else "M98 Q"
         if call.local:
-            name, repeats, first = f"N{call.number}", call.repeats or 1, self._block_numbered(at, "M97 calls", call)
+            name, repeats, first = f"N{call.number}", call.repeats or 1, self._block_numbered(at, f"{code} calls", call)
         else:
             number, repeats = self._target(at, call)
             name, first = f"O{number}", self._heads()[number] + 1
-        code = "M97" if call.local else "M98"
         if not 1 <= repeats <= MOST_REPEATS:
             raise self._fail(at, f"{code} with {repeats} repeats", f"1 to {MOST_REPEATS}", column=call.column)
         if any(level.name == name for level in self._levels):

@@ -46,7 +46,7 @@ class Flow(Enum):
 
 @dataclass(frozen=True)
 class Call:
-    """A subprogram call: its P, its L (None: not given), the column of its M98; `local`: it is M97, P an N number."""
+    """A subprogram call: its number, its L (None: not given), the column of its M98; `local`: by an N number."""
 
     number: int
     repeats: int | None

@@ -281,6 +281,9 @@ def _unreadable(compact: str, position: int, column: int, line: int, name: str) 
         found, expected = f"the polar word {character!r} has no number", f"a number after {character}"
     elif character == "%":
         found, expected = "`%` among other words", "`%` alone on its line"
+        if compact[1:].isalnum() and not position:  # DIN 66025
+            found = f"{compact[:20]!r} is a program's name behind `%`, as Siemens', NUM's and ISG's controls have it"
+            hint = "take the name away; a Fanuc's number is read past with --dialect fanuc"
     return ProgramError(found, expected=expected, hint=hint, file=name, line=line, column=column)
 
 

@@ -40,7 +40,7 @@ from toolpath_stiff.nc.codes import (
     m_codes,
 )
 from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
-from toolpath_stiff.nc.controller import MILLISECONDS, SECONDS
+from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.nc.state import POINT_WORDS, Call, CurrentBlock, Flow, GoTo, Numbers, State
 from toolpath_stiff.nc.words import Word
@@ -145,6 +145,8 @@ def bare_feed_is_open(state: State) -> bool:
 
 def speed_word(state: State, block: CurrentBlock, code: str) -> None:
     """S: the spindle speed, 1/min."""
+    if _dwells_by(state, block) == "S":
+        return
     speed = block.take("S")
     assert speed is not None
     if speed < 0.0:
@@ -158,9 +160,31 @@ def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
     state.turning.setdefault("constant surface speed (G96)", block.line)
 
 
+def _dwells_by(state: State, block: CurrentBlock) -> str:
+    """The word that holds the time of a block's G4: P; X on Fanuc's controls, S in Marlin; "" for no such word."""
+    if "G4" not in block.codes:
+        return ""
+    letters = {"linuxcnc": "P", "generic": "PXS"}.get(state.dialect.name, "XP")
+    return next((letter for letter in letters if letter in block.values), "")
+
+
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
     """G4: a pause, before the block's own moves."""
-    seconds = time_word(state, block, "X" if state.dialect.dwell != SECONDS and block.has("X") else "P")
+    letter = _dwells_by(state, block)
+    seconds = time_word(state, block, letter) if letter else None
+    if not letter and state.dialect.name in _OURS and "F" not in block.values:  # F: seconds on Siemens' controls
+        state.assume("G4 without a time is no pause: an exact stop (Fanuc), the end of the moves before it (Marlin)")
+        seconds = 0.0
+    if state.dialect.name == GENERIC.name and letter in ("X", "S"):
+        word = block.values[letter]
+        if letter == "X" and ("." not in word.text or any(block.has(axis) for axis in POINT_WORDS)):
+            raise block.fail(
+                word,
+                "beside G4 is not certainly a time: without a point it counts milliseconds on Fanuc's controls",
+                f"{word.text.rstrip('.')}. alone, for seconds",
+                "name the control with --dialect",
+            )
+        state.assume(f"the {letter} of G4 is a time in seconds, as {'Fanuc' if letter == 'X' else 'Marlin'} means it")
     if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
         raise block.fail(block.codes[code], "needs its time", "P with the seconds, 0 or more")
     state.recorder.add_dwell(seconds)
@@ -229,7 +253,7 @@ _FEEDS, _SPINDLE = g_codes("G93 G94 G95"), g_codes("G96 G97")
 FEED_CODES = (
     Code("F", FEED, feed_word, "feed", "LinuxCNC, Other Codes, F: Set Feed Rate"),
     Code("S", SPEED, speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
-    Code("G4", ONCE, dwell, "dwell", g_codes("G4"), step=DWELL),
+    Code("G4", ONCE, dwell, "dwell", f"{g_codes('G4')}; {_FANUC}, Dwell (G04); Marlin, G004", step=DWELL),
     Code("G93", FEED_MODE, feed_mode, "inverse-time feed", _FEEDS),
     Code("G94", FEED_MODE, feed_mode, "feed per minute", _FEEDS),
     Code("G95", FEED_MODE, feed_mode, "feed per revolution", _FEEDS),
@@ -245,7 +269,7 @@ FEED_CODES = (
 
 
 def call(state: State, block: CurrentBlock, code: str) -> None:
-    """M98 P L: run a subprogram; M97 P L (Haas): run from the block with that N number. After the block's own moves."""
+    """M98 P L: run a subprogram; M97 P L (Haas), M98 Q L (Fanuc): from that N number. The block's moves first."""
     word = block.codes[code]
     if code == "M97" and not state.dialect.local_calls:
         raise block.fail(
@@ -255,14 +279,26 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
         )
     if block.groups.get(ONCE) in ("G4", "G10"):
         raise block.fail(word, "beside a code that uses the P word too", "two blocks")
-    number = block.whole("P", word)
+    local = code == "M97"
+    if code == "M98" and block.has("Q"):
+        if state.dialect.name != "fanuc" or block.has("P"):
+            raise block.fail(
+                block.values["Q"],
+                "beside M98 names the block at which the call begins, as on Fanuc's controls with parameter 6005",
+                hint="make what it calls a subprogram of its own (O, M99)"
+                if block.has("P")
+                else "name the control with --dialect fanuc if it is that",
+            )
+        local = True
+        state.assume("M98 Q calls the block of that N number, as Fanuc's controls do with parameter 6005 #0")
+    number = block.whole("Q" if local and code == "M98" else "P", word)
     if number is None:
         raise block.fail(word, "without P", "P with the number of what it calls")
     if state.dialect.name == "linuxcnc" and "L" in block.values and block.values["L"].value == 0:
         block.take("L")  # LinuxCNC's tests/interp/m98m99: L0 calls nothing
         return
     repeats = block.whole("L", word)
-    block.flow = Call(number, repeats, word.column, local=code == "M97")
+    block.flow = Call(number, repeats, word.column, local)
 
 
 def macro_call(state: State, block: CurrentBlock, code: str) -> None:

@@ -28,6 +28,7 @@ from toolpath_stiff.nc.codes.points import (
     control_point,
     destination,
     forget_polar,
+    increments_hint,
     know_place,
     point_words,
     refuse_while_rotated,
@@ -320,7 +321,7 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
         center = _center(state, block, start, end, clockwise, words)
         sweep = sweep_about(center, start, end, clockwise, state.inch, turns)
     except geometry.ArcError as error:
-        raise block.fail(None, error.found, error.expected) from None
+        raise block.fail(None, error.found, error.expected, increments_hint(state)) from None
     middle = list(here)
     middle[first], middle[second] = center
     x, y, z = frames.to_setup(frames.to_control(middle))[:3]
@@ -331,7 +332,9 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
 def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inch: bool, turns: int = 1) -> float:
     """Signed angle of an arc in rad. Raises `ArcError` unless start and end lie on one circle about the centre."""
     geometry.check_radii(start, end, center, inch)
-    return geometry.arc_sweep(start, end, center, clockwise, turns)
+    sweep = geometry.arc_sweep(start, end, center, clockwise, turns)
+    geometry.check_bulge(math.dist(start, center), sweep)
+    return sweep
 
 
 def center_by_offsets(start: Point2, offsets: tuple[float, float], scale: float) -> Point2:

@@ -310,8 +310,8 @@ def read_numbers(state: State, block: CurrentBlock) -> None:
 
 
 def is_count(block: CurrentBlock, letter: str) -> bool:
-    """Whether a letter of lengths is a number of something else: G5.1 Q1, M61 Q5."""
-    return letter == "Q" and (SMOOTHING in block.groups or "M61" in block.codes)
+    """Whether a letter of lengths is a number of something else: G5.1 Q1, M61 Q5, M98 Q5."""
+    return letter == "Q" and (SMOOTHING in block.groups or not {"M61", "M98"}.isdisjoint(block.codes))
 
 
 def increment(angle: bool, inch: bool) -> float:
@@ -322,6 +322,15 @@ def increment(angle: bool, inch: bool) -> float:
 def assume_increments(state: State) -> None:
     """Say that numbers without a point were counted in increments."""
     state.assume(INCREMENTS.format(state.dialect.name))
+
+
+def increments_hint(state: State) -> str:
+    """What to do about an arc that fits nowhere, once numbers without a point were counted in increments."""
+    if INCREMENTS.format(state.dialect.name) not in state.assumptions:
+        return ""
+    step, unit = ("0.0001", "inch") if state.inch else ("0.001", "mm")
+    name = state.dialect.name
+    return f"numbers without a point are read in {step} {unit} (--dialect {name}); without it X10 is 10 {unit}"
 
 
 def watches_points(state: State) -> bool:

@@ -28,6 +28,7 @@ from toolpath_stiff.nc.geometry import (
     ArcError,
     Point2,
     Vector,
+    check_bulge,
     roll_pitch_of_axis,
 )
 from toolpath_stiff.nc.moves import Arc
@@ -115,7 +116,9 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
             f"radii that agree within {allowed:.4f} mm",
         )
     center = along(circle.center, circle.axis, dot(from_center, circle.axis))
-    return Arc(center, circle.axis, _sweep(circle, here, there))
+    sweep = _sweep(circle, here, there)
+    check_bulge(radius, sweep)
+    return Arc(center, circle.axis, sweep)
 
 
 def _sweep(circle: Circle, here: Point2, there: Point2) -> float:

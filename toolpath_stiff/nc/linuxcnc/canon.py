@@ -331,6 +331,10 @@ class Follower:
             turns < 0,
             int(abs(turns)) or 1,
         )
+        try:
+            geometry.check_bulge(math.dist((here[first], here[second]), (middle[first], middle[second])), sweep)
+        except geometry.ArcError as error:
+            raise self.fail(self.line, error.found, error.expected) from None
         x, y = self._turn(middle[0], middle[1]) if self.rotation else (middle[0], middle[1])
         center = [v + o - r for v, o, r in zip((x, y, middle[2]), self.g5x[:3], self.reference, strict=True)]
         vector = [0.0, 0.0, 0.0]

@@ -432,8 +432,11 @@ def structure_of(steerings: Iterable[tuple[int, Steering]], firsts: set[int], fa
         fault = _pair(structure, opened, labels, at, steering)
         if fault:
             structure.faults[at] = fail(at, *fault, column=steering.column)
-    for one in opened:
-        structure.faults[one.at] = fail(one.at, f"o{one.label.lower()[:SHOWN]} {one.kind.lower()} has no end")
+    endless = {start.at: f"o{start.label.lower()[:SHOWN]} {start.kind.lower()} has no end" for start in opened}
+    # `break` and `continue` go to that end.
+    leaving = {row: f"{endless[loop]} (line {loop + 1})" for row, loop in structure.inside.items() if loop in endless}
+    for row, text in (endless | leaving).items():
+        structure.faults[row] = fail(row, text)
     return structure
 
 

@@ -46,6 +46,7 @@ TEXTS = ("name", "title", "link", "equation", "source")
 NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)  # of an effect or a parameter; a bare key of a machine file
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 KINDS = ("real", "integer", "text")
+LONGEST_SHOWN = 200  # characters of a value in a message
 
 
 def is_foreign(effect: Effect) -> bool:
@@ -386,17 +387,20 @@ def _wrong_in(parameter: Parameter) -> tuple[str, str] | None:
     if not BARE_KEY.fullmatch(parameter.key):
         return f"unit = {parameter.unit!r} makes the key {parameter.key!r}", "a unit in plain letters, such as um, N/um"
     if not _is_number(parameter.si) or not 0.0 < parameter.si < math.inf:
-        return f"si = {parameter.si!r}", f"the SI value of one {parameter.unit or 'unit'} as a number, such as 1e-9"
+        return (
+            f"si = {_shown(parameter.si)}",
+            f"the SI value of one {parameter.unit or 'unit'} as a number, such as 1e-9",
+        )
     if parameter.kind == "text":
         return None
     for attribute in ("bounds", "typical"):
         pair = getattr(parameter, attribute)
         good = isinstance(pair, tuple | list) and len(pair) == 2 and all(map(_is_number, pair))
         if not good or any(math.isnan(value) for value in pair):
-            return f"{attribute} = {pair!r}", "two numbers (low, high)"
+            return f"{attribute} = {_shown(pair)}", "two numbers (low, high)"
     (low, high), typical = parameter.bounds, parameter.typical
     if not _is_number(parameter.neutral):
-        return f"neutral = {parameter.neutral!r}", "a number, or inf"
+        return f"neutral = {_shown(parameter.neutral)}", "a number, or inf"
     if not low < high or not low <= parameter.neutral <= high:
         found = f"bounds {tuple(parameter.bounds)}, neutral {parameter.neutral:g}"
         return found, "low < high with the neutral value between them"
@@ -406,7 +410,19 @@ def _wrong_in(parameter: Parameter) -> tuple[str, str] | None:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether it is a number that a float holds: Python's whole numbers may be larger."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return abs(value) <= sys.float_info.max
+    return isinstance(value, float)
+
+
+def _shown(value: object) -> str:
+    """What was found, in a few words where it is endless; Python writes no whole number of more than 4,300 digits."""
+    try:
+        text = repr(value)
+    except ValueError:
+        return "a number of thousands of digits"
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:10]}... ({len(text)} characters)"
 
 
 def _check_hooks(effect: Effect, refuse: Any) -> None:
