@@ -590,7 +590,8 @@ class _Contrasts:
             sizes = np.bincount(means.of)
             return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
 
-        axes, size, _ = np.linalg.svd(centred(_drifts(data)), full_matrices=False)
+        logs = np.log(data.stiffness)[:, None]
+        axes, size, _ = np.linalg.svd(centred(_drifts(data, np.exp(logs - centred(logs))[:, 0])), full_matrices=False)
         fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(np.bincount(means.of).max()))]
 
         def left(columns: FloatArray) -> FloatArray:
@@ -604,7 +605,7 @@ class _Contrasts:
         kept = values > largest * n * np.finfo(float).eps
         own = 1.0 - 1.0 / np.bincount(means.of)[means.of] - (fixed**2).sum(axis=1)
         return cls(
-            left(np.log(data.stiffness)[:, None])[:, 0],
+            left(logs)[:, 0],
             own,
             clamped @ vectors[:, kept],
             values[kept],
@@ -634,12 +635,16 @@ class _Contrasts:
         return np.asarray(np.abs(pull) / np.maximum(scale, 1e-12))
 
 
-def _drifts(data: Measurements) -> FloatArray:
-    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing."""
+def _drifts(data: Measurements, stiffness: FloatArray) -> FloatArray:
+    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing.
+
+    `stiffness` (n,) is the mean of each reading's repeats: a reading's own would carry its noise into the regressor,
+    which then takes that very noise away.
+    """
     regressors = [np.linspace(-1.0, 1.0, len(data))]
     if "time_min" not in data.missing:
         # A drift adds rate * time to the deflection: to the logarithm, rate * time * k / F and its square.
-        drift = data.time * data.stiffness / data.force
+        drift = data.time * stiffness / data.force
         drift = drift / max(float(np.abs(drift).max()), 1e-300)
         regressors += [drift, drift**2, data.time / max(float(data.time.max()), 1e-300)]
     return np.stack(regressors, axis=1)
