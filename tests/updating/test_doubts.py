@@ -8,9 +8,17 @@ import numpy as np
 import pytest
 
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, judged_once, predictor_for, simple_noise
+from tests.updating.cases import campaign, examined, judged_once, predictor_for, simple_noise
+from toolpath_stiff.rig import Nuisances
 from toolpath_stiff.updating.inference import candidates
-from toolpath_stiff.updating.inference.doubts import noise_doubt, slips_that_show, suspect_entries, suspect_rows
+from toolpath_stiff.updating.inference.doubts import (
+    alone,
+    mended,
+    noise_doubt,
+    slips_that_show,
+    suspect_entries,
+    suspect_rows,
+)
 from toolpath_stiff.updating.inference.evidence import Problem
 from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_gate, discrepancy_forms
 from toolpath_stiff.updating.inference.noise import from_repeats, noise_models, repeat_groups
@@ -29,6 +37,10 @@ def clamping(data, number):
     return np.flatnonzero(data.clamp == np.unique(data.clamp)[number])
 
 
+def most_tilted():
+    return clamping(DATA, int(np.argmax([abs(DATA.angles[clamping(DATA, k)[0], 1]) for k in range(48)])))
+
+
 def test_nothing_is_suspected_where_nothing_slipped() -> None:
     assert suspects(DATA) == ()
 
@@ -38,7 +50,7 @@ def test_a_stiffness_in_another_unit_is_named() -> None:
     stiffness[40] *= 25.4 / 4.4482216152605
     (found,) = suspects(replace(DATA, stiffness=stiffness))
     assert found.rows == (40,) and found.clear and "lbf/in" in found.words
-    (entry,) = suspect_entries((found,), DATA, left_out=True)
+    (entry,) = suspect_entries((found,), DATA, left_out=(found,))
     assert entry["row"] == 41 and entry["lines"] == [42] and entry["left_out"] and "left out" in entry["words"]
 
 
@@ -54,13 +66,37 @@ def test_exchanged_readings_are_named() -> None:
 
 
 def test_a_wrong_sign_in_all_rows_of_a_clamping_is_named() -> None:
-    number = int(np.argmax([abs(DATA.angles[clamping(DATA, k)[0], 1]) for k in range(48)]))
-    rows = clamping(DATA, number)
-    angles = DATA.angles.copy()
+    rows, angles = most_tilted(), DATA.angles.copy()
     angles[rows, 1] *= -1.0
     (found,) = suspects(replace(DATA, angles=angles))
     assert set(found.rows) == set(rows.tolist()) and found.column == "b_deg" and found.clear
     assert float(found.meant) == pytest.approx(np.degrees(DATA.angles[rows[0], 1]))
+    spoiled = replace(DATA, angles=angles)
+    assert mended(spoiled, (found,)).angles == pytest.approx(DATA.angles)
+    # As all that there is of a tool, the readings cannot say whether they slipped or the tool does something.
+    assert alone(spoiled, (found,)) == ()
+    of_a_tool = DATA.tool_extension.copy()
+    of_a_tool[rows] = 0.123
+    assert alone(replace(spoiled, tool_extension=of_a_tool), (found,)) == (found,)
+
+
+def test_rows_are_left_out_where_that_explains_all_and_else_stay() -> None:
+    """A sound machine with a wrong sign; a pallet that bends, in no catalogue, and nothing mistyped at all."""
+    rows, angles = most_tilted(), DATA.angles.copy()
+    angles[rows, 1] *= -1.0
+    slipped = examined(nist(), replace(DATA, angles=angles))
+    assert slipped.verdict == "adequate" and len(slipped.data) == len(DATA) - len(rows)
+    assert [entry["left_out"] for entry in slipped.suspects] == [True]
+    quiet = Nuisances(repeat=0.01, clamping=0.005)
+    bent = campaign(0, "tilted", "pallet_overhang", 0.15, quiet)[0]
+    (noise,) = noise_models(bent)
+    problem = Problem.of(predictor_for(bent), noise)
+    judgement = judged_once(problem, noise, candidates.testable_effects(problem.predictor)[0], seed=0)
+    assert any(suspect.clear for suspect in suspect_rows(problem, judgement.likeliest))
+    unknown = examined(nist(), bent)
+    assert unknown.verdict == "unexplained" and len(unknown.data) == len(bent)
+    assert not any(entry["left_out"] for entry in unknown.suspects)
+    assert any("what is missing from the model" in entry["words"] for entry in unknown.suspects)
 
 
 @pytest.mark.parametrize(("scatter", "shows"), [(0.003, True), (0.08, False)])

@@ -25,6 +25,8 @@ from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.doubts import (
     SlipSize,
     SuspectEntry,
+    alone,
+    mended,
     slips_that_show,
     suspect_entries,
     suspect_rows,
@@ -284,10 +286,16 @@ def _examined(
     judgements, main = judged(data)
     looked_at = not main.question and data.beside is None
     suspects = suspect_rows(main.problem, main.likeliest) if looked_at else ()
-    entries = suspect_entries(suspects, data, left_out=True)
+    clear = [suspect for suspect in suspects if suspect.clear]
+    clear = [suspect for suspect in clear if suspect not in alone(data, clear)]
     kept = np.ones(len(data), dtype=bool)
-    kept[[row for one in suspects if one.clear for row in one.rows]] = False
-    if not kept.all() and kept.sum() >= FEWEST:
+    kept[[row for suspect in clear for row in suspect.rows]] = False
+    if clear and kept.sum() >= FEWEST:
+        # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
+        say("once more with the rows mended that look mistyped")
+        clear = clear if judged(mended(data, clear))[1].explained else []
+    entries = suspect_entries(suspects, data, left_out=clear)
+    if clear:
         say("once more without the rows that look mistyped")
         data = data.select(kept)
         judgements, main = judged(data)
