@@ -44,7 +44,7 @@ from toolpath_stiff.updating.inference.noise import JOINT_ERROR, Noise, noise_mo
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning import plan_measurements
-from toolpath_stiff.updating.planning.document import plan_rows
+from toolpath_stiff.updating.planning.document import nothing_gained, plan_rows
 from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
 from toolpath_stiff.updating.portrait import Portrait, draw_portrait
@@ -417,7 +417,8 @@ def next_measurements(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
 
-    Of an answer that is only `described`, what would confirm it. Empty with any other verdict than these two.
+    Of an answer that is only `described`, what would confirm it. No rows with any other verdict than these two, and
+    where they would gain nothing: the first remark says so.
     """
     # Under several noise models the most demanding one that leaves rivals: a plan for it serves the others, too.
     open_ones = [j for j in diagnosis.judgements.values() if j.verdict == diagnosis.verdict]
@@ -435,6 +436,8 @@ def next_measurements(
         )  # fmt: skip
     except InputError as error:
         return [], [f"no plan could be made: {error}"]
+    if not plan.gains:
+        return [], [nothing_gained(plan)]
     rows = plan_rows(plan.visits, plan.chosen, set(diagnosis.data.point.tolist()))
     for row in rows:
         row["why"] = plan.why[int(row["clamp"]) - 1]

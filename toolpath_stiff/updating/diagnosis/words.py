@@ -269,12 +269,14 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     if diagnosis.verdict == "described":
         names = diagnosis.explanations[0].split(" + ")
         own = [*options(add=names), "-o", asked.updated_machine]
+        planned = diagnosis.next_measurements or not diagnosis.remarks
         return [
-            hint("measure where it would show, or fail", asked.command("plan")),
+            hint("measure where it would show, or fail", asked.command("plan")) if planned else diagnosis.remarks[0],
             hint("add it all the same, as described", asked.command("update", *own)),
         ]
     if diagnosis.verdict == "ambiguous":
-        found = [hint("measure what tells them apart", asked.command("plan"))]
+        planned = diagnosis.next_measurements or not diagnosis.remarks  # else the remark says why there is no plan
+        found = [hint("measure what tells them apart", asked.command("plan")) if planned else diagnosis.remarks[0]]
         if len(diagnosis.judgements) > 1:
             noise = both_names("--noise")
             found.insert(0, f"repeat a few readings, re-clamped, or state {noise}: the verdict depends on the scatter")
