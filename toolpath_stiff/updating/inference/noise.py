@@ -39,7 +39,7 @@ JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
 
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
-LOW_GUESS, HIGH_GUESS = 0.02, 0.10
+GUESSES = {"low": 0.02, "high": 0.10}
 LARGEST = 0.5  # relative sd that a user may state
 
 # Relative sd of a reading below which nobody measures: the paper's best readings, not clamped anew, scatter by 44 N/mm,
@@ -109,6 +109,11 @@ class Noise:
     origin: str
     remark: str = ""
     tip: NDArray[np.bool_] | None = None
+
+    @property
+    def guess(self) -> str:
+        """Which guess it is, "low" or "high"; "" where it is none."""
+        return self.name if self.name in GUESSES else ""
 
     @property
     def reading(self) -> FloatArray:
@@ -231,7 +236,7 @@ def _noise_of_tip(
         return (model("stated", every, clamping, STATED_FREEDOM, origin),)
     why = "the repeats agree exactly, as copies do" if copied(data) else "the data hold neither repeats nor sd_N_per_mm"
     guesses = []
-    for name, guess in (("low", LOW_GUESS), ("high", HIGH_GUESS)):
+    for name, guess in GUESSES.items():
         both = _shared(guess)
         origin = f"a {name} guess, {_percent(*both)}: {why}"
         guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
