@@ -86,10 +86,10 @@ def test_few_false_findings_in_mere_scatter():
 def test_few_false_findings_with_clampings_and_repeats():
     """Dense data with clamping and strut spread, which alone make 40 % of false alarms if they are not modelled.
 
-    2 or more of 4 has a chance of 1.4 % if 5 % is true.
+    3 or more of 10 has a chance of 1.2 % if 5 % is true.
     """
-    false = sum(bool(quick(campaign(seed)[0]).document["findings"]) for seed in range(9200, 9204))
-    assert false <= 1
+    false = sum(bool(quick(campaign(seed)[0]).document["findings"]) for seed in range(9200, 9210))
+    assert false <= 2
 
 
 def test_guessed_noise_names_only_what_both_guesses_show():

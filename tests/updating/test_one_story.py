@@ -16,7 +16,7 @@ import pytest
 
 from tests.effects.cases import CATALOGUE
 from tests.stiffness.cases import nist
-from tests.updating.cases import campaign, diagnosed, table_1
+from tests.updating.cases import campaign, diagnosed, examined, table_1
 from toolpath_stiff.hints import Asked, parted
 from toolpath_stiff.report import compare as compare_report
 from toolpath_stiff.report import diagnose as diagnose_report
@@ -34,8 +34,10 @@ from toolpath_stiff.updating.correction.document import residuals_csv
 from toolpath_stiff.updating.correction.ladder import _Work, build_ladder, parse_addition
 from toolpath_stiff.updating.diagnosis import words as verdict_words
 from toolpath_stiff.updating.diagnosis.document import document as diagnosis_document
-from toolpath_stiff.updating.diagnosis.words import words
+from toolpath_stiff.updating.diagnosis.words import next_steps, verdict_text, why, words
 from toolpath_stiff.updating.inference import NONE
+from toolpath_stiff.updating.inference.fits import raised_text, scatter_text
+from toolpath_stiff.updating.inference.noise import noise_models
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning.rivals import errors_so_far, rivals_of
 
@@ -99,6 +101,30 @@ def test_every_text_prints_these_two_errors():
     ]
     for text, rest in texts:
         assert story + rest in re.sub(r"\s+", " ", text)
+
+
+def test_a_noise_that_is_only_guessed_says_what_it_would_hide():
+    """A sound machine whose struts are 3.9 % softer, and no word on how far its readings scatter."""
+    data = campaign(5, "paper", "none")[0]
+    (stated,) = noise_models(data)
+    assert not stated.guess and scatter_text(2.0, 1.0, stated.guess) == "scatter alone leaves 2.00 %"
+    lacking = tuple(dict.fromkeys((*data.missing, "sd_N_per_mm")))
+    unknown = replace(data, sd=np.full(len(data), np.nan), stiffness=0.961 * data.stiffness, missing=lacking)
+    found = examined(nist(), unknown)
+    assert found.verdict == "adequate" and found.noise.guess == "high"
+    hidden = re.search(r"hide a missing effect .* less than ([\d.]+) % .* off by up to ([\d.]+) %", verdict_text(found))
+    assert hidden and float(hidden[1]) > 3.9 and float(hidden[2]) > 3.9
+    assert next_steps(found, Asked(()))[0].startswith("repeat a few readings")
+    printed = " ".join(diagnose_report.text(diagnosis_document(found)).split())
+    assert "these data do not tell how much of it is scatter" in printed and "scatter alone leaves" not in printed
+
+
+def test_a_mean_error_that_rises_with_the_refitted_law_has_its_reason():
+    said = "refitting the strut law raises the mean error from 1.04 to 1.09 %"
+    assert raised_text(1.04, 1.09).startswith(said)
+    assert raised_text(1.09, 1.04) == raised_text(1.041, 1.044) == ""
+    found = examined(nist(), table_1(), noise=0.10)
+    assert any(reason.startswith("refitting the strut law raises the mean error") for reason in why(found))
 
 
 def test_a_kept_law_is_said_beside_the_refitted_one():

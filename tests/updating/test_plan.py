@@ -17,6 +17,7 @@ from tests.stiffness.cases import nist
 from tests.updating.planning import READING_SD, active, rival, rivals, table_1_design
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
+from toolpath_stiff.report.measuring import text
 from toolpath_stiff.rig.structure import load_nominal
 from toolpath_stiff.rig.structure import reachable as rig_reachable
 from toolpath_stiff.updating.inference import NAMED
@@ -193,6 +194,19 @@ def test_a_constant_joint_compliance_is_never_told_from_the_struts_own(other):
     assert "strut end" in pair.indicators["joints"]
     assert found.after.truth < 0.8 and found.after.settled < 0.2
     assert any("indicator" in line for line in plan_document(found)["text"])
+
+
+def test_a_plan_that_gains_nothing_says_so_first() -> None:
+    """Joints against the struts' own softness: a chance of about a half, before and after."""
+    found = plan_for("joint_compliance", "none")
+    document = plan_document(found)
+    first = "nothing worth measuring at the tip; an indicator across a joint would tell joint_compliance from none"
+    assert not document["worth_measuring"] and document["text"][0].startswith(first)
+    assert not any("is expected to rise" in line for line in document["text"])
+    whole = {**document, "kind": "rivals", "visits": []}
+    assert text(whole).startswith(first)
+    worth = plan_document(plan_for("spindle_compliance", "table_compliance"))
+    assert worth["worth_measuring"] and "is expected to rise" in worth["text"][0]
 
 
 def test_a_plan_beats_visits_drawn_at_random():

@@ -13,6 +13,8 @@ from toolpath_stiff.defaults import MEAN_OVER_SD
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report import WIDTH, counted, labelled, machine_text, number, plain, shortened
 from toolpath_stiff.updating.inference.candidates import choice_text
+from toolpath_stiff.updating.inference.fits import scatter_text
+from toolpath_stiff.updating.inference.noise import GUESSES
 
 if TYPE_CHECKING:
     from toolpath_stiff.updating.diagnosis.document import DiagnosisDocument
@@ -205,9 +207,14 @@ def hidden_name(entry: Mapping[str, Any]) -> str:
 
 def floor_text(document: DiagnosisDocument) -> str:
     """The noise floor in words; a guess says so."""
+    guess = _guess(document)
+    return percent(noise_floor_percent(document), 2) + (f" ({guess} guess)" if guess else "")
+
+
+def _guess(document: DiagnosisDocument) -> str:
+    """Which guess the noise is, "low" or "high"; "" where it is none."""
     name = str(document["noise"]["name"])
-    guess = f" ({plain(name)} guess)" if name in ("low", "high") else ""
-    return percent(noise_floor_percent(document), 2) + guess
+    return name if name in GUESSES else ""
 
 
 def headline(document: DiagnosisDocument) -> str:
@@ -331,7 +338,9 @@ def _error(document: DiagnosisDocument) -> str:
     best = best_explanation(document)
     if best is not None and document.get("verdict") != "adequate":
         parts.append(_pair_of_errors(best) + f" with {name_text(best)}")
-    return "mean " + ", ".join(parts) + f"; scatter alone leaves {floor_text(document)}"
+    floor, error = noise_floor_percent(document), figure_of(base, "mean_abs_error_percent")
+    tail = "" if floor is None else f"; {scatter_text(floor, error or 0.0, _guess(document))}"
+    return "mean " + ", ".join(parts) + tail
 
 
 def _pair_of_errors(entry: Mapping[str, Any]) -> str:

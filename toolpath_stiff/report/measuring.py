@@ -245,8 +245,10 @@ def files(proposal: Proposal, document: PlanDocument, *, plots: bool = True) -> 
 
 
 def text(document: PlanDocument) -> str:
-    """The visits in measuring order, then what is to be expected."""
-    lines = [
+    """The visits in measuring order, then what is to be expected; that before them where it is nothing."""
+    promise = list(document["text"])
+    lines = [] if document.get("worth_measuring", True) else [promise.pop(0), ""]
+    lines += [
         f"{'':>4} {'x':>7} {'y':>7} {'z':>7} mm {'a':>6} {'b':>6} deg {'tool':>5} mm  load N     set-up, directions"
     ]
     for visit in document["visits"]:
@@ -259,7 +261,7 @@ def text(document: PlanDocument) -> str:
         )
         if document["kind"] == "rivals":
             lines.append(f"{'':>5}{visit['why']}")
-    lines += ["", *document["text"]]
+    lines += ["", *promise]
     lines += [f"note: {note}" for note in document["notes"]]
     return "\n".join(lines)
 

@@ -28,8 +28,10 @@ function gaugeOf(state) {
   const most = Math.max(...STAGES.map(([key]) => g[key] ?? 0), g.floor ?? 0) * 1.04 || 1, width = (v) => `${100 * Math.min(1, v / most)}%`;
   return h("dl", { class: "gauge", "aria-label": "Mean error of the model" }, STAGES.map(([key, label]) => {
     const note = key === "left_out" && g[key] === null ? "Fit tells" : percent(g[key]);
+    const rises = key === "refitted" && percent(g.refitted) !== percent(g.as_given) && g.refitted > g.as_given;
     return [h("dt", {}, label), h("dd", { class: "track", "aria-hidden": "true" }, h("span", { class: `fill ${key}`, style: `width:${width(g[key] ?? 0)}` }),
-      g.floor === null ? null : h("span", { class: "floor", style: `left:${width(g.floor)}` })), h("dd", { class: "number", id: `g-${key}` }, note)];
+      g.floor === null ? null : h("span", { class: "floor", style: `left:${width(g.floor)}` })), h("dd", { class: "number", id: `g-${key}` }, note),
+      rises ? h("dd", { class: "muted", id: "g-rises", style: "grid-column: 1 / -1" }, "likelier, not closer: it trusts those readings less that scatter more or lie far off; this mean counts all alike") : null];
   }), h("dt", {}, "noise floor"), h("dd", { class: "muted" }, "dashed: no model can be better"), h("dd", { class: "number", id: "g-floor" }, percent(g.floor)));
 }
 

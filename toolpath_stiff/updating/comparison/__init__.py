@@ -182,7 +182,7 @@ def compare(
     document = document_of(
         predictor, answers, residual, looked_for, numbers, cannot, notes, seed,
         [hint("which effect would explain it", asked.command("diagnose"))],
-        suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=False),
+        suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=None),
         *_loops(machine, every, effect_files, noise_models(every, noise, strut_spread)[-1], seed),
     )  # fmt: skip
     return Comparison(

@@ -25,6 +25,8 @@ from toolpath_stiff.updating.inference.candidates import testable_effects
 from toolpath_stiff.updating.inference.doubts import (
     SlipSize,
     SuspectEntry,
+    alone,
+    mended,
     slips_that_show,
     suspect_entries,
     suspect_rows,
@@ -42,7 +44,7 @@ from toolpath_stiff.updating.inference.noise import JOINT_ERROR, Noise, noise_mo
 from toolpath_stiff.updating.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.updating.measurements import Measurements
 from toolpath_stiff.updating.planning import plan_measurements
-from toolpath_stiff.updating.planning.document import plan_rows
+from toolpath_stiff.updating.planning.document import nothing_gained, plan_rows
 from toolpath_stiff.updating.planning.rivals import rivals_of
 from toolpath_stiff.updating.planning.visits import Costs, Menu
 from toolpath_stiff.updating.portrait import Portrait, draw_portrait
@@ -284,10 +286,16 @@ def _examined(
     judgements, main = judged(data)
     looked_at = not main.question and data.beside is None
     suspects = suspect_rows(main.problem, main.likeliest) if looked_at else ()
-    entries = suspect_entries(suspects, data, left_out=True)
+    clear = [suspect for suspect in suspects if suspect.clear]
+    clear = [suspect for suspect in clear if suspect not in alone(data, clear)]
     kept = np.ones(len(data), dtype=bool)
-    kept[[row for one in suspects if one.clear for row in one.rows]] = False
-    if not kept.all() and kept.sum() >= FEWEST:
+    kept[[row for suspect in clear for row in suspect.rows]] = False
+    if clear and kept.sum() >= FEWEST:
+        # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
+        say("once more with the rows mended that look mistyped")
+        clear = clear if judged(mended(data, clear))[1].explained else []
+    entries = suspect_entries(suspects, data, left_out=clear)
+    if clear:
         say("once more without the rows that look mistyped")
         data = data.select(kept)
         judgements, main = judged(data)
@@ -409,7 +417,8 @@ def next_measurements(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
 
-    Of an answer that is only `described`, what would confirm it. Empty with any other verdict than these two.
+    Of an answer that is only `described`, what would confirm it. No rows with any other verdict than these two, and
+    where they would gain nothing: the first remark says so.
     """
     # Under several noise models the most demanding one that leaves rivals: a plan for it serves the others, too.
     open_ones = [j for j in diagnosis.judgements.values() if j.verdict == diagnosis.verdict]
@@ -427,6 +436,8 @@ def next_measurements(
         )  # fmt: skip
     except InputError as error:
         return [], [f"no plan could be made: {error}"]
+    if not plan.gains:
+        return [], [nothing_gained(plan)]
     rows = plan_rows(plan.visits, plan.chosen, set(diagnosis.data.point.tolist()))
     for row in rows:
         row["why"] = plan.why[int(row["clamp"]) - 1]

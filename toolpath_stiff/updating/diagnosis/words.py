@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from toolpath_stiff import defaults
+from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.hints import Asked, both_names, command_line, hint, options
 from toolpath_stiff.stiffness.effects.contract import joined
 from toolpath_stiff.units import mm_from_m
@@ -14,7 +15,7 @@ from toolpath_stiff.updating.diagnosis import Diagnosis
 from toolpath_stiff.updating.inference import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
 from toolpath_stiff.updating.inference.candidates import EXPECTED, choice_text
 from toolpath_stiff.updating.inference.evidence import LAW_PRIOR
-from toolpath_stiff.updating.inference.fits import errors_text
+from toolpath_stiff.updating.inference.fits import errors_text, raised_text, scatter_text
 from toolpath_stiff.updating.inference.gates import Drawn, seen_readings
 from toolpath_stiff.updating.inference.hypotheses import CONFOUNDED, MATTERS, Unexcluded
 from toolpath_stiff.updating.inference.noise import OUTLIERS
@@ -71,7 +72,8 @@ def doubts(diagnosis: Diagnosis) -> list[str]:
 
 def _verdict_text(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "adequate":
-        return f"Nothing is missing that these data could show: what is left is scatter.{_not_excluded(diagnosis)}"
+        hidden = _hidden(diagnosis) + _not_excluded(diagnosis)
+        return f"Nothing is missing that these data could show: what is left is scatter.{hidden}"
     if diagnosis.verdict == "identified":
         best = diagnosis.explanations[0]
         return f"{_capital(_cause(diagnosis, best))}. Mean error: {_errors(diagnosis, best)}."
@@ -96,7 +98,7 @@ def _verdict_text(diagnosis: Diagnosis) -> str:
     form = diagnosis.main.form
     return (
         f"Something is missing, and nothing in the catalogue accounts for it{_or_noise(diagnosis)}. Mean error: "
-        f"{_errors(diagnosis)}; scatter alone leaves {diagnosis.noise.floor_percent:.2f} %."
+        f"{_errors(diagnosis)}; {_scatter(diagnosis)}."
         + (f" What is left forms a pattern {form}." if form else "")
         + _closest(diagnosis)
     )
@@ -162,11 +164,36 @@ def _not_excluded(diagnosis: Diagnosis) -> str:
     return f" Not ruled out either, but no more than chance would show: {joined(names)}." if names else ""
 
 
+def _hidden(diagnosis: Diagnosis) -> str:
+    """Of an adequate model whose noise is a guess: what such a noise would hide."""
+    if not diagnosis.noise.guess:
+        return ""
+    shown = [one.rms for one in diagnosis.detectable if one.seen]
+    law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
+    change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown):.2g} % (rms) and "
+    return (
+        f" But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading would "
+        f"hide {change if shown else 'every effect and '}struts that are off by up to {100.0 * law:.2g} %."
+    )
+
+
 def _errors(diagnosis: Diagnosis, name: str = "") -> str:
     """Mean errors as given, with the strut law refitted, with an explanation."""
-    as_given, refitted = (100.0 * float(fit.errors.mean()) for fit in (diagnosis.as_given, diagnosis.base))
+    as_given, refitted = _as_given(diagnosis), _refitted(diagnosis)
     rest = [(f"with {name}", 100.0 * float(diagnosis.fits[name].errors.mean()))] if name else []
     return errors_text(as_given, refitted, rest)
+
+
+def _scatter(diagnosis: Diagnosis) -> str:
+    return scatter_text(diagnosis.noise.floor_percent, _refitted(diagnosis), diagnosis.noise.guess)
+
+
+def _as_given(diagnosis: Diagnosis) -> float:
+    return 100.0 * float(diagnosis.as_given.errors.mean())
+
+
+def _refitted(diagnosis: Diagnosis) -> float:
+    return 100.0 * float(diagnosis.base.errors.mean())
 
 
 def _capital(text: str) -> str:
@@ -175,12 +202,8 @@ def _capital(text: str) -> str:
 
 def why(diagnosis: Diagnosis) -> list[str]:
     """The reasons, most important first."""
-    main, found = diagnosis.main, []
-    if diagnosis.verdict == "adequate":
-        found += [_base_text(judgement, len(diagnosis.judgements) > 1) for judgement in diagnosis.judgements.values()]
-        return found
-    for judgement in diagnosis.judgements.values():
-        found.append(_base_text(judgement, len(diagnosis.judgements) > 1))
+    main, several = diagnosis.main, len(diagnosis.judgements) > 1
+    found = [_base_text(judgement, several) for judgement in diagnosis.judgements.values()]
     if diagnosis.verdict == "identified" and main.drawn is not None:
         found.append(main.drawn.reason)
     if diagnosis.verdict == "ambiguous":
@@ -191,7 +214,8 @@ def why(diagnosis: Diagnosis) -> list[str]:
             found.append(f"the best of the catalogue leave more than noise would: {', '.join(tested)}")
         if main.noise_factor > 1.0:
             found.append(main.doubt)
-    return found
+    raised = "" if main.question else raised_text(_as_given(diagnosis), _refitted(diagnosis))
+    return [*found, raised] if raised else found
 
 
 def _base_text(judgement: Judgement, several: bool) -> str:
@@ -258,6 +282,7 @@ def _rival_names(diagnosis: Diagnosis, first: str, second: str) -> bool:
 
 def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     """What to do next, as hints: commands run as they stand."""
+    noise = both_names("--noise")
     if diagnosis.verdict == "identified" and diagnosis.best is not None:
         names = diagnosis.explanations[0].split(" + ")
         fit = diagnosis.fits.get(diagnosis.explanations[0])
@@ -269,14 +294,15 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
     if diagnosis.verdict == "described":
         names = diagnosis.explanations[0].split(" + ")
         own = [*options(add=names), "-o", asked.updated_machine]
+        planned = diagnosis.next_measurements or not diagnosis.remarks
         return [
-            hint("measure where it would show, or fail", asked.command("plan")),
+            hint("measure where it would show, or fail", asked.command("plan")) if planned else diagnosis.remarks[0],
             hint("add it all the same, as described", asked.command("update", *own)),
         ]
     if diagnosis.verdict == "ambiguous":
-        found = [hint("measure what tells them apart", asked.command("plan"))]
+        planned = diagnosis.next_measurements or not diagnosis.remarks  # else the remark says why there is no plan
+        found = [hint("measure what tells them apart", asked.command("plan")) if planned else diagnosis.remarks[0]]
         if len(diagnosis.judgements) > 1:
-            noise = both_names("--noise")
             found.insert(0, f"repeat a few readings, re-clamped, or state {noise}: the verdict depends on the scatter")
         return found
     if diagnosis.main.question:
@@ -295,7 +321,8 @@ def next_steps(diagnosis: Diagnosis, asked: Asked) -> list[str]:
             file = asked.new_effect()
             found.append(hint("write the effect that you suspect as one file", command_line("effects", "new", file)))
         return [*found, hint("and try it", asked.command("diagnose", effects=[file]))]
-    return ["use the model; `detectable` lists what could still be there unseen"]
+    use = "use the model; `detectable` lists what could still be there unseen"
+    return [use] if not diagnosis.noise.guess else [f"repeat a few readings, re-clamped, or state {noise}", use]
 
 
 def row_words(diagnosis: Diagnosis, name: str) -> str:

@@ -129,6 +129,11 @@ class Judgement:
     drawn: Drawn | None = None
 
     @property
+    def explained(self) -> bool:
+        """Whether an explanation stands, the model alone among them."""
+        return self.verdict != "unexplained"
+
+    @property
     def plausible(self) -> tuple[str, ...]:
         """Names of the effects in `explanations`, each once."""
         return tuple(dict.fromkeys(name for one in self.explanations for name in one.split(" + ")))

@@ -110,7 +110,7 @@ POSE_STEPS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Suspect:
     """Rows that look mistyped.
 
@@ -124,6 +124,8 @@ class Suspect:
         All of it in a sentence.
     log_odds
         Against the rows being as they should be, or wild.
+    slip
+        The likeliest slip.
     """
 
     rows: tuple[int, ...]
@@ -132,10 +134,11 @@ class Suspect:
     meant: str
     words: str
     log_odds: float
+    slip: _Slip
 
     @property
     def clear(self) -> bool:
-        """Whether the rows are better left out."""
+        """Whether the rows are better left out, where nothing else is missing."""
         return self.log_odds > CLEAR
 
 
@@ -153,8 +156,37 @@ class SuspectEntry(TypedDict):
     left_out: bool
 
 
-def suspect_entries(suspects: Sequence[Suspect], data: Measurements, left_out: bool) -> list[SuspectEntry]:
-    """Suspects for a document; `left_out`: whether the clear ones were left out of the judgement."""
+def mended(data: Measurements, suspects: Sequence[Suspect]) -> Measurements:
+    """The readings with the likeliest slip of each suspect mended."""
+    columns = {name: getattr(data, name).copy() for name in ("position", "angles", "direction", "stiffness")}
+    for slip in (suspect.slip for suspect in suspects):
+        columns["position"][slip.rows] = slip.position
+        columns["angles"][slip.rows] = slip.angles
+        columns["direction"][slip.rows] = slip.direction
+        if slip.change is not None:
+            columns["stiffness"][slip.rows] /= np.exp(slip.change)
+    return replace(data, **columns)
+
+
+def alone(data: Measurements, suspects: Sequence[Suspect]) -> tuple[Suspect, ...]:
+    """Those whose rows are, with the other suspects' rows, all that there is of a tool, a set-up, a loop or a load.
+
+    An effect of that tool, set-up or load would look like their slip, and no other reading says which of the two it is.
+    """
+    rest = np.ones(len(data), dtype=bool)
+    rest[[row for suspect in suspects for row in suspect.rows]] = False
+    columns = (data.tool_extension, data.setup, data.loop, data.force)
+    return tuple(
+        suspect
+        for suspect in suspects
+        if not all(np.isin(column[list(suspect.rows)], column[rest]).all() for column in columns)
+    )
+
+
+def suspect_entries(
+    suspects: Sequence[Suspect], data: Measurements, left_out: Sequence[Suspect] | None
+) -> list[SuspectEntry]:
+    """Suspects for a document; `left_out`: those that were left out of the judgement, None where there was none."""
     found: list[SuspectEntry] = []
     for one in suspects:
         rows = [int((data.file[: row + 1] == data.file[row]).sum()) for row in one.rows]
@@ -167,21 +199,27 @@ def suspect_entries(suspects: Sequence[Suspect], data: Measurements, left_out: b
             "stands": one.stands,
             "would_be": one.meant,
             "words": said_of(one, left_out),
-            "left_out": left_out and one.clear,
+            "left_out": left_out is not None and one in left_out,
         })  # fmt: skip
     return found
 
 
-def said_of(suspect: Suspect, left_out: bool) -> str:
+def said_of(suspect: Suspect, left_out: Sequence[Suspect] | None) -> str:
     """A suspect in a sentence, with what was done about it."""
-    if not left_out:
+    if left_out is None:
         return suspect.words
+    several = len(suspect.rows) > 1
+    if suspect in left_out:
+        return f"{suspect.words}; {'they were' if several else 'it was'} left out of the judgement"
     if not suspect.clear:
         return f"{suspect.words}; kept all the same, for it may be chance"
-    return f"{suspect.words}; {'they were' if len(suspect.rows) > 1 else 'it was'} left out of the judgement"
+    return (
+        f"{suspect.words}; kept all the same: it may as well be what is missing from the model that stands out in "
+        f"{'them' if several else 'it'}"
+    )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Slip:
     """A slip: (k,) rows, what it is, and where (k, 3) and along which direction (k, 3) they would be if mended.
 
@@ -283,7 +321,7 @@ def _suspect(data: Measurements, ways: Sequence[_Slip], odds: float) -> Suspect:
     where = f"line{'s' if several else ''} {lines} of {data.file[first.rows[0]]}"
     said = " or ".join(f"{way.column} {way.meant} instead of {way.stands}" for way in ways)
     words = f"{where} {'look' if several else 'looks'} mistyped: {said} would fit all other readings"
-    return Suspect(tuple(first.rows.tolist()), first.column, first.stands, first.meant, words, odds)
+    return Suspect(tuple(first.rows.tolist()), first.column, first.stands, first.meant, words, odds, first)
 
 
 def _looked_at(problem: Problem, fit: Fit, taken: NDArray[np.bool_]) -> tuple[list[Rows], list[Rows]]:

@@ -399,6 +399,23 @@ def errors_text(as_given: float, refitted: float | None, rest: Sequence[tuple[st
     return ", ".join(f"{name} {value:.2f} %" for name, value in steps)
 
 
+def scatter_text(floor: float, error: float, guess: str = "") -> str:
+    """How much of a mean error (%) is scatter; where a `guess` would leave more than there is, that nobody knows."""
+    if guess and floor > error:
+        return f"these data do not tell how much of it is scatter (the {guess} guess alone would leave {floor:.2f} %)"
+    return f"scatter alone leaves {floor:.2f} %" + (f" ({guess} guess)" if guess else "")
+
+
+def raised_text(as_given: float, refitted: float) -> str:
+    """Why refitting the strut law raised the mean error (%), a sentence; "" where it did not."""
+    if f"{refitted:.2f}" == f"{as_given:.2f}" or not refitted > as_given:
+        return ""
+    return (
+        f"refitting the strut law raises the mean error from {as_given:.2f} to {refitted:.2f} %: it makes the readings "
+        "likelier, which trusts those less that scatter more or lie far off; the mean error counts all alike"
+    )
+
+
 # -- errors at left-out points -----------------------------------------------------------------------------------------
 #
 # Errors at points that the fit has not seen: each measuring point is left out in turn.

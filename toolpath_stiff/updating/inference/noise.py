@@ -39,7 +39,7 @@ JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
 
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
-LOW_GUESS, HIGH_GUESS = 0.02, 0.10
+GUESSES = {"low": 0.02, "high": 0.10}
 LARGEST = 0.5  # relative sd that a user may state
 
 # Relative sd of a reading below which nobody measures: the paper's best readings, not clamped anew, scatter by 44 N/mm,
@@ -109,6 +109,11 @@ class Noise:
     origin: str
     remark: str = ""
     tip: NDArray[np.bool_] | None = None
+
+    @property
+    def guess(self) -> str:
+        """Which guess it is, "low" or "high"; "" where it is none."""
+        return self.name if self.name in GUESSES else ""
 
     @property
     def reading(self) -> FloatArray:
@@ -231,7 +236,7 @@ def _noise_of_tip(
         return (model("stated", every, clamping, STATED_FREEDOM, origin),)
     why = "the repeats agree exactly, as copies do" if copied(data) else "the data hold neither repeats nor sd_N_per_mm"
     guesses = []
-    for name, guess in (("low", LOW_GUESS), ("high", HIGH_GUESS)):
+    for name, guess in GUESSES.items():
         both = _shared(guess)
         origin = f"a {name} guess, {_percent(*both)}: {why}"
         guesses.append(model(name, np.full(n, both[0]), both[1], GUESSED_FREEDOM, origin))
@@ -590,7 +595,8 @@ class _Contrasts:
             sizes = np.bincount(means.of)
             return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
 
-        axes, size, _ = np.linalg.svd(centred(_drifts(data)), full_matrices=False)
+        logs = np.log(data.stiffness)[:, None]
+        axes, size, _ = np.linalg.svd(centred(_drifts(data, np.exp(logs - centred(logs))[:, 0])), full_matrices=False)
         fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(np.bincount(means.of).max()))]
 
         def left(columns: FloatArray) -> FloatArray:
@@ -604,7 +610,7 @@ class _Contrasts:
         kept = values > largest * n * np.finfo(float).eps
         own = 1.0 - 1.0 / np.bincount(means.of)[means.of] - (fixed**2).sum(axis=1)
         return cls(
-            left(np.log(data.stiffness)[:, None])[:, 0],
+            left(logs)[:, 0],
             own,
             clamped @ vectors[:, kept],
             values[kept],
@@ -634,12 +640,16 @@ class _Contrasts:
         return np.asarray(np.abs(pull) / np.maximum(scale, 1e-12))
 
 
-def _drifts(data: Measurements) -> FloatArray:
-    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing."""
+def _drifts(data: Measurements, stiffness: FloatArray) -> FloatArray:
+    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing.
+
+    `stiffness` (n,) is the mean of each reading's repeats: a reading's own would carry its noise into the regressor,
+    which then takes that very noise away.
+    """
     regressors = [np.linspace(-1.0, 1.0, len(data))]
     if "time_min" not in data.missing:
         # A drift adds rate * time to the deflection: to the logarithm, rate * time * k / F and its square.
-        drift = data.time * data.stiffness / data.force
+        drift = data.time * stiffness / data.force
         drift = drift / max(float(np.abs(drift).max()), 1e-300)
         regressors += [drift, drift**2, data.time / max(float(data.time.max()), 1e-300)]
     return np.stack(regressors, axis=1)

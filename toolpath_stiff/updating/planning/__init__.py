@@ -63,6 +63,7 @@ from toolpath_stiff.updating.planning.visits import Costs, Matters, Menu, Visits
 MOST_RIVALS = 6  # a plan that separates more would separate none well
 MOST_VISITS = 200
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart
+LEAST_GAIN = 0.01  # of a probability that is printed in whole per cent: less is no reason to measure
 
 # Where an indicator reads a link's own deflection.
 INDICATORS = {
@@ -159,6 +160,12 @@ class Plan:
     def separable(self) -> bool:
         """Whether any pair can be told apart by tip stiffness."""
         return any(pair.separable for pair in self.pairs)
+
+    @property
+    def gains(self) -> bool:
+        """Whether the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
+        rises = (self.after.truth - self.before.truth, self.after.settled - self.before.settled)
+        return bool(max(rises) >= LEAST_GAIN and (self.separable or self.repeats is not None))
 
 
 def plan_measurements(

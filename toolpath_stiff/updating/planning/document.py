@@ -103,6 +103,7 @@ class RivalsPlan(_Promise):
 
     rivals: list[RivalEntry]
     expected: Expected
+    worth_measuring: bool
     pairs: list[PairEntry]
 
 
@@ -114,6 +115,7 @@ class PlanDocument(_Promise):
     mean_abs_error_percent: NotRequired[dict[str, float]]
     rivals: NotRequired[list[RivalEntry]]
     expected: NotRequired[Expected]
+    worth_measuring: NotRequired[bool]
     pairs: NotRequired[list[PairEntry]]
     sees: NotRequired[list[Seen]]
     visits: list[VisitEntry]
@@ -141,7 +143,7 @@ def document(proposal: Proposal, command: str = "") -> PlanDocument:
         }
         if proposal.errors:
             steps = ", ".join(f"{name} {value:.2f} %" for name, value in proposal.errors.items())
-            own["text"] = [f"mean error so far: {steps}", *own["text"]]
+            own["text"].insert(int(not found.gains), f"mean error so far: {steps}")
         kinds, why = found.kinds, found.why
     else:
         own = _campaign(found, rows, proposal.noise)
@@ -247,6 +249,7 @@ def plan_document(plan: Plan) -> RivalsPlan:
             "poses_to_settle": plan.enough,
             "repeats_to_settle": plan.repeats,
         },
+        "worth_measuring": plan.gains,
         "pairs": [
             {
                 "effects": [pair.first, pair.second],
@@ -275,7 +278,9 @@ def plan_text(plan: Plan) -> list[str]:
         f"explanation is expected to rise from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}, "
         f"and the verdict to be settled in {_percent(plan.after.settled)} of cases"
     ]
-    if plan.enough is not None and plan.enough < count:
+    if not plan.gains:
+        lines = [nothing_gained(plan)]
+    elif plan.enough is not None and plan.enough < count:
         lines.append(f"{plan.enough} of the poses should do for {100 * SETTLED:.0f} %; the others are in reserve")
     elif plan.repeats is None:
         lines.append(f"{100 * SETTLED:.0f} % is not expected from repeats of these poses, up to {MOST_REPEATS} of them")
@@ -289,6 +294,23 @@ def plan_text(plan: Plan) -> list[str]:
                 + "; or ".join(f"{link}: {place}" for link, place in pair.indicators.items())
             )
     return lines
+
+
+def nothing_gained(plan: Plan) -> str:
+    """That a plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
+    count = len(plan.chosen)
+    first, second = (rival.name for rival in plan.rivals[:2])
+    pair = next(pair for pair in plan.pairs if {pair.first, pair.second} == {first, second})
+    beside = bool((plan.visits.readings.loop != "").any())  # indicators take part already
+    places = [] if beside else list(pair.indicators.values())
+    across = dict.fromkeys(place.split(":")[0] for place in places if not place.startswith("none: "))
+    parts = ["nothing worth measuring" + ("" if beside else " at the tip")]
+    parts += [f"an indicator {' or '.join(across)} would tell {first} from {second}"] if across else []
+    parts += dict.fromkeys(place.removeprefix("none: ") for place in places if place.startswith("none: "))
+    return "; ".join(parts) + (
+        f". {count} pose{'s' if count > 1 else ''}, about {plan.minutes:.0f} minutes, would bring the probability of "
+        f"the right explanation from {_percent(plan.before.truth)} to {_percent(plan.after.truth)}"
+    )
 
 
 # -- rows --------------------------------------------------------------------------------------------------------------
