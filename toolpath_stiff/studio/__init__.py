@@ -132,8 +132,6 @@ def serve(case: Case, port: int = 0, *, browser: bool = True) -> int:
     """Serve until Ctrl-C or a request to end; returns 0. Raises `InputError` where the port is taken."""
     from toolpath_stiff.studio.session import Session
 
-    # Python would look for modules in the present folder, which is the case's, in each process that is started.
-    os.environ["PYTHONSAFEPATH"] = "1"
     with locked(case.folder):
         os.chdir(case.folder)  # so that files are named as the commands in the history name them
         case.folder = Path()
