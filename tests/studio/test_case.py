@@ -193,6 +193,7 @@ def test_another_program_s_change_is_not_written_over(case):
                 ("result = 3", "result = 3"),
                 ("change = {machine = 1}", "machine = 1"),
                 ("change = {data = 'a.csv'}", "data = 'a.csv'"),
+                ("change = {aside = ['a.csv']}", "aside = "),
                 ("change = {on = {weak_strut = 1}}", "on = "),
                 ("change = {on = {weak_strut = {factor = nan}}}", "on = "),
                 ("change = {origin = [nan, 0, 0]}", "origin = "),

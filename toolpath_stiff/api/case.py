@@ -172,8 +172,8 @@ class Case(Findings):
         ...     case = tps.Case.open(folder)
         ...     case.add_effects(tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py")))
         ...     case.trust("effects/my_screw.py")  # agreed to already, by adding it
-        ...     case.not_agreed
-        ()
+        ...     case.not_agreed, case.state == case.recorded
+        ((), True)
         """
         self.check_files()
         for name in names:

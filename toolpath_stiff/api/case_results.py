@@ -36,6 +36,7 @@ FORMAT = 1
 HEADING = "# A case of toolpath_stiff: the steps in their order; `done` of them hold, the others were undone.\n"
 UNSAFE = re.compile(r"[^\w.+-]+", re.ASCII)
 LONGEST_NAME = 80
+ENTRY = re.compile(r".+:[0-9]{1,9}")  # a reading that was set aside: file and line
 TABLES = {"tools": "tool table", "offsets": "work offsets", "controller": "controller file"}  # a program is read with
 READING = ("dialect", *TABLES, "block_delete", "feed_mm_per_min")  # of `Program.read`; not what runs another program
 NOT_AGREED = "its code is not run, as you have not agreed to it"
@@ -167,7 +168,8 @@ STEP: dict[str, Callable[[Any], bool]] = {
 }
 STATE: dict[str, Callable[[Any], bool]] = {
     **dict.fromkeys(("machine", "program", "exercise"), _is_text),
-    **dict.fromkeys(("effects", "data", "aside"), _is_texts),
+    **dict.fromkeys(("effects", "data"), _is_texts),
+    "aside": lambda value: _is_texts(value) and all(ENTRY.fullmatch(entry) for entry in value),
     "on": lambda value: isinstance(value, dict) and all(map(_is_scalars, value.values())),
     "reading": lambda value: _is_scalars(value) and set(value) <= set(READING),
     "origin": lambda value: isinstance(value, list) and len(value) in (0, 3, 6) and all(map(_is_number, value)),
