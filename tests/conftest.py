@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,6 +36,10 @@ settings.load_profile("suite")
 AS_ASKED = sys.dont_write_bytecode
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# What tests and examples agree to run is recorded in a folder of theirs, also by the processes that they start.
+CONFIGURATION = tempfile.TemporaryDirectory()
+os.environ["XDG_CONFIG_HOME"] = CONFIGURATION.name
 
 
 # Where several processes share the tests, each begins with a run of neighbours, and who is done takes half of what the

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import os
+import py_compile
 import shlex
 import shutil
 import subprocess
@@ -10,6 +13,8 @@ import subprocess
 import pytest
 
 import toolpath_stiff as tps
+from toolpath_stiff.api.case_results import sha256
+from toolpath_stiff.api.trust import agree
 from toolpath_stiff.cli.main import main
 
 SEED = 9006  # hides a weak strut
@@ -178,6 +183,25 @@ def test_another_program_s_change_is_not_written_over(case):
             "within the case",
         ),
         ("format = 1\ndone = \n", "not TOML"),
+        ("format = 1\ndone = 1\nstep = 1\n", "case.toml:3: step is no table"),
+        ("format = 1\ndone = 1\nstep = [1]\n", "case.toml:3: step is no table"),
+        *(
+            (f"format = 1\ndone = 1\n[[step]]\nkind = 'x'\ntext = 'y'\n{line}\n", f"case.toml:6: step 1 .*{said}")
+            for line, said in (
+                ("change = 1", "change = 1"),
+                ("files = ['a']", "files = "),
+                ("result = 3", "result = 3"),
+                ("change = {machine = 1}", "machine = 1"),
+                ("change = {data = 'a.csv'}", "data = 'a.csv'"),
+                ("change = {aside = ['a.csv']}", "aside = "),
+                ("change = {on = {weak_strut = 1}}", "on = "),
+                ("change = {on = {weak_strut = {factor = nan}}}", "on = "),
+                ("change = {origin = [nan, 0, 0]}", "origin = "),
+                ("change = {origin = [1, 2]}", "origin = "),
+                ("change = {require = nan}", "require = nan"),
+                ("change = {reading = {rs274 = '/bin/sh'}}", "reading = "),
+            )
+        ),
     ],
 )
 def test_a_file_that_is_no_case_is_refused(tmp_path, text, said):
@@ -259,3 +283,174 @@ def test_without_readings_a_switch_leaves_the_strut_law(tmp_path):
     written = tps.Machine.load(case.path("machines/by-hand.toml"))
     assert written.effects == ["table_compliance"]
     assert written.model.machine.strut_law == case.machine.model.machine.strut_law
+
+
+# -- code that came with a case ----------------------------------------------------------------------------------------
+
+
+def screw(folder, marker):
+    """An effect file that writes down that it was run."""
+    text = tps.effect_template("my_screw").text
+    file = folder / "my_screw.py"
+    file.write_text(f"from pathlib import Path\n\nPath({str(marker)!r}).write_text('ran')\n{text}")
+    return file
+
+
+@pytest.fixture
+def from_elsewhere(tmp_path, monkeypatch):
+    """A case as another user sent it, with an effect of theirs switched on; the file that its code writes."""
+    marker = tmp_path / "marker"
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "sender"))
+    case = tps.Case.open(tmp_path / "sent")
+    case.add_effects(screw(tmp_path, marker))
+    effect = tps.effects([case.path("effects/my_screw.py")])["my_screw"]
+    values = {one.key: one.typical[1] for one in effect.parameters}
+    case.switch("my_screw", values)
+    (tmp_path / "slot.nc").write_text(SLOT)
+    case.add_program(tmp_path / "slot.nc")
+    marker.unlink()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "mine"))
+    return shutil.copytree(case.folder, tmp_path / "moved"), marker
+
+
+def test_a_moved_case_works_without_its_code_until_this_user_agrees(from_elsewhere):
+    folder, marker = from_elsewhere
+    case = tps.Case.open(folder)
+    assert case.not_agreed == ("effects/my_screw.py",)
+    assert "effects/my_screw.py" in repr(case)
+    found = case.analyze().to_dict()
+    assert found["mean_N_per_mm"] == tps.analyze("nist", case.program).mean_N_per_mm
+    assert found["effects_idle"] == [
+        {"effect": "my_screw", "reason": "its code is not run, as you have not agreed to it"}
+    ]
+    assert [text for text in found["warnings"] if "my_screw" in text]
+    case.require(30000)  # a step that knows nothing of the effect leaves it where it is
+    case.switch("table_compliance", TABLE)
+    with pytest.raises(tps.TpsError, match="my_screw"):
+        case.switch("my_screw", {})
+    with pytest.raises(tps.InputError, match="no file of own effects"):
+        case.trust("effects/other.py")
+    assert not marker.exists()
+    case.trust("effects/my_screw.py")
+    assert marker.exists()
+    assert set(case.state.on) == {"my_screw", "table_compliance"}
+    assert case.analyze().mean_N_per_mm < found["mean_N_per_mm"]
+    assert tps.Case.open(folder).not_agreed == ()  # from now on
+
+
+def test_a_machine_that_carries_own_effects_is_loaded_without_them(from_elsewhere, tmp_path, monkeypatch):
+    folder, marker = from_elsewhere
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "sender"))
+    case = tps.Case.open(folder)
+    case.accept(case.path("machines/by-hand.toml"))
+    assert case.machine.effects == ["my_screw"]
+    marker.unlink()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "mine"))
+    case = tps.Case.open(folder)
+    assert case.machine.effects == []
+    assert [one.effect for one in case.machine.running().withheld] == ["my_screw"]
+    assert not marker.exists()
+
+
+def test_an_edited_file_is_not_run_though_its_case_was_agreed_to(from_elsewhere):
+    folder, marker = from_elsewhere
+    case = tps.Case.open(folder, trust=["effects/my_screw.py"])
+    marker.unlink()
+    file = folder / "effects/my_screw.py"
+    before = sha256(file.read_bytes())
+    file.write_text(file.read_text() + "\n# edited\n")
+    assert case.not_agreed == ("effects/my_screw.py",)
+    assert case.machine.effect_files == ()
+    with pytest.raises(tps.InputError, match="is not what was put into the case"):
+        tps.Case.open(folder, trust=["effects/my_screw.py"])
+    text = (folder / "case.toml").read_text()
+    (folder / "case.toml").write_text(text.replace(before, sha256(file.read_bytes())))
+    assert tps.Case.open(folder).machine.effect_files == ()
+    assert not marker.exists()
+
+
+def test_a_compiled_file_beside_an_effect_is_not_run(tmp_path):
+    marker = tmp_path / "marker"
+    bad = screw(tmp_path, marker)
+    case = tps.Case.open(tmp_path / "case")
+    good = tmp_path / "good" / "my_screw.py"
+    tps.effect_template("my_screw").save(good)
+    case.add_effects(good)
+    compiled = importlib.util.cache_from_source(case.path("effects/my_screw.py"))
+    py_compile.compile(str(bad), compiled, invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH)
+    os.utime(case.path("effects/my_screw.py"), (1, 1))  # as if it were new to this process
+    assert tps.Case.open(case.folder).machine.effect_files != ()
+    assert not marker.exists()
+
+
+def test_code_that_cannot_be_used_stays_off(from_elsewhere):
+    folder, _ = from_elsewhere
+    file = folder / "effects/my_screw.py"
+    before, broken = sha256(file.read_bytes()), "import nothing_of_that_name\n"
+    file.write_text(broken)
+    text = (folder / "case.toml").read_text()
+    (folder / "case.toml").write_text(text.replace(before, sha256(file.read_bytes())))
+    case = tps.Case.open(folder)
+    with pytest.raises(tps.TpsError, match="nothing_of_that_name"):
+        case.trust("effects/my_screw.py")
+    assert case.not_agreed == ("effects/my_screw.py",)
+    assert case.analyze().mean_N_per_mm > 0
+
+
+def test_a_relative_configuration_folder_does_not_count(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", "config")  # it would be the case's own
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    agree(b"text", "effects/a.py")
+    assert [one.name for one in (tmp_path / ".config/tps/agreed-effects").iterdir()] == [sha256(b"text")]
+    assert not (tmp_path / "config").exists()
+
+
+# -- numbers, tables ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, 1e300, 10**400, "soft", None])
+def test_no_number_but_a_stiffness_is_required(case, value):
+    with pytest.raises(tps.InputError, match="required"):
+        case.require(value)
+    assert tps.Case.open(case.folder).state.require == 0
+
+
+@pytest.mark.parametrize("origin", [(float("nan"), 0, 800), (0, 0, float("inf")), (1, 2), (0, 0, 10**400), (1e9, 0, 0)])
+def test_work_is_placed_at_a_pose_alone(case, origin):
+    with pytest.raises(tps.InputError, match="origin"):
+        case.place_at(origin)
+    assert case.state.origin == ()
+
+
+def test_a_program_is_read_with_its_tools_and_so_is_its_command(tmp_path, monkeypatch, capsys):
+    case = tps.Case.open(tmp_path / "case")
+    (tmp_path / "long.nc").write_text("G21 G90\nT5 M6\nG0 X0 Y0\nG43 H5 Z5\nG1 Z0 F300\n/2 G1 X10\nG1 X40\nM2\n")
+    (tmp_path / "my.tbl").write_text("T5 P5 Z220\n")
+    with pytest.raises(tps.InputError) as refused:
+        case.add_program(tmp_path / "long.nc")
+    table = str(refused.value).partition("\n")[2]
+    assert table == "tool,length_mm\n5,LENGTH"
+    (tmp_path / "copied.csv").write_text(table.replace("LENGTH", "220"))
+    case.add_program(tmp_path / "long.nc", tools=tmp_path / "copied.csv", block_delete={2}, dialect="linuxcnc")
+    case.place_at((0, 0, 700))
+    found = case.analyze()
+    read = tps.Program.read(tmp_path / "long.nc", tools=tmp_path / "my.tbl", block_delete={2}, dialect="linuxcnc")
+    assert found.mean_N_per_mm == tps.analyze("nist", read, origin_mm_deg=(0, 0, 700)).mean_N_per_mm
+    case.read_programs(tools=tmp_path / "my.tbl")
+    assert tps.Case.open(case.folder).analyze().to_frame().equals(found.to_frame())
+    monkeypatch.chdir(case.folder)
+    assert main([*shlex.split(tps.Case.open(case.folder).history[-1].command)[1:], "--json", "--no-plots"]) == 0
+    assert json.loads(capsys.readouterr().out)["mean_N_per_mm"] == found.mean_N_per_mm
+
+
+def test_a_table_that_cannot_be_read_leaves_nothing(case, tmp_path):
+    (tmp_path / "slot.nc").write_text(SLOT)
+    (tmp_path / "my.tbl").write_text("nonsense\n")
+    files = sorted(case.folder.rglob("*"))
+    for reading in ({"tools": tmp_path / "my.tbl"}, {"rs274": "/bin/true"}, {"feed_mm_per_min": float("nan")}):
+        with pytest.raises(tps.InputError):
+            case.add_program(tmp_path / "slot.nc", **reading)
+        with pytest.raises(tps.InputError):
+            case.read_programs(**reading)
+    assert [one for one in sorted(case.folder.rglob("*")) if one not in files and one.is_file()] == []

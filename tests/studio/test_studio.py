@@ -6,7 +6,9 @@ import http.client
 import json
 import re
 import shlex
+import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -19,6 +21,7 @@ import toolpath_stiff as tps
 from tests.browser import BROWSER
 from toolpath_stiff import rig
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.studio import ask_for_effects
 
 SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG1 Y30\nM2\n"
 SEED, LAYOUT = 9006, "paper"
@@ -32,8 +35,12 @@ class Running:
         self.folder = folder
         words = [sys.executable, "-m", "toolpath_stiff", "studio", "--case", str(folder), "--no-browser", *more]
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        lines = iter(self.process.stdout.readline, "")
-        self.address = next(line.split()[1] for line in lines if line.startswith("studio"))
+        self.told = ""
+        for line in iter(self.process.stdout.readline, ""):
+            if line.startswith("studio"):
+                self.address = line.split()[1]
+                break
+            self.told += line
         self.port = int(re.search(r":(\d+)/", self.address)[1])
         self.token = self.address.partition("token=")[2]
 
@@ -141,11 +148,177 @@ def test_large_bodies_are_refused_before_they_are_read(running):
         ({"do": "fit"}, "no effect is switched on"),
         ({"do": "place", "x_mm": 0, "out": "/tmp"}, "bounds"),
         ({"do": "undo", "what": 1}, "undo"),
+        ({"do": "trust", "file": "effects/ghost.py"}, "no file of own effects"),
+        ({"do": "require", "value": "nan"}, "finite"),
+        ({"do": "place_at", "origin": [1, 2]}, "2 numbers"),
+        ({"do": "place_at", "origin": ["nan", 0, 0]}, "finite"),
+        ({"do": "place_at", "origin": [10**400, 0, 0]}, "finite"),
+        ({"do": "switch", "effect": "weak_strut", "values": 5}, "switch"),
+        ({"do": "hand", "on": 5}, ""),
     ],
 )
 def test_what_cannot_be_done_is_said(running, asked, said):
     answer = running.do(**asked)
     assert said in answer["error"]
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b'{"do": "plan", "n": 1e400}',
+        b'{"do": "plan", "n": NaN}',
+        b'{"do": "require", "value": -Infinity}',
+        b'{"do": "hand", "on": {"weak_strut": {"strut": 1, "factor": 1e999}}}',
+        b'{"do": "plan", "n": ' + 5000 * b"9" + b"}",
+        100_000 * b"[",
+        b"\xff",
+        b"",
+    ],
+)
+def test_numbers_of_a_question_are_finite_and_it_is_json(running, body):
+    status, content, _ = running.ask("POST", "/do", body)
+    assert (status, "error" in json.loads(content)) == (200, True)
+    assert running.ask("GET", "/state")[0] == 200
+
+
+@pytest.mark.parametrize(
+    "name", ["a" * 300 + ".nc", "%00.nc", "a%00b.csv", "%C3%A9" * 120, "b." + "c" * 190, "..", "%FF"]
+)
+def test_whatever_a_file_is_called_there_is_an_answer(running, name):
+    status, content, _ = running.ask("POST", f"/file?name={name}", b"G5.9 X\n")
+    assert (status, "error" in json.loads(content)) == (200, True)
+    assert running.ask("GET", f"/case/{name}")[0] == 404
+
+
+def test_half_open_connections_neither_pile_up_nor_lock_the_studio(running):
+    silent = [socket.create_connection(("127.0.0.1", running.port)) for _ in range(100)]
+    try:
+        for one in silent[::2]:
+            one.sendall(b"GET /state HTTP/1.1\r\nHost: ")
+        assert running.ask("GET", "/state")[0] == 200
+        threads = Path(f"/proc/{running.process.pid}/task")
+        if threads.is_dir():
+            assert len(list(threads.iterdir())) < 70
+    finally:
+        for one in silent:
+            one.close()
+    assert running.ask("GET", "/state")[0] == 200
+
+
+def test_a_program_with_tool_lengths_by_dropped_files(running):
+    program = b"G21 G90\nT5 M6\nG0 X0 Y0\nG43 H5 Z5\nG1 Z0 F300\nG1 X40\nM2\n"
+
+    def drop(name: str, content: bytes) -> dict[str, str]:
+        return json.loads(running.ask("POST", f"/file?name={name}", content)[1])
+
+    assert "no tool table" in drop("long.nc", program)["error"]
+    for name, content, key in (
+        ("my.tbl", b"T5 P5 Z120\n", "tools"),
+        ("tools.csv", b"tool,length_mm\n5,130\n", "tools"),
+        ("mill.var", b"5221 10\n", "offsets"),
+        ("control.toml", b'dialect = "linuxcnc"\n', "controller"),
+    ):
+        assert "message" in drop(name, content), name
+        assert tps.Case.open(running.folder).state.reading[key] == f"programs/{name}"
+    assert "message" in drop("long.nc", program)
+    case = tps.Case.open(running.folder)
+    assert case.program.controller.tools[5].length == 130
+    assert case.program.controller.label == "linuxcnc"
+    assert running.idle()["program"]["error"] == ""
+    for _ in range(5):
+        running.do(do="undo")
+    assert tps.Case.open(running.folder).state.reading == {}
+
+
+def test_the_command_takes_what_a_program_is_read_with(tmp_path):
+    (tmp_path / "long.nc").write_text("G21 G90\nT5 M6\nG0 X0 Y0\nG43 H5 Z5\nG1 Z0 F300\nG1 X40\nM2\n")
+    (tmp_path / "my.tbl").write_text("T5 P5 Z120\n")
+    words = ("--program", tmp_path / "long.nc", "--tools", tmp_path / "my.tbl", "--dialect", "linuxcnc")
+    studio = Running(tmp_path / "case", *map(str, words))
+    try:
+        state = studio.idle()
+        assert state["program"]["path"]["samples"] > 40
+        assert "--dialect linuxcnc --tools programs/my.tbl" in state["history"][-1]["command"]
+    finally:
+        studio.end()
+
+
+@pytest.fixture
+def from_elsewhere(tmp_path, monkeypatch):
+    """A case of another user with code of theirs in three places; the file that each of them would write."""
+    marker = tmp_path / "marker"
+    evil = f"from pathlib import Path\n\nPath({str(marker)!r}).write_text('ran')\n"
+    (tmp_path / "my_screw.py").write_text(evil + tps.effect_template("my_screw").text)
+    (tmp_path / "slot.nc").write_text(SLOT)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "sender"))
+    case = tps.Case.open(tmp_path / "case")
+    case.add_effects(tmp_path / "my_screw.py")
+    case.add_program(tmp_path / "slot.nc")
+    for name in ("pandas.py", "multiprocessing.py", "sitecustomize.py"):
+        (case.folder / name).write_text(evil)
+    marker.unlink()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "mine"))
+    return shutil.copytree(case.folder, tmp_path / "moved"), marker
+
+
+def test_a_case_from_elsewhere_runs_nothing_until_this_user_agrees(from_elsewhere):
+    folder, marker = from_elsewhere
+    studio = Running(folder)
+    try:
+        assert "effects/my_screw.py is code" in studio.told
+        assert f"tps studio --case {folder} --trust effects/my_screw.py" in studio.told
+        state = studio.idle()
+        exported = studio.ask("GET", "/export")[1].decode()
+        assert [(one["file"], one["off"]) for one in state["own_effects"]] == [("effects/my_screw.py", True)]
+        assert "my_screw" not in [one["name"] for one in state["effects"]]
+        assert "this case" in str(studio.do(do="edit", file="effects/my_screw.py")["error"])
+        assert state["program"]["path"]
+        assert '"off": true' in exported or '"off":true' in exported
+        assert not marker.exists()
+        studio.do(do="trust", file="effects/my_screw.py")
+        assert marker.exists()
+        assert "my_screw" in [one["name"] for one in studio.idle()["effects"]]
+    finally:
+        studio.end()
+    again = Running(folder)
+    again.end()
+    assert "code" not in again.told
+
+
+def test_the_command_agrees_by_file(from_elsewhere):
+    folder, marker = from_elsewhere
+    studio = Running(folder, "--trust", "effects/my_screw.py")
+    studio.end()
+    assert (studio.told.count("code"), marker.exists()) == (0, True)
+
+
+@pytest.mark.parametrize(("answer", "run"), [("", False), ("n", False), ("y", True)])
+def test_a_terminal_is_asked(from_elsewhere, monkeypatch, capsys, answer, run):
+    folder, marker = from_elsewhere
+    case = tps.Case.open(folder)
+    for stream in (sys.stdin, sys.stdout):
+        monkeypatch.setattr(stream, "isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda question: answer)
+    ask_for_effects(case, str(folder))
+    assert (case.not_agreed == (), marker.exists()) == (run, run)
+
+
+def test_the_page_shows_the_code_and_asks(from_elsewhere, browser):
+    folder, marker = from_elsewhere
+    studio = Running(folder)
+    try:
+        tab = Tab(browser, studio.address)
+        tab.page.wait_for_selector("#off:not([hidden])")
+        assert "effects/my_screw.py" in tab.text("#off")
+        assert "write_text('ran')" in tab.page.input_value("#own-0")
+        assert not marker.exists()
+        tab.page.click("#own-trust-0")
+        tab.page.wait_for_selector("#sw-my_screw")
+        tab.page.wait_for_selector("#off", state="hidden")
+        assert tab.faults == []
+        tab.close()
+    finally:
+        studio.end()
 
 
 def test_code_is_loaded_on_an_explicit_yes_alone(running, tmp_path):

@@ -13,12 +13,14 @@ The state is what the steps up to `done` have made of it; undo and redo move `do
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from toolpath_stiff.api.case_results import (
     CASE_FILE,
+    READING,
+    TABLES,
     Findings,
     copied,
     first_name,
@@ -26,14 +28,15 @@ from toolpath_stiff.api.case_results import (
     machine_bytes,
     measurements_csv,
     read_case,
+    reading_arguments,
     used_name,
     without_lines,
     write_files,
 )
 from toolpath_stiff.api.diagnosis import Measurements
-from toolpath_stiff.api.effects import effects
-from toolpath_stiff.api.inputs import Program
+from toolpath_stiff.api.inputs import Program, Reading, finite, pose_si, positive
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.trust import agree, withdraw
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.files import read_bytes
@@ -74,8 +77,11 @@ class Case(Findings):
     """
 
     @classmethod
-    def open(cls, folder: str | Path, machine: str | Path = MACHINE) -> Case:
+    def open(cls, folder: str | Path, machine: str | Path = MACHINE, trust: Iterable[str] = ()) -> Case:
         """Open a case, or begin one in a folder that has none.
+
+        Files of own effects that came with a case from elsewhere are code, and are run once you have agreed to them:
+        until then the case works without them, and `not_agreed` names them.
 
         Parameters
         ----------
@@ -83,11 +89,14 @@ class Case(Findings):
             Its folder; made if need be.
         machine
             Of a new case: name or file.
+        trust
+            Files of own effects of the case that you have read and agree to run, as of the method `trust`.
 
         Raises
         ------
         InputError
-            case.toml is no case, a file of the case is missing or was changed by another program.
+            case.toml is no case, a file of the case is missing or was changed by another program, or it has no file
+            that `trust` names.
 
         Examples
         --------
@@ -103,13 +112,16 @@ class Case(Findings):
         if (place / CASE_FILE).is_file():
             found = cls(place, *read_case(place / CASE_FILE))
             found.check_files()
-            return found
-        case = cls(place, [], 0, "")
-        case.set_machine(machine)
-        return case
+        else:
+            found = cls(place, [], 0, "")
+            found.set_machine(machine)
+        if trust := tuple(trust):
+            found.trust(*trust)
+        return found
 
     def __repr__(self) -> str:
-        return f"<Case {self.folder.name}: {self._done} steps>"
+        off = f", without {', '.join(self.not_agreed)}: not agreed to" if self.not_agreed else ""
+        return f"<Case {self.folder.name}: {self._done} steps{off}>"
 
     # -- what one does ------------------------------------------------------------------------------------------------
 
@@ -146,8 +158,43 @@ class Case(Findings):
             python=python,
         )
 
+    def trust(self, *names: str) -> None:
+        """Agree to run these files of own effects of the case (their names there), as they are now; read them before.
+
+        The agreement is this user's, and kept in their configuration folder: it holds for files of the same content in
+        any case. Raises `InputError` for a file that the case has not, or that cannot be used, which stays unused.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.add_effects(tps.effect_template("my_screw").save(pathlib.Path(folder, "my_screw.py")))
+        ...     case.trust("effects/my_screw.py")  # agreed to already, by adding it
+        ...     case.not_agreed, case.state == case.recorded
+        ((), True)
+        """
+        self.check_files()
+        for name in names:
+            if name not in self.recorded.effects:
+                expected = ", ".join(self.not_agreed) or "none is left"
+                raise InputError(f"{name!r} is no file of own effects of this case", expected=expected)
+            if name in self.not_agreed:
+                self._agree(name)
+
+    def _agree(self, name: str) -> None:
+        """Run a file of the case from now on; not if the machine cannot be built with it."""
+        content = (self.folder / name).read_bytes()
+        agree(content, name)
+        try:
+            self.machine  # noqa: B018
+        except TpsError:
+            withdraw(content)
+            raise
+
     def add_effects(self, file: str | Path) -> None:
-        """Use a Python file with effects of one's own. Its code is run.
+        """Use a Python file with effects of one's own. Its code is run: to add it is to agree to that, as of `trust`.
 
         Examples
         --------
@@ -173,16 +220,18 @@ class Case(Findings):
 
     def _take_effects(self, new: str, old: str, text: str, python: str) -> None:
         """Put a file of the case among the effects, in place of `old` if there is one; drop it where it is at fault."""
-        others = tuple(one for one in self.state.effects if one != old)
+        state, recorded = self.state, self.recorded
+        files = [*(one for one in state.effects if one != old), new]
         try:
-            Machine.load(self.path(self.state.machine), effects=[self.path(one) for one in (*others, new)])
+            Machine.load(self.path(state.machine), effects=[self.path(one) for one in files])
+            agree((self.folder / new).read_bytes(), new)
         except TpsError:
             (self.folder / new).unlink()
             raise
-        names = {effect.name for effect in effects([self.path(one) for one in (*others, new)]).effects}
+        lost = set(state.on) - set(self._known(state.on, files)) if old else set()
         change = {
-            "effects": (*others, new),
-            "on": {name: keys for name, keys in self.state.on.items() if name in names} if old else self.state.on,
+            "effects": (*(one for one in recorded.effects if one != old), new),
+            "on": {name: keys for name, keys in recorded.on.items() if name not in lost},
         }
         command = command_line("effects", "check", new)
         self.record("effects", text, change=change, files=[new], command=command, python=python)
@@ -259,16 +308,16 @@ class Case(Findings):
         {'weak_strut': {'strut': 4, 'factor': 0.8}}
         """
         self._check_effect(effect, values or {}, values is not None)
-        on = {name: dict(keys) for name, keys in self.state.on.items() if name != effect}
+        on = {name: dict(keys) for name, keys in self.recorded.on.items() if name != effect}
         if values is not None:
             on[effect] = dict(values)
-        name = self._machine_by_hand(on)
+        name = self._machine_by_hand(self._known(on, self.state.effects))
         said = ", ".join(f"{key} {_short(value)}" for key, value in (values or {}).items())
         self.record(
             "switch",
             f"{effect} on: {said}" if values is not None else f"{effect} off",
             change={"on": on},
-            files=[name] if on else [],
+            files=[name] if name != self.state.machine else [],
             command=self._of_machine(name),
             python=f"case.switch({effect!r}, {dict(values) if values is not None else None!r})",
         )
@@ -310,8 +359,11 @@ class Case(Findings):
             python=f"case.accept({str(file)!r})",
         )
 
-    def add_program(self, file: str | Path) -> None:
+    def add_program(self, file: str | Path, **reading: Unpack[Reading]) -> None:
         r"""Use an NC program or cutter-location file.
+
+        Further arguments as of `Program.read`: dialect, controller, offsets, tools, block_delete, feed_mm_per_min. They
+        hold for later programs of the case too, until they are given anew; None takes one back.
 
         Examples
         --------
@@ -319,9 +371,10 @@ class Case(Findings):
         >>> import toolpath_stiff as tps
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     case = tps.Case.open(folder)
-        ...     file = pathlib.Path(folder, "slot.nc")
-        ...     _ = file.write_text("G21 G90\nG1 X40 F300\nM2\n")
-        ...     case.add_program(file)
+        ...     file, tools = pathlib.Path(folder, "slot.nc"), pathlib.Path(folder, "my.tbl")
+        ...     _ = file.write_text("G21 G90\nT1 M6\nG43 H1\nG1 X40 F300\nM2\n")
+        ...     _ = tools.write_text("T1 P1 Z120\n")
+        ...     case.add_program(file, tools=tools)
         ...     case.place_at((0, 0, 850))
         ...     case.require(50000)
         ...     found = case.analyze()
@@ -329,22 +382,61 @@ class Case(Findings):
         (<Program slot.nc>, True, 'results/005-analyze', 'tps analyze programs/slot.nc -')
         """
         name = copied(self.folder, file, "programs")
+        python = f"case.add_program({', '.join([repr(str(file)), *_arguments(reading)])})"
+        self._take_program(name, reading, [name], "program", f"program {Path(file).name}", python)
+
+    def read_programs(self, **reading: Unpack[Reading]) -> None:
+        r"""Read the programs of the case with another tool table, offsets, controller file: arguments of `add_program`.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     tools = pathlib.Path(folder, "my.tbl")
+        ...     _ = tools.write_text("T1 P1 Z120\n")
+        ...     case.read_programs(tools=tools)
+        ...     case.state.reading
+        {'tools': 'programs/my.tbl'}
+        """
+        text = ", ".join(f"{TABLES.get(name, name)} {Path(str(value)).name}" for name, value in reading.items())
+        python = f"case.read_programs({', '.join(_arguments(reading))})"
+        self._take_program(self.state.program, reading, [], "reading", f"programs are read with {text}", python)
+
+    def _take_program(
+        self, program: str, given: Mapping[str, Any], files: list[str], kind: str, text: str, python: str
+    ) -> None:
+        """Read a program of the case with what it has and what is given; drop the files where it cannot be read."""
+        state, reading = self.state, dict(self.state.reading)
         try:
-            Program.read(self.path(name)).moves()
+            for key, value in given.items():
+                if key not in READING:
+                    raise InputError(f"{key} is not kept in a case", expected=", ".join(READING))
+                reading[key] = value
+                if key in TABLES and value is not None:
+                    reading[key] = copied(self.folder, value, "programs")
+                    files.append(reading[key])
+                elif key == "block_delete" and not isinstance(value, bool | None):
+                    reading[key] = ",".join(map(str, sorted(value)))
+            reading = {key: value for key, value in reading.items() if value not in (None, False)}
+            if program:
+                self._program(program, reading).moves()
+            else:
+                Program.from_text("M2", **reading_arguments(self.folder, reading))
         except TpsError:
-            (self.folder / name).unlink()
+            for name in files:
+                (self.folder / name).unlink()
             raise
-        self.record(
-            "program",
-            f"program {Path(file).name}",
-            change={"program": name, "origin": ()},
-            files=[name],
-            command=self._analyze_line(name, ()),
-            python=f"case.add_program({str(file)!r})",
-        )
+        change: dict[str, Any] = {"reading": reading} if reading != state.reading else {}
+        if program != state.program:
+            change |= {"program": program, "origin": ()}
+        command = self._analyze_line(program, change.get("origin", state.origin), reading=reading) if program else ""
+        self.record(kind, text, change=change, files=files, command=command, python=python)
 
     def place_at(self, origin_mm_deg: Sequence[float]) -> None:
         """Put program zero somewhere: X, Y, Z, A, B, C in machine coordinates."""
+        pose_si("origin", origin_mm_deg)
         origin = tuple(round(float(value), 6) for value in origin_mm_deg)
         word = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
         self.record(
@@ -357,7 +449,11 @@ class Case(Findings):
 
     def require(self, stiffness_N_per_mm: float) -> None:
         """Ask a stiffness of every cut; 0: none."""
-        asked = float(stiffness_N_per_mm)
+        from toolpath_stiff.api.programs import STIFFEST_N_PER_MM
+
+        asked = finite("required", stiffness_N_per_mm)
+        if asked:
+            positive("required", asked, "N/mm", STIFFEST_N_PER_MM)
         self.record(
             "require",
             f"{asked:g} N/mm required",
@@ -474,6 +570,11 @@ class Case(Findings):
         if not good:
             self._rewrite_used()
             raise InputError(f"{file} line {line} cannot be left out by itself")
+
+
+def _arguments(given: Mapping[str, Any]) -> list[str]:
+    """Arguments as a Python line has them."""
+    return [f"{name}={str(value) if isinstance(value, Path) else value!r}" for name, value in given.items()]
 
 
 def _short(value: Any) -> str:

@@ -6,20 +6,23 @@ The files of a case: the steps that were done and what they make of its state; c
 from __future__ import annotations
 
 import hashlib
+import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from toolpath_stiff.api import FolderResult, Progress
 from toolpath_stiff.api.diagnosis import Measurements
 from toolpath_stiff.api.effects import Preview, effects, preview, with_effects
-from toolpath_stiff.api.inputs import Program
+from toolpath_stiff.api.inputs import Program, Reading
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.api.trust import is_agreed
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.toml_reader import TomlReader, is_number, shortened
 
 if TYPE_CHECKING:
     from toolpath_stiff.api.correction import Plan, Update
@@ -33,6 +36,10 @@ FORMAT = 1
 HEADING = "# A case of toolpath_stiff: the steps in their order; `done` of them hold, the others were undone.\n"
 UNSAFE = re.compile(r"[^\w.+-]+", re.ASCII)
 LONGEST_NAME = 80
+ENTRY = re.compile(r".+:[0-9]{1,9}")  # a reading that was set aside: file and line
+TABLES = {"tools": "tool table", "offsets": "work offsets", "controller": "controller file"}  # a program is read with
+READING = ("dialect", *TABLES, "block_delete", "feed_mm_per_min")  # of `Program.read`; not what runs another program
+NOT_AGREED = "its code is not run, as you have not agreed to it"
 Found = TypeVar("Found", bound=FolderResult)
 
 
@@ -75,6 +82,8 @@ class CaseState:
         Readings that were set aside, "file:line" each.
     on
         Effects that are switched on: name -> the keys of its entry in a machine file.
+    reading
+        How programs are read, as arguments of `Program.read`; switches of block delete as "2,3".
     origin
         Where program zero sits, mm and degrees; empty: where the program or the machine has it.
     require
@@ -87,6 +96,7 @@ class CaseState:
     aside: tuple[str, ...] = ()
     on: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     program: str = ""
+    reading: Mapping[str, Any] = field(default_factory=dict)
     origin: tuple[float, ...] = ()
     require: float = 0.0
     exercise: str = ""
@@ -114,34 +124,78 @@ def _toml(value: Any) -> str:
 
 def read_case(file: Path) -> tuple[list[Step], int, str]:
     """Steps, how many hold, the text. Raises `InputError`."""
-    from toolpath_stiff.toml_reader import TomlReader
-
     reader = TomlReader.read(file, "the case")
-    found = reader.data
-    if found.get("format") != FORMAT:
-        raise InputError(f"format {found.get('format')}", expected=f"format = {FORMAT}", file=str(file))
-    known, states = ({one.name for one in fields(kind)} for kind in (Step, CaseState))
+    content = reader.data
+    if content.get("format") != FORMAT:
+        raise InputError(f"format {content.get('format')}", expected=f"format = {FORMAT}", file=str(file))
+    entries = content.get("step", [])
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise reader.error("step is no table", expected="the steps, each under [[step]]", where="step")
     steps = []
-    for number, entry in enumerate(found.get("step", []), 1):
-        change: dict[str, Any] = entry.get("change", {})
-        if not {"kind", "text"} <= set(entry) <= known or not set(change) <= states:
-            raise InputError(
-                f"step {number} is no step of a case", file=str(file), line=reader.line_of("step", nth=number - 1)
-            )
-        fixed = {name: tuple(value) if isinstance(value, list) else value for name, value in change.items()}
-        _check_names(fixed, entry, str(file), number)
-        steps.append(Step(**{**entry, "change": fixed}))
-    done = found.get("done")
+    for number, entry in enumerate(entries, 1):
+        _check_step(reader, number, entry)
+        change = {k: tuple(value) if isinstance(value, list) else value for k, value in entry.get("change", {}).items()}
+        _check_names(change, entry, str(file), number)
+        steps.append(Step(**{**entry, "change": change}))
+    done = content.get("done")
     if not isinstance(done, int) or not 1 <= done <= len(steps):
         raise InputError(f"done = {done}", expected=f"1 to {len(steps)}, the steps that hold", file=str(file))
     return steps, done, file.read_text("utf-8")
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is_text, value))
+
+
+def _is_number(value: Any) -> bool:
+    return is_number(value) and math.isfinite(value)
+
+
+def _is_scalars(value: Any) -> bool:
+    return isinstance(value, dict) and all(
+        _is_text(one) or isinstance(one, bool) or _is_number(one) for one in value.values()
+    )
+
+
+STEP: dict[str, Callable[[Any], bool]] = {
+    **dict.fromkeys(("kind", "text", "command", "python", "result"), _is_text),
+    "change": lambda value: isinstance(value, dict),
+    "files": lambda value: isinstance(value, dict) and all(map(_is_text, value.values())),
+}
+STATE: dict[str, Callable[[Any], bool]] = {
+    **dict.fromkeys(("machine", "program", "exercise"), _is_text),
+    **dict.fromkeys(("effects", "data"), _is_texts),
+    "aside": lambda value: _is_texts(value) and all(ENTRY.fullmatch(entry) for entry in value),
+    "on": lambda value: isinstance(value, dict) and all(map(_is_scalars, value.values())),
+    "reading": lambda value: _is_scalars(value) and set(value) <= set(READING),
+    "origin": lambda value: isinstance(value, list) and len(value) in (0, 3, 6) and all(map(_is_number, value)),
+    "require": lambda value: _is_number(value) and value >= 0,
+}
+
+
+def _check_step(reader: TomlReader, number: int, entry: Mapping[str, Any]) -> None:
+    """Refuse a step that is none, or that says what no step has written."""
+    wrong = "" if {"kind", "text"} <= set(entry) else "it has no kind or no text"
+    for shapes, table in ((STEP, entry), (STATE, entry.get("change", {}))):
+        for key, value in table.items() if not wrong else ():
+            if key not in shapes or not shapes[key](value):
+                wrong = f"{key} = {shortened(value)}"
+    if wrong:
+        lines = (reader.line_of("step", key, number - 1) for key in (wrong.partition(" = ")[0], "change", ""))
+        line = next(filter(None, lines), None)
+        raise InputError(f"step {number} is no step of a case: {wrong}", file=reader.file, line=line)
 
 
 def _check_names(change: Mapping[str, Any], entry: Mapping[str, Any], file: str, number: int) -> None:
     """No file of a case lies outside its folder."""
     names = [change.get("machine"), change.get("program"), change.get("exercise"), entry.get("result")]
     names += [*change.get("data", ()), *change.get("effects", ()), *entry.get("files", {})]
-    names += [str(one).rpartition(":")[0] for one in change.get("aside", ())]
+    names += [one.rpartition(":")[0] for one in change.get("aside", ())]
+    names += [value for name, value in change.get("reading", {}).items() if name in TABLES]
     for name in filter(None, names):
         if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts or "\\" in name:
             raise InputError(f"step {number} names {name!r}", expected="a file within the case's folder", file=file)
@@ -173,12 +227,38 @@ class History:
         return self._steps[self._done :]
 
     @property
-    def state(self) -> CaseState:
-        """What holds now."""
+    def recorded(self) -> CaseState:
+        """What holds now as the steps say it."""
         found = CaseState()
         for step in self.history:
             found = replace(found, **step.change)
         return found
+
+    @property
+    def state(self) -> CaseState:
+        """What holds now: without the files of own effects that this user has not agreed to run, and their effects."""
+        found, off = self.recorded, self.not_agreed
+        if not off:
+            return found
+        kept = tuple(name for name in found.effects if name not in off)
+        return replace(found, effects=kept, on=self._known(found.on, kept))
+
+    def _known(self, on: Mapping[str, Mapping[str, Any]], files: Iterable[str]) -> dict[str, Mapping[str, Any]]:
+        """Those of the effects that are known with these files of own ones."""
+        known = {effect.name for effect in effects([self.path(name) for name in files]).effects}
+        return {name: keys for name, keys in on.items() if name in known}
+
+    @property
+    def not_agreed(self) -> tuple[str, ...]:
+        """The files of own effects whose code is not run: this user has not agreed to what they hold; see `trust`."""
+        return tuple(name for name in self.recorded.effects if not self._is_agreed(self.folder / name))
+
+    @staticmethod
+    def _is_agreed(file: Path) -> bool:
+        try:
+            return is_agreed(file.read_bytes())
+        except OSError:
+            return False
 
     def path(self, name: str) -> str:
         """A file of the case, as functions and commands take it."""
@@ -233,8 +313,9 @@ class History:
 
     def check_files(self) -> None:
         """Raise `InputError` for a file of the case that is gone, or is not what its step wrote."""
-        state = self.state
-        needed = {state.machine, state.program, *state.effects, *state.data} - {""}
+        state = self.recorded
+        tables = {str(state.reading[name]) for name in TABLES if name in state.reading}
+        needed = {state.machine, state.program, *state.effects, *state.data, *tables} - {""}
         for name, known in {n: s for step in self.history for n, s in step.files.items()}.items():
             file = self.folder / name
             if name in needed and (not file.is_file() or sha256(file.read_bytes()) != known):
@@ -259,6 +340,19 @@ class History:
         self._rewrite_used()
         self._written = case_text(self._steps, self._done)
         write_atomically(file, self._written)
+
+
+def reading_words(reading: Mapping[str, Any]) -> list[str]:
+    """How a program is read, as options of a command."""
+    return options(**{name.removesuffix("_mm_per_min"): value for name, value in reading.items()})
+
+
+def reading_arguments(folder: Path, reading: Mapping[str, Any]) -> Reading:
+    """The same as arguments of `Program.read`."""
+    given = {name: str(folder / value) if name in TABLES else value for name, value in reading.items()}
+    if isinstance(switches := given.get("block_delete"), str):
+        given["block_delete"] = [int(one) for one in switches.split(",")]
+    return cast("Reading", given)
 
 
 def free_name(folder: Path, name: str) -> str:
@@ -351,8 +445,33 @@ class Contents(History):
     @property
     def machine(self) -> Machine:
         """The machine, effects of one's own included."""
-        state = self.state
-        return Machine.load(self.path(state.machine), effects=[self.path(name) for name in state.effects])
+        return self.machine_of(self.state.machine)
+
+    def machine_of(self, file: str) -> Machine:
+        """A machine file of the case with the effects of one's own; those that are not agreed to are left out of it.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.machine_of(case.state.machine)
+        <Machine nist: 6 struts, no effects>
+        """
+        from toolpath_stiff.machine import load_machine
+        from toolpath_stiff.stiffness.effects import known_effects
+        from toolpath_stiff.stiffness.model import Idle, build_model
+
+        path, files = self.path(file), tuple(map(self.path, self.state.effects))
+        if not self.not_agreed:
+            return Machine.load(path, effects=files)
+        given, known = load_machine(path), known_effects(files)
+        acting, reading = (tuple(e for e in some if e.name in known) for some in (given.effects, given.instruments))
+        left = {e.name for e in (*given.effects, *given.instruments)} | set(self.recorded.on)
+        model = build_model(given.with_changes(effects=acting, instruments=reading), files)
+        withheld = tuple(Idle(name, NOT_AGREED, waiting=True) for name in sorted(left - set(known)))
+        return Machine(replace(model, withheld=withheld), path, files)
 
     @property
     def data_files(self) -> tuple[str, ...]:
@@ -388,16 +507,21 @@ class Contents(History):
         ...     tps.Case.open(folder).machine_with({"weak_strut": {"strut": 4, "factor": 0.8}})
         <Machine nist: 6 struts, weak_strut>
         """
+        machine = self.machine
         if not on:
-            return self.machine
-        return self.preview.machine(on) if self.state.data else with_effects(self.machine, on)
+            return machine
+        found = self.preview.machine(on) if self.state.data else with_effects(machine, on)
+        return replace(found, model=replace(found.model, withheld=machine.model.withheld))
 
     @property
     def program(self) -> Program:
         """The program. Raises `InputError` where there is none."""
         if not self.state.program:
             raise InputError("this case has no program", hint="add one with add_program")
-        return Program.read(self.path(self.state.program))
+        return self._program(self.state.program, self.state.reading)
+
+    def _program(self, name: str, reading: Mapping[str, Any]) -> Program:
+        return Program.read(self.path(name), **reading_arguments(self.folder, reading))
 
     def latest(self, kind: str) -> str:
         """Folder of the latest result of a kind among the steps that hold; "" without one."""
@@ -419,12 +543,13 @@ class Contents(History):
         name: str = "analyze",
         machine: str = "",
         require: float | None = None,
+        reading: Mapping[str, Any] | None = None,
     ) -> str:
         state, word = self.state, ",".join(f"{value:.10g}" for value in origin) or None
         need = state.require if require is None else require
         own: dict[str, Any] = {"partial": True, "require": f"{need:g}" if need else None} if name == "analyze" else {}
         asked = options(machine=machine or state.machine, origin=word, **own, effects=list(state.effects))
-        return command_line(name, program, *asked)
+        return command_line(name, program, *asked, *reading_words(state.reading if reading is None else reading))
 
 
 class Findings(Contents):
@@ -504,7 +629,7 @@ class Findings(Contents):
         from toolpath_stiff.api.programs import analyze
 
         state, name = self.state, machine or self.state.machine
-        on = self.machine.like(self.path(machine)) if machine else self.machine_with(state.on)
+        on = self.machine_of(machine) if machine else self.machine_with(state.on)
         found = analyze(
             on,
             self.program,
@@ -559,7 +684,7 @@ class Findings(Contents):
         bounds = {key.rpartition("_")[0].replace("_", "-"): f"{value:.10g}" for key, value in at.items()}
         written = None if reason else f"{result}/{name}"
         asked = options(machine=state.machine, effects=list(state.effects), **bounds, out=result, write=written)
-        return found, command_line("place", state.program, *asked)
+        return found, command_line("place", state.program, *asked, *reading_words(state.reading))
 
     def _kept(self, kind: str, found: Found, words: str = "", **own: Any) -> Found:
         result = self.next_result(kind)

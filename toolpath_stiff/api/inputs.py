@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,6 +26,17 @@ LONGEST_STEP_MM = 1000.0
 FASTEST_MM_PER_MIN = 1e6
 
 
+def finite(name: str, value: Any) -> float:
+    """A number that is neither infinite nor nan: of a command, a call and a page alike. Raises `InputError`."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f"{name} {str(value)[:40]!r}".strip(), expected="a finite number")
+    return number
+
+
 def positive(name: str, value: float, unit: str, highest: float) -> float:
     """A number above 0 and up to `highest`. Raises `InputError`."""
     if not 0.0 < value <= highest:
@@ -43,12 +55,12 @@ def whole(name: str, value: int, lowest: int, highest: int | None = None) -> int
 
 def pose_si(name: str, pose: Sequence[float]) -> Pose:
     """X, Y, Z or X, Y, Z, A, B, C in mm and degrees, in SI. Raises `InputError`."""
-    values = [float(value) for value in pose]
+    values = [finite(name, value) for value in pose]
     if len(values) not in (3, 6):
         raise InputError(f"{name} of {len(values)} numbers", expected="X, Y, Z or X, Y, Z, A, B, C in mm and degrees")
     x, y, z, a, b, c = (*values, 0.0, 0.0, 0.0)[:6]
     near = max(abs(x), abs(y), abs(z)) <= FARTHEST_MM and max(abs(a), abs(b), abs(c)) <= FARTHEST_DEG
-    if not near:  # nan is not near either
+    if not near:
         raise InputError(
             f"{name} {values}",
             expected=f"positions within +-{FARTHEST_MM:g} mm and angles within +-{FARTHEST_DEG:g} degrees",

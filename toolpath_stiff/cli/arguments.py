@@ -17,9 +17,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM
+from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM, finite
 from toolpath_stiff.defaults import FORCE, LOAD, MACHINE
 from toolpath_stiff.errors import InputError, harmless
 from toolpath_stiff.files import Content, check_outputs, encoded, is_file, keep_old, read_bytes, write_atomically
@@ -28,7 +28,7 @@ from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
     from toolpath_stiff.api import FolderResult, Progress
-    from toolpath_stiff.api.inputs import Program
+    from toolpath_stiff.api.inputs import Program, Reading
     from toolpath_stiff.api.machines import Machine
 
 SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
@@ -43,12 +43,9 @@ DESTINATIONS = ("out", "output", "write")
 def finite_number(text: str) -> float:
     """A number that is neither infinite nor nan, in plain digits: Python would also read `1_000`."""
     try:
-        value = math.nan if "_" in text else float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
-    return value
+        return finite("", math.nan if "_" in text else text)
+    except InputError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number") from None
 
 
 def positive_number(unit: str, highest: float) -> Callable[[str], float]:
@@ -135,6 +132,12 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
             metavar="MM",
             help="distance of the samples (default: 1)",
         )
+    add_reading_options(group)
+    _add_interpreter_options(group)
+
+
+def add_reading_options(group: argparse._ActionsContainer) -> None:
+    """What belongs to the control."""
     group.add_argument("--offsets", metavar="FILE", help="work offsets G54 to G59.3")
     group.add_argument("--tools", metavar="FILE", help="tool table: LinuxCNC .tbl, or CSV tool,length_mm,diameter_mm")
     group.add_argument(
@@ -158,7 +161,12 @@ def add_program_options(parser: argparse.ArgumentParser, *, sampled: bool = True
         metavar="N,N",
         help="leave out blocks that begin with / (with 2,3: those that begin with /2 or /3; / is /1)",
     )
-    _add_interpreter_options(group)
+    group.add_argument(
+        "--feed",
+        type=positive_number("mm/min", 1e6),
+        metavar="MM_PER_MIN",
+        help="feed of cuts before the program's first F (a cutter-location file's first FEDRAT)",
+    )
 
 
 def _add_interpreter_options(group: argparse._ArgumentGroup) -> None:
@@ -168,12 +176,6 @@ def _add_interpreter_options(group: argparse._ArgumentGroup) -> None:
         default="builtin",
         help="what reads the program: the built-in reader; LinuxCNC's rs274; "
         "auto: rs274 where the built-in reader refuses the program (default: builtin)",
-    )
-    group.add_argument(
-        "--feed",
-        type=positive_number("mm/min", 1e6),
-        metavar="MM_PER_MIN",
-        help="feed of cuts before the program's first F (a cutter-location file's first FEDRAT)",
     )
     group.add_argument(
         "--subprograms",
@@ -274,6 +276,13 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
         "subprograms": args.subprograms,
         "unconfined": args.unconfined,
     }
+
+
+def case_reading(args: argparse.Namespace) -> Reading:
+    """What the options of `add_reading_options` say, as a case keeps it: no more than was given."""
+    given = {name: getattr(args, name) for name in ("dialect", "controller", "offsets", "tools", "block_delete")}
+    said = {**given, "feed_mm_per_min": args.feed}
+    return cast("Reading", {name: value for name, value in said.items() if value not in (None, False)})
 
 
 def program_for(args: argparse.Namespace, file: str) -> Program:

@@ -9,7 +9,9 @@ from pathlib import Path
 from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_machine_options,
+    add_reading_options,
     add_replace_option,
+    case_reading,
     check_made,
     check_new,
     check_single,
@@ -46,6 +48,7 @@ examples:
   tps studio                                          a new case, in tps-case/
   tps studio measured.csv --machine mine.toml --program part.nc --case mill-3
   tps studio --case mill-3                            goes on where it was left
+  tps studio --program part.nc --tools my.tbl         a program with tool lengths (G43)
 
 It serves 127.0.0.1 alone; the address holds a token. Ctrl-C ends it, nothing is lost.
 """
@@ -447,6 +450,14 @@ def studio_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--machine", metavar="NAME|FILE", help=f"machine of a new case (default: {MACHINE})")
     parser.add_argument("--program", metavar="FILE", help="NC program to add")
     parser.add_argument("--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects")
+    parser.add_argument(
+        "--trust",
+        action="append",
+        default=[],
+        metavar="effects/FILE.py",
+        help="code that came with the case, which you have read and agree to run",
+    )
+    add_reading_options(parser.add_argument_group("how programs are read"))
     parser.add_argument("--case", default="tps-case", metavar="DIR", help="folder of the case (default: tps-case)")
     parser.add_argument("--exercise", type=int, metavar="SEED", help="start a blind exercise in a new case")
     parser.add_argument("--port", type=int, default=0, metavar="N", help="port (default: one that is free)")
@@ -455,11 +466,19 @@ def studio_arguments(parser: argparse.ArgumentParser) -> None:
 
 def studio(args: argparse.Namespace) -> int:
     """Open the case and serve it until Ctrl-C."""
-    from toolpath_stiff.studio import opened_case, serve
+    from toolpath_stiff.studio import ask_for_effects, opened_case, serve
 
     case = opened_case(
-        args.case, args.data, machine=args.machine, program=args.program, effects=args.effects, exercise=args.exercise
+        args.case,
+        args.data,
+        machine=args.machine,
+        program=args.program,
+        effects=args.effects,
+        exercise=args.exercise,
+        trust=args.trust,
+        reading=case_reading(args),
     )
+    ask_for_effects(case, args.case)
     return serve(case, args.port, browser=not args.no_browser)
 
 

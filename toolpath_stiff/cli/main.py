@@ -265,6 +265,8 @@ def _stop_at(new: Any, *before: Any) -> None:
 def entry() -> None:
     """Console script: one thread of linear algebra, whatever the command."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
+    # Further processes would look for modules in the present folder first: in a case, or wherever programs came from.
+    os.environ["PYTHONSAFEPATH"] = "1"
     _stop_at(_stop, signal.SIG_DFL)  # one that is ignored (nohup) stays so
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal that cannot show a letter shows a question mark

@@ -93,6 +93,8 @@ class StiffnessModel:
         The machine as it was loaded, before geometry effects; None for a model that `build_model` did not make.
     conditions
         Under what programs run; measurements bring their own. `acting_effects` says which effects that leaves.
+    withheld
+        Effects that the machine should have and that were left out, with the reason.
     """
 
     machine: Machine
@@ -101,6 +103,7 @@ class StiffnessModel:
     control: Machine | None = None
     given: Machine | None = None
     conditions: Conditions = field(default_factory=Conditions)
+    withheld: tuple[Idle, ...] = ()
 
     @property
     def load_dependent(self) -> bool:
@@ -321,7 +324,7 @@ class Idle:
 
 def idle_effects(model: StiffnessModel) -> list[Idle]:
     """The effects that add nothing to a program run under the model's conditions; instruments never do."""
-    found = [_idle(active, model) for active in model.effects]
+    found = [*model.withheld, *(_idle(active, model) for active in model.effects)]
     return [one for one in found if one is not None]
 
 

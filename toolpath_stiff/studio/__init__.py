@@ -16,9 +16,12 @@ import json
 import os
 import secrets
 import signal
+import socket
+import sys
 import threading
 import webbrowser
 from collections.abc import Sequence
+from contextlib import suppress
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -29,8 +32,11 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from toolpath_stiff.api.case import Case
 from toolpath_stiff.api.case_results import CASE_FILE
+from toolpath_stiff.api.inputs import Reading, finite
 from toolpath_stiff.defaults import MACHINE, VERSION
 from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.files import is_file, reason
+from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.report import asset, json_for_script, script_hash
 from toolpath_stiff.report.figure import page_colours
 from toolpath_stiff.studio.picture import document
@@ -39,6 +45,7 @@ from toolpath_stiff.studio.session import Session
 LOCK = ".studio.lock"
 LARGEST_FILE = 64 * 1024 * 1024  # bytes of a dropped file
 LARGEST_QUESTION = 1024 * 1024
+MOST_SILENT = 32  # connections that have not shown the token yet, each with a thread
 BEAT = 15.0  # s between two signs of life of an event stream
 PLAIN = {
     ".json": "application/json",
@@ -67,16 +74,18 @@ def opened_case(
     program: str | None = None,
     effects: Sequence[str] = (),
     exercise: int | None = None,
+    trust: Sequence[str] = (),
+    reading: Reading | None = None,
 ) -> Case:
     """The case of a folder with what the command line adds to it.
 
     Raises `InputError` for files that cannot be used, and for a machine or an exercise where the case has them already.
     """
-    there = (Path(folder) / CASE_FILE).is_file()
+    there = is_file(Path(folder) / CASE_FILE)
     if there and (machine is not None or exercise is not None):
         name = "machine" if machine is not None else "exercise"
         raise InputError(f"--{name}: the case {folder} is there already", hint="name another folder with --case")
-    case = Case.open(folder, machine or MACHINE)
+    case = Case.open(folder, machine or MACHINE, trust)
     for file in effects:
         case.add_effects(file)
     if exercise is not None:
@@ -84,8 +93,22 @@ def opened_case(
     if data:
         case.add_data(*data)
     if program:
-        case.add_program(program)
+        case.add_program(program, **reading or {})
+    elif reading:
+        case.read_programs(**reading)
     return case
+
+
+def ask_for_effects(case: Case, folder: str) -> None:
+    """Ask on the terminal, by file, whether code that came with the case may be run; say what is off without it."""
+    for name in case.not_agreed:
+        file = case.path(name)
+        print(f"{file} is code that came with the case, and you have not agreed to run it: its effects are off.")
+        if sys.stdin.isatty() and sys.stdout.isatty():
+            if input("Have you read it, and shall it be run? [y/N] ").strip().lower() in ("y", "yes"):
+                case.trust(name)
+        else:
+            print(f"When you have read it: {command_line('studio', *options(case=folder, trust=name))}")
 
 
 def locked(folder: Path) -> IO[str]:
@@ -148,6 +171,29 @@ class Studio(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", port), Handler)
         self.session, self.token = session, token or secrets.token_urlsafe(24)
         self.closing = threading.Event()
+        self._silent: dict[Any, None] = {}  # connections that have not shown the token, the oldest first
+        self._silent_lock = threading.Lock()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a connection in a thread; where too many say nothing, the one that did so longest is ended."""
+        with self._silent_lock:
+            self._silent[request] = None
+            if len(self._silent) > MOST_SILENT:
+                oldest = next(iter(self._silent))
+                del self._silent[oldest]
+                with suppress(OSError):
+                    oldest.shutdown(socket.SHUT_RDWR)
+        super().process_request(request, client_address)
+
+    def is_known(self, request: Any) -> None:
+        """Of a connection that has shown the token, or has ended."""
+        with self._silent_lock:
+            self._silent.pop(request, None)
+
+    def shutdown_request(self, request: Any) -> None:
+        """End a connection."""
+        self.is_known(request)
+        super().shutdown_request(request)
 
     @property
     def address(self) -> str:
@@ -186,11 +232,14 @@ class Handler(BaseHTTPRequestHandler):
             if self._refused():
                 self.close_connection = True
                 return self._send(HTTPStatus.FORBIDDEN, REFUSED, "text/plain")
+            self.server.is_known(self.request)
             answer()
         except TpsError as error:
             self._json({"error": str(error)})
-        except (BrokenPipeError, ConnectionError):  # the tab was closed
+        except (ConnectionError, TimeoutError):  # the tab was closed
             self.close_connection = True
+        except OSError as error:
+            self._json({"error": reason(error)})
         return None
 
     # -- who may ask ---------------------------------------------------------------------------------------------------
@@ -257,8 +306,8 @@ class Handler(BaseHTTPRequestHandler):
             query = {name: values[0] for name, values in parse_qs(parts.query).items()}
             return self._json(session.take_file(query.get("name", "file"), body, query.get("run") == "yes"))
         try:
-            asked = json.loads(body)
-        except ValueError:
+            asked = json.loads(body, parse_float=_number, parse_constant=_number)
+        except (ValueError, RecursionError):
             raise InputError("the question is no JSON") from None
         if parts.path == "/do" and isinstance(asked, dict):
             return self._json(session.do(asked))
@@ -282,11 +331,11 @@ class Handler(BaseHTTPRequestHandler):
 
     def _file(self, name: str) -> None:
         folder = self.server.session.case.folder.resolve()
-        file = (folder / name).resolve()
+        file = (folder / name.replace("\0", "")).resolve()
         room = file.relative_to(folder).parts[0] if file.is_relative_to(folder) and file != folder else "exercise"
         # Programs have any suffix; among the results there is nothing that the tool has not written.
         known = PLAIN.get(file.suffix, "text/plain" if room == "results" else "")
-        if not known or "exercise" in room or not file.is_file():
+        if not known or "exercise" in room or not is_file(file):
             return self._send(HTTPStatus.NOT_FOUND, "there is no such file in the case", "text/plain")
         saved = "" if file.suffix in (".html", ".png", ".svg") else file.name
         return self._send(HTTPStatus.OK, file.read_bytes(), known, saved, {"Content-Security-Policy": SANDBOX})
@@ -316,6 +365,10 @@ class Handler(BaseHTTPRequestHandler):
             self.send_header(header, value)
         self.end_headers()
         self.wfile.write(body)
+
+
+def _number(text: str) -> float:
+    return finite("the question holds", text)
 
 
 def page() -> str:

@@ -308,7 +308,7 @@ def program(session: Session) -> dict[str, Any] | None:
     state = session.case.state
     if not state.program:
         return None
-    lines = session.once("lines", state.program, lambda: list(session.case.program.lines))
+    lines = session.once("lines", session.program_key, lambda: list(session.case.program.lines))
     found, error = session.found("analyze"), session.failed("analyze")
     shown = {
         "name": state.program.rpartition("/")[2],
@@ -358,7 +358,7 @@ def placement(session: Session) -> dict[str, Any] | None:
     try:
         now = session.once(
             "placed",
-            (session.data_key, state.program, tuple(origin(session))),
+            (session.data_key, session.program_key, tuple(origin(session))),
             lambda: session.trial().at(origin(session)),
         )
     except TpsError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,15 @@ from typing import Any
 import toolpath_stiff as tps
 from toolpath_stiff.api import one_of
 from toolpath_stiff.api.case import Case
-from toolpath_stiff.api.case_results import Step
+from toolpath_stiff.api.case_results import Step, reading_words
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.studio.work import Editing, Job
 
 MOST_POSES, MOST_SEED = 60, 2**31 - 1
-SUFFIXES = {".csv": "data", ".xlsx": "data", ".py": "effects", ".toml": "machine"}
+SUFFIXES = {".csv": "data", ".xlsx": "data", ".py": "effects", ".toml": "machine", ".tbl": "tools", ".var": "offsets"}
+NOT_OURS = (TypeError, ValueError, KeyError, OverflowError, AttributeError)  # of arguments that no page of ours sends
+LONGEST_NAME = 200  # bytes: what a file system takes, and what is put before it
 
 
 class Session:
@@ -86,7 +89,14 @@ class Session:
         state = self.case.state
         own = tuple((name, tuple(keys.items())) for name, keys in state.on.items())
         fitted = bool(own) and self.is_fitted  # a fit knows how well it knows: its machine has a band
-        return (self.data_key if own else state.machine, own, fitted, state.program, state.origin, state.require)
+        on = self.data_key if own else (state.machine, state.effects)
+        return (on, own, fitted, self.program_key, state.origin, state.require)
+
+    @property
+    def program_key(self) -> tuple[Any, ...]:
+        """The program and how it is read."""
+        state = self.case.state
+        return (state.program, tuple(state.reading.items()))
 
     def once(self, name: str, key: Any, make: Callable[[], Any]) -> Any:
         """What `make` gives, worked out once for a key."""
@@ -125,7 +135,7 @@ class Session:
         """The program that can be put anywhere."""
         state = self.case.state
         found: tps.PlacementTrial = self.once(
-            "trial", (state.machine, state.effects, state.program),
+            "trial", (state.machine, state.effects, self.program_key),
             lambda: tps.try_placement(self.machine, self.case.program),
         )  # fmt: skip
         return found
@@ -142,7 +152,7 @@ class Session:
             self._message = ""
             try:
                 answer = ACTIONS[name](self, **given)
-            except (TypeError, ValueError, KeyError) as error:  # arguments that a page of ours does not send
+            except NOT_OURS as error:
                 raise InputError(f"{name}: {error}") from None
             if name not in LOOKS:
                 self._follow_up()
@@ -217,7 +227,11 @@ class Session:
         import tempfile
 
         plain = Path(name.replace("\\", "/")).name or "file"
-        kind = SUFFIXES.get(Path(plain).suffix.lower(), "program")
+        if "\0" in plain or len(plain.encode()) > LONGEST_NAME:
+            raise InputError(
+                f"a file called {plain[:40]!r}", expected=f"{LONGEST_NAME} bytes at most, none of them zero"
+            )
+        kind = _kind(Path(plain).suffix.lower(), content)
         if kind == "effects" and not run:
             return {"confirm": f"{plain} is code. It is run when it is loaded. Load it?"}
         with tempfile.TemporaryDirectory() as folder, self.lock:
@@ -229,6 +243,9 @@ class Session:
                     "data": self.case.add_data,
                     "effects": self.case.add_effects,
                     "machine": self.case.set_machine,
+                    "tools": lambda file: self.case.read_programs(tools=file),
+                    "offsets": lambda file: self.case.read_programs(offsets=file),
+                    "controller": lambda file: self.case.read_programs(controller=file),
                 }
                 add.get(kind, self.case.add_program)(file)
             except TpsError as error:
@@ -268,9 +285,9 @@ class Session:
         """What the state holds of that on which this kind of result hangs."""
         state = self.case.state
         if kind == "place":
-            return (state.machine, state.effects, state.program)
+            return (state.machine, state.effects, self.program_key)
         if kind == "set_up":
-            return (state.machine, state.effects, state.program, state.origin)
+            return (state.machine, state.effects, self.program_key, state.origin)
         return self.path_key if kind == "analyze" else self.data_key
 
     def _start(self) -> None:
@@ -354,7 +371,7 @@ class Session:
                 name.partition("_")[0]: f"{v[0]:g}:{v[1]:g}" for name, v in job.options.items() if isinstance(v, list)
             }
             words = options(machine=state.machine, origin=origin, **bounds, effects=list(state.effects))
-            return command_line(job.kind, state.program, *words)
+            return command_line(job.kind, state.program, *words, *reading_words(state.reading))
         own = {"add": job.options.get("add"), "n": job.options.get("n")}
         return self.case.question(job.kind, **{name: value for name, value in own.items() if value})
 
@@ -432,6 +449,22 @@ class Session:
         return found
 
 
+def _kind(suffix: str, content: bytes) -> str:
+    """What a file is that was dropped; tables of tools and controller files are known by their headings and keys."""
+    from toolpath_stiff.nc.controller import KEYS
+
+    heading = content[:4096].decode("utf-8-sig", "replace").partition("\n")[0]
+    if suffix == ".csv" and {"tool", "length_mm"} <= {cell.strip() for cell in heading.split(",")}:
+        return "tools"
+    if suffix == ".toml":
+        try:
+            keys = set(tomllib.loads(content.decode("utf-8-sig")))
+        except ValueError:
+            keys = set()
+        return "controller" if keys and keys <= set(KEYS) else "machine"
+    return SUFFIXES.get(suffix, "program")
+
+
 def _moves_data(step: Step) -> bool:
     return bool({"machine", "effects", "data", "aside"} & set(step.change))
 
@@ -466,6 +499,7 @@ ACTIONS: dict[str, Callable[..., dict[str, Any] | None]] = {
     "hand": Session._by_hand,
     "at": lambda self, origin: self.trial().at(origin),
     "switch": lambda self, effect, values: self.case.switch(str(effect), values),
+    "trust": lambda self, file: self.case.trust(str(file)),
     "aside": Session._aside,
     "fit": Session._fit,
     "accept": Session._accept,

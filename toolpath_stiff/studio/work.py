@@ -152,9 +152,7 @@ def analyze(case: Any, tell: Tell, result: str, machine: str, first: str) -> dic
 
     found, command = case.analyze_in(result, machine, tell)
     origin = case.state.origin or None
-    before = tps.analyze(
-        case.machine.like(case.path(first)), case.program, origin_mm_deg=origin, partial=True, progress=tell
-    )
+    before = tps.analyze(case.machine_of(first), case.program, origin_mm_deg=origin, partial=True, progress=tell)
     return {"text": repr(found), "document": found.to_dict(), "command": command, "path": _columns(found, before)}
 
 
@@ -292,14 +290,17 @@ class Editing:
         new = self.case.state.effects[-1]
         self._open[new], self.faults[new] = self._open[name], ""
 
-    def state(self) -> list[dict[str, str]]:
-        """The own effects of the case with their text, as the page shows them; `copy`: "" where none is open."""
-        found = []
-        for name in self.case.state.effects:
-            copy = self._open.get(name, (None, ""))[0]
+    def state(self) -> list[dict[str, str | bool]]:
+        """The own effects of the case with their text, as the page shows them; `copy`: "" where none is open.
+
+        `off`: its code is not run, as this user has not agreed to it.
+        """
+        found, off = list[dict[str, str | bool]](), self.case.not_agreed
+        for name in self.case.recorded.effects:
+            copy = None if name in off else self._open.get(name, (None, ""))[0]
             text = (copy or self.case.folder / name).read_text("utf-8", "replace")
-            fault = self.faults.get(name, "")
-            found.append({"file": name, "text": text, "copy": str(copy.resolve()) if copy else "", "fault": fault})
+            fault, path = self.faults.get(name, ""), str(copy.resolve()) if copy else ""
+            found.append({"file": name, "text": text, "copy": path, "fault": fault, "off": name in off})
         return found
 
     def follow(self, looked: Callable[[], None]) -> None:

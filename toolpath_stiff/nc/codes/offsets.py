@@ -407,7 +407,10 @@ def _length_in_table(state: State, block: CurrentBlock, word: Word) -> float:
         raise block.fail(block.values["H"], "is not a tool number", "a whole number")
     if state.tools is None:
         raise block.fail(
-            word, f"needs the length of tool {tool}, and there is no tool table", hint="give one with --tools FILE"
+            word,
+            f"needs the length of tool {tool}, and there is no tool table",
+            hint="give one with --tools tools.csv, or drop it on the studio's page first; with the length in "
+            f"mm:\ntool,length_mm\n{tool},LENGTH",
         )
     if tool not in state.tools or math.isnan(state.tools[tool].length):
         raise block.fail(word, f"needs the length of tool {tool}", hint="add it to the tool table (--tools FILE)")

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import importlib.machinery
 import importlib.util
 import pkgutil
 import sys
 from collections.abc import Iterable
 from functools import cache, lru_cache
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
@@ -126,13 +127,21 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
     return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
 
 
+class _Source(importlib.machinery.SourceFileLoader):
+    """Runs the text of a file and nothing else: a compiled file beside it may come from anybody and say anything."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
 @lru_cache(maxsize=MOST_FILES)
 def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]:
     """`path`, `changed` and `size` tell files and their versions apart."""
     name = f"toolpath_stiff_user_effects_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
+    if path.suffix != ".py":
         raise EffectError("not a Python file", expected="a name that ends in .py", file=file)
+    spec = importlib.util.spec_from_file_location(name, path, loader=_Source(name, str(path)))
+    assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:

@@ -243,6 +243,9 @@ function draw() {
   $("sentence").classList.toggle("waiting", Boolean(waiting));
   $("sentence").replaceChildren(waiting || `${v.sentence}.`, v ? h("small", {}, v.text) : "");
   $("gauge").replaceChildren(gaugeOf(state));
+  const off = state.own_effects.filter((one) => one.off).map((one) => one.file);
+  $("off").hidden = !off.length;
+  $("off").textContent = `Off, as it is code that you have not agreed to run: ${off.join(", ")}. It stands under Effects.`;
   for (const [id, many] of [["undo", state.history.length > 1], ["redo", state.undone.length]]) if ($(id)) $(id).disabled = !many;
   scene.paths = [];
   if (state.program?.path && here >= state.program.path.s_mm.length) here = scene.sample = -1;
@@ -292,6 +295,8 @@ $("play").addEventListener("click", () => {
 });
 watchTheme(() => { if (state) { drawLegend(); view.redraw(); profile?.redraw(); } });
 
+// What a program is read with comes before the program.
+const ordered = (files) => [...files].sort((a, b) => /\.(tbl|var|toml|csv)$/i.test(b.name) - /\.(tbl|var|toml|csv)$/i.test(a.name));
 async function take(file, run = false) {
   try {
     const found = await post(`/file?name=${encodeURIComponent(file.name)}${run ? "&run=yes" : ""}`, file);
@@ -312,10 +317,10 @@ if (readonly) draw();
 else {
   for (const name of ["undo", "redo", "cancel"]) $(name).addEventListener("click", () => act({ do: name }));
   $("open").addEventListener("click", () => $("file").click());
-  $("file").addEventListener("change", async (e) => { for (const file of [...e.target.files]) await take(file); e.target.value = ""; });
+  $("file").addEventListener("change", async (e) => { for (const file of ordered(e.target.files)) await take(file); e.target.value = ""; });
   addEventListener("dragover", (e) => { e.preventDefault(); $("drop").hidden = false; });
   addEventListener("dragleave", (e) => { if (!e.relatedTarget) $("drop").hidden = true; });
-  addEventListener("drop", async (e) => { e.preventDefault(); $("drop").hidden = true; for (const file of [...e.dataTransfer.files]) await take(file); });
+  addEventListener("drop", async (e) => { e.preventDefault(); $("drop").hidden = true; for (const file of ordered(e.dataTransfer.files)) await take(file); });
   addEventListener("keydown", (e) => {
     if (!(e.ctrlKey || e.metaKey) || e.target.matches("textarea, input[type=number], input[type=text]")) return;
     const name = { z: "undo", y: "redo" }[e.key.toLowerCase()];
