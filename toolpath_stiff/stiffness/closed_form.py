@@ -22,12 +22,13 @@ from itertools import combinations
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
-from toolpath_stiff.machine.kinematics import solve_struts_at
+from toolpath_stiff.machine.kinematics import LENGTH_TOLERANCE, Struts, solve_struts_at
 from toolpath_stiff.machine.model import Machine, StrutLaw
 
 BLOCK = 2048  # poses; the nine-row work arrays (150 kB each) then stay in a core's second-level cache
 # Determinants of unit directions lie within 0 and 1. At 1e-3 the elimination loses three of sixteen digits.
 SMALL_DETERMINANT = 1e-3
+FOLLOWING_STEPS = 12  # a platform radius 1 mm off takes four
 NEXT, LAST = [1, 2, 0], [2, 0, 1]
 
 
@@ -182,6 +183,86 @@ def compliance_along_columns(
                 force.sum(axis=0, out=along[rows])
                 good[rows] &= np.isfinite(along[rows])
     return compliance if direction.ndim == 3 else compliance[0], determinant, lengths, good
+
+
+def strut_forces_columns(
+    kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
+) -> tuple[FloatArray, Struts, BoolArray]:
+    """Strut forces (n, 6) N per N along one direction a pose, the struts, and where the forces may be trusted (n,).
+
+    Arguments as of `compliance_along_columns`, with one direction.
+    """
+    n, order = position.shape[1], list(kernel.order)
+    forces, good = np.empty((n, 6)), np.empty(n, dtype=bool)
+    struts = Struts(np.empty((n, 6)), np.empty((n, 6, 3)), np.empty((n, 6, 3)))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for rows, work in _blocks(n):
+            turn = None if rotation is None else rotation[:, rows].reshape(3, 3, -1)
+            first, second = _eliminate(kernel, position[:, rows], turn, work)
+            arms = kernel.platform[:, :, None] if turn is None else work.arms
+            struts.lengths[rows, order] = work.length.T
+            struts.directions[rows, order], struts.arms[rows, order] = work.directions.T, arms.T
+            forces[rows, order] = _forces(work, direction[:, rows]).T
+            good[rows] = well_conditioned(kernel, first, second) & np.isfinite(forces[rows]).all(axis=1)
+    return forces, struts, good
+
+
+def followed_columns(
+    kernel: ClosedForm, control: ClosedForm, position: FloatArray, rotation: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Where a platform goes whose struts get the lengths that a control computes for the poses on its own geometry.
+
+    `control` has the joints of the control's machine in the order of `kernel`; the other arguments as of
+    `compliance_along_columns`. Newton's method with the first inverse throughout: geometries differ by little.
+
+    Returns
+    -------
+    position, rotation, good
+        (3, n) m, (9, n), and (n,) where the lengths are met.
+    """
+    n = position.shape[1]
+    tips, turns, good = position.copy(), np.empty((9, n)), np.empty(n, dtype=bool)
+    turns[:] = np.eye(3).reshape(9, 1) if rotation is None else rotation
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for rows, first in _blocks(n):
+            tip, turn, work = tips[:, rows], turns[:, rows].reshape(3, 3, -1), _Work(rows.stop - rows.start)
+            _strut_geometry(control, tip, None if rotation is None else turn, work)
+            wanted = work.length.copy()
+            _eliminate(kernel, tip, None if rotation is None else turn, first)
+            missing = wanted - first.length
+            for _ in range(FOLLOWING_STEPS):
+                shift, spin = _twist(first, missing)
+                tip = tip + shift
+                turn = _spun(spin, turn)
+                _strut_geometry(kernel, tip, turn, work)
+                missing = wanted - work.length
+                error = np.abs(missing).max(axis=0)
+                if not (error > LENGTH_TOLERANCE).any():
+                    break
+            tips[:, rows], turns[:, rows] = tip, turn.reshape(9, -1)
+            good[rows] = error <= LENGTH_TOLERANCE
+    return tips, turns, good
+
+
+def _twist(work: _Work, missing: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Shift (3, m) and turn (3, m) of the tip that lengthen the struts by (6, m), after `_eliminate`."""
+    a, b = missing[:3], missing[3:]
+    spin = (work.q * (b - (work.t * a[:, None]).sum(axis=0))[None]).sum(axis=1)
+    rest = a - (work.moments[:, :3] * spin[:, None]).sum(axis=0)
+    return (work.w * rest[None]).sum(axis=1), spin
+
+
+def _spun(spin: FloatArray, turn: FloatArray) -> FloatArray:
+    """Orientations (3, 3, m) turned further by small vectors (3, m), by Cayley's formula: a rotation to all digits."""
+    half = 0.5 * spin
+    scale = 2.0 / (1.0 + (half * half).sum(axis=0))
+    across = _crossed(half, turn)
+    return np.asarray(turn + scale * (across + _crossed(half, across)))
+
+
+def _crossed(vector: FloatArray, columns: FloatArray) -> FloatArray:
+    """Cross products of vectors (3, m) with each column of (3, 3, m)."""
+    return np.asarray(vector[NEXT, None] * columns[LAST] - vector[LAST, None] * columns[NEXT])
 
 
 def well_conditioned(kernel: ClosedForm, first: FloatArray, second: FloatArray) -> BoolArray:

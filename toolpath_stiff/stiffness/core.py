@@ -24,8 +24,8 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness import closed_form, exact
 from toolpath_stiff.stiffness.effects import guard
-from toolpath_stiff.stiffness.effects.contract import LoadPath
-from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, acting_effects, load_path
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
 CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2 ms a call is not earned back
@@ -150,6 +150,64 @@ def compliance_along_columns(
 
         return compiled.compliance_along_columns(kernel, position, direction, rotation)
     return closed_form.compliance_along_columns(kernel, position, direction, rotation)
+
+
+def compliance_with_effects(
+    model: StiffnessModel,
+    position: FloatArray,
+    direction: FloatArray,
+    rotation: FloatArray | None,
+    tool_length: float,
+    force: float,
+) -> FloatArray:
+    """Compliance along one direction a pose of one tool, effects included, without a pivoted solve.
+
+    The struts are statically determinate: their forces are the closed form's, whatever gives way. Where the control
+    knows the geometry less well, the closed form also says where the platform goes.
+
+    Returns
+    -------
+    (n,) m/N; nan where the exact route must be asked. Columns as of `compliance_along_columns`.
+    """
+    kernel, n = closed_form.prepare(model.machine, tool_length), position.shape[1]
+    sure = np.ones(n, dtype=bool)
+    if model.control is not None:
+        order = list(kernel.order)
+        platform = np.ascontiguousarray(model.control.platform_joints_for(tool_length)[order].T)
+        frame = np.ascontiguousarray(model.control.frame_joints[order].T)
+        control = replace(kernel, frame=frame, platform=platform)
+        position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
+    if not any(map(_gives_way, acting_effects(model))):
+        found, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
+        found[~(sure & good)] = np.nan
+        return found
+    found = np.full(n, np.nan)
+    extension = 0.0 if np.isnan(tool_length) else tool_length - model.machine.reference_tool_length
+    for start in range(0, n, BLOCK):
+        rows = slice(start, start + BLOCK)
+        turn = None if rotation is None else rotation[:, rows]
+        forces, struts, good = closed_form.strut_forces_columns(kernel, position[:, rows], direction[:, rows], turn)
+        turns = np.broadcast_to(np.eye(3), (len(forces), 3, 3)) if turn is None else turn.T.reshape(-1, 3, 3)
+        path = LoadPath(
+            machine=model.machine,
+            position=position[:, rows].T,
+            rotation=turns,
+            struts=struts,
+            tool_extension=np.full(len(forces), extension),
+            force=np.full(len(forces), force),
+            **model.conditions.columns(len(forces)),
+        )
+        some = np.flatnonzero(good & sure[rows])
+        path = path if len(some) == len(forces) else path.take(some)
+        found[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
+    return found
+
+
+def _gives_way(active: ActiveEffect) -> bool:
+    """Whether an effect does more than change the geometry."""
+    kind = type(active.effect)
+    hooks = ("strut_compliance", "load_compliance", "parallel_stiffness")
+    return any(getattr(kind, hook) is not getattr(Effect, hook) for hook in hooks)
 
 
 def _exact(
