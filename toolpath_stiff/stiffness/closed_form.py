@@ -28,7 +28,7 @@ from toolpath_stiff.machine.model import Machine, StrutLaw
 BLOCK = 2048  # poses; the nine-row work arrays (150 kB each) then stay in a core's second-level cache
 # Determinants of unit directions lie within 0 and 1. At 1e-3 the elimination loses three of sixteen digits.
 SMALL_DETERMINANT = 1e-3
-FOLLOWING_STEPS = 12  # a platform radius 1 mm off takes four
+FOLLOWING_STEPS = 25  # a platform radius 1 mm off takes three
 NEXT, LAST = [1, 2, 0], [2, 0, 1]
 
 
@@ -224,23 +224,23 @@ def followed_columns(
     tips, turns, good = position.copy(), np.empty((9, n)), np.empty(n, dtype=bool)
     turns[:] = np.eye(3).reshape(9, 1) if rotation is None else rotation
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for rows, first in _blocks(n):
-            tip, turn, work = tips[:, rows], turns[:, rows].reshape(3, 3, -1), _Work(rows.stop - rows.start)
-            _strut_geometry(control, tip, None if rotation is None else turn, work)
-            wanted = work.length.copy()
+        for (rows, first), (_, work) in zip(_blocks(n), _blocks(n), strict=True):
+            tip, turn = tips[:, rows], turns[:, rows].reshape(3, 3, -1)
+            _strut_lengths(control, tip, None if rotation is None else turn, work)
+            wanted, left = work.length.copy(), np.full(tip.shape[1], np.inf)
             _eliminate(kernel, tip, None if rotation is None else turn, first)
-            missing = wanted - first.length
+            missing, before = wanted - first.length, np.array(kernel.arm)
             for _ in range(FOLLOWING_STEPS):
                 shift, spin = _twist(first, missing)
-                tip = tip + shift
-                turn = _spun(spin, turn)
-                _strut_geometry(kernel, tip, turn, work)
-                missing = wanted - work.length
+                tip, turn = tip + shift, _spun(spin, turn)
                 error = np.abs(missing).max(axis=0)
-                if not (error > LENGTH_TOLERANCE).any():
+                left = error * error / before  # a step shortens what is missing as the one before it did
+                if not (left > LENGTH_TOLERANCE).any():
                     break
+                _strut_lengths(kernel, tip, turn, work)
+                missing, before = wanted - work.length, np.maximum(error, LENGTH_TOLERANCE)
             tips[:, rows], turns[:, rows] = tip, turn.reshape(9, -1)
-            good[rows] = error <= LENGTH_TOLERANCE
+            good[rows] = left <= LENGTH_TOLERANCE
     return tips, turns, good
 
 
@@ -354,7 +354,19 @@ def _strut_compliances(kernel: ClosedForm, work: _Work) -> BoolArray:
 
 def _strut_geometry(kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None, work: _Work) -> None:
     """Arms r, directions u, moments r x u and lengths of the block."""
-    arms, u, m, six = work.arms, work.directions, work.moments, work.six
+    arms = _strut_lengths(kernel, position, rotation, work)
+    u, m, six = work.directions, work.moments, work.six
+    np.divide(1.0, work.length, out=work.inverse_length)
+    u *= work.inverse_length
+    for c in range(3):
+        np.multiply(arms[NEXT[c]], u[LAST[c]], out=m[c])
+        np.multiply(arms[LAST[c]], u[NEXT[c]], out=six)
+        m[c] -= six
+
+
+def _strut_lengths(kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None, work: _Work) -> FloatArray:
+    """Lengths of the block, and the struts as vectors in `work.directions`; returns the arms."""
+    arms, u, six = work.arms, work.directions, work.six
     if rotation is None:
         arms = kernel.platform[:, :, None]
         np.add(position[:, None], (kernel.platform - kernel.frame)[:, :, None], out=u)
@@ -371,12 +383,7 @@ def _strut_geometry(kernel: ClosedForm, position: FloatArray, rotation: FloatArr
         np.multiply(u[c], u[c], out=six)
         work.length += six
     np.sqrt(work.length, out=work.length)
-    np.divide(1.0, work.length, out=work.inverse_length)
-    u *= work.inverse_length
-    for c in range(3):
-        np.multiply(arms[NEXT[c]], u[LAST[c]], out=m[c])
-        np.multiply(arms[LAST[c]], u[NEXT[c]], out=six)
-        m[c] -= six
+    return arms
 
 
 def _inverse_columns(matrix: FloatArray, out: FloatArray, spare: FloatArray) -> FloatArray:
