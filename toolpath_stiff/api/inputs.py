@@ -47,8 +47,8 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
     if len(values) not in (3, 6):
         raise InputError(f"{name} of {len(values)} numbers", expected="X, Y, Z or X, Y, Z, A, B, C in mm and degrees")
     x, y, z, a, b, c = (*values, 0.0, 0.0, 0.0)[:6]
-    near = max(abs(x), abs(y), abs(z)) <= FARTHEST_MM and max(abs(a), abs(b), abs(c)) <= FARTHEST_DEG
-    if not near:  # nan is not near either
+    near = [abs(v) <= FARTHEST_MM for v in (x, y, z)] + [abs(v) <= FARTHEST_DEG for v in (a, b, c)]
+    if not all(near):  # nan is not near either
         raise InputError(
             f"{name} {values}",
             expected=f"positions within +-{FARTHEST_MM:g} mm and angles within +-{FARTHEST_DEG:g} degrees",
