@@ -9,7 +9,8 @@ depends on the load. With gaps and contacts there is no tensor: the compliance a
 under the load in that direction, and its extremes are searched on the half sphere. Gaps give it kinks, where
 derivatives say nothing, so the search compares values alone. Where a strut's force changes its sign its gap costs
 least: the stiffest direction tends to lie in such a plane, or where two of them meet, and that valley is too narrow for
-steps in any direction. So the stiffest one is looked for in the planes as well, by steps that stay in them.
+steps in any direction. So the stiffest one is looked for in the planes as well, by steps that stay in them. The softest
+one never lies there: the planes part its basins, and climbs begin in different ones.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ ROUTES = ("exact", "closed_form", "compiled")
 Along = Callable[[FloatArray, IntArray], FloatArray]
 
 DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
-CLIMBS, CLIMBS_IN_PLANES = 3, 6  # from so many of the best; kinks make more basins
+CLIMBS = 6  # from so many of the best; kinks make more basins
 FIRST_STEP, LAST_STEP = 0.13, 1e-4  # rad; half the distance of neighbours; the compliance is then certain to 1e-6
 AROUND = 6  # directions tried about the best one at each step
 IN_PLANE = 12  # over half a circle of the directions in which one strut is idle
@@ -279,8 +280,8 @@ def extreme_directions(
             return exact.compliance_along(model, path.take(poses), directions)
 
         normals = None if across is None else across[rows]
-        idle = None if softest else exact.strut_forces(model, path)
-        result[rows] = searched_directions(along, exact.tip_compliance(model, path), softest, normals, idle)
+        forces = exact.strut_forces(model, path)
+        result[rows] = searched_directions(along, exact.tip_compliance(model, path), forces, softest, normals)
     return result
 
 
@@ -295,9 +296,9 @@ def half_sphere(count: int) -> FloatArray:
 def searched_directions(
     along: Along,
     tensor: FloatArray,
+    forces: FloatArray,
     softest: bool = True,
     across: FloatArray | None = None,
-    idle: FloatArray | None = None,
 ) -> FloatArray:
     """Directions in which the tip gives way most, or least.
 
@@ -307,20 +308,20 @@ def searched_directions(
         Unit vectors (k, 3) and the poses (k,) at which they are meant, to compliances (k,) m/N.
     tensor
         (n, 3, 3) m/N, the compliance without what depends on the load; its eigenvectors are tried as well.
+    forces
+        (n, 6, 3) N per N in the struts under loads along the axes: across its row a strut is idle. Kinks in these
+        planes may hold the stiffest direction, and part the basins of the softest.
     softest
         The softest, else the stiffest direction.
     across
         (n, 3) unit vectors; only directions across these are looked at.
-    idle
-        (n, 6, 3) N per N, the forces of the struts under loads along the axes: across its row a strut is idle. Where
-        kinks in these planes may hold the extreme.
 
     Returns
     -------
     (n, 3) unit vectors whose largest component is positive.
     """
     n, sign = len(tensor), 1.0 if softest else -1.0
-    climbs = CLIMBS if idle is None else CLIMBS_IN_PLANES
+    idle = None if softest else forces / np.linalg.norm(forces, axis=-1, keepdims=True)
 
     def value(directions: FloatArray) -> FloatArray:
         """(n, m) of directions (n, m, 3), to be made large."""
@@ -330,11 +331,11 @@ def searched_directions(
     spread = np.broadcast_to(half_sphere(DIRECTIONS), (n, DIRECTIONS, 3))
     tried = np.concatenate([spread, np.swapaxes(np.linalg.eigh(tensor)[1], 1, 2)], axis=1)
     if idle is not None:
-        idle = idle / np.linalg.norm(idle, axis=-1, keepdims=True)
         tried = np.concatenate([tried, _in_planes(idle)], axis=1)
     tried = tried if across is None else _flattened(tried, across)
     found = value(tried)
-    best = np.argsort(-found, axis=1, kind="stable")[:, :climbs]
+    best = np.argsort(-found, axis=1, kind="stable")
+    best = (_best_of_each_cell(best, tried, forces) if softest else best)[:, :CLIMBS]
     directions = np.take_along_axis(tried, best[..., None], axis=1)
     reached = np.take_along_axis(found, best, axis=1)
     step = np.full(reached.shape, FIRST_STEP)
@@ -342,7 +343,7 @@ def searched_directions(
         around = _around(directions, step)
         around = around if idle is None else np.concatenate([around, _turned_about(directions, idle, step)], axis=2)
         around = around if across is None else _flattened(around, across)
-        values = value(around.reshape(n, -1, 3)).reshape(n, climbs, -1)
+        values = value(around.reshape(n, -1, 3)).reshape(n, CLIMBS, -1)
         better = values.argmax(axis=-1)
         top = np.take_along_axis(values, better[..., None], axis=-1)[..., 0]
         risen = top > reached
@@ -352,6 +353,15 @@ def searched_directions(
         step = np.where(risen, step, 0.5 * step)
     last = reached.argmax(axis=1)
     return signed(directions[np.arange(n), last])
+
+
+def _best_of_each_cell(best: IntArray, tried: FloatArray, forces: FloatArray) -> IntArray:
+    """(n, m) directions, best first: of each set in which the same struts pull and push the best, then the others."""
+    pulls = np.einsum("nij,nmj->nmi", forces, tried) > 0.0
+    cell = (pulls ^ pulls[..., :1]) @ (1 << np.arange(6))  # a direction and its opposite are one
+    ranked = np.take_along_axis(cell, best, axis=1)
+    again = np.tril(ranked[:, :, None] == ranked[:, None, :], -1).any(axis=2)
+    return np.take_along_axis(best, np.argsort(again, axis=1, kind="stable"), axis=1)
 
 
 def _around(directions: FloatArray, step: FloatArray) -> FloatArray:
