@@ -83,7 +83,8 @@ def test_what_must_give_way_is_said_first(tmp_path, capsys):
     assert {row["figure"] for row in summary["worse"]} == {"mean", "range", "weakest"}
     for row, line in zip(summary["worse"], printed, strict=False):
         assert line.startswith("warning         WORSE")
-        assert f"{row['chosen_N_per_mm']:.0f} instead of {row['before_N_per_mm']:.0f} N/mm" in line
+        chosen, before = (f"{row[key]:,.0f}".replace(",", " ") for key in ("chosen_N_per_mm", "before_N_per_mm"))
+        assert f"one, {chosen} instead of {before} N/mm" in line
         sign = -1.0 if row["figure"] == "range" else 1.0
         assert row["worse_by_N_per_mm"] == pytest.approx(sign * (row["before_N_per_mm"] - row["chosen_N_per_mm"]))
     # The present placement lies outside; the hints to widen are options of the command itself.

@@ -581,11 +581,10 @@ def _worse_words(one: dict[str, Any], picked: bool) -> str:
     which = "picked" if picked else "recommended"
     what = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
     share = 100.0 * one["worse_by_N_per_mm"] / max(abs(one["before_N_per_mm"]), 1e-12)
+    chosen, before = (f"{one[key]:,.0f}".replace(",", " ") for key in ("chosen_N_per_mm", "before_N_per_mm"))
     return (
         f"WORSE: at the {which} placement {what[one['figure']]} than at the present one, "
-        f"{one['chosen_N_per_mm']:,.0f} instead of {one['before_N_per_mm']:,.0f} N/mm ({share:.1f} % worse)".replace(
-            ",", " "
-        )
+        f"{chosen} instead of {before} N/mm ({share:.1f} % worse)"
     )
 
 
