@@ -84,8 +84,8 @@ class Placement(FolderResult):
     <Placement: slot.nc, X0 Y0 Z800 A0 B0 C0 of 1 placements>
     >>> found.origin_mm_deg, found.worse, found.warnings
     ((0.0, 0.0, 800.0, 0.0, 0.0, 0.0), [], [])
-    >>> print(found.program_bytes.decode().splitlines()[1])
-    G0 X0 Y0 Z5
+    >>> found.refusal, found.program_bytes.decode().splitlines()[1]
+    ('', 'G0 X0 Y0 Z5')
     >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
     (1, ['placements.csv', 'placement.json'], 'balanced')
     >>> type(found.plot()).__name__
