@@ -144,6 +144,7 @@ def test_regions_by_option_by_file_and_from_python_are_the_same(slot, capsys):
         (["--regions", "two.csv"], "two.csv:3: region a stands twice"),
         (["--regions", "short.csv"], "short.csv:1: column z_mm is missing"),
         (["--regions", "word.csv"], "word.csv:2: "),
+        (["--regions", "turn.csv"], "turn.csv:2: region a: a cell is no finite number"),
         (["--regions", "empty.csv"], "empty.csv"),
     ],
 )
@@ -151,6 +152,7 @@ def test_regions_that_are_refused(slot, capsys, arguments, told):
     Path("two.csv").write_text("region,x_mm,y_mm,z_mm\na,0,0,800\na,0,0,900\n")
     Path("short.csv").write_text("region,x_mm,y_mm\na,0,0\n")
     Path("word.csv").write_text("region,x_mm,y_mm,z_mm\na,0,zero,800\n")
+    Path("turn.csv").write_text("region,x_mm,y_mm,z_mm,rotation_deg\na,0,0,800,nan\n")
     Path("empty.csv").write_text("region,x_mm,y_mm,z_mm\n")
     try:
         code = main(["case-study", "slot.nc", *arguments, "--step", "10", "--no-plots", "--out", "o"])

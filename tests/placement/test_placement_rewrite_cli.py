@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,21 @@ def test_tool_lengths_reach_the_rewriter():
     assert any("chords within 0.001 mm" in note for note in summary["written"]["notes"])
 
 
+def test_a_turn_that_cannot_be_written_keeps_the_search(in_empty_folder, capsys):
+    assert place("arcs_in_planes.nc", "--write", "placed.nc") == 2
+    error = capsys.readouterr().err
+    assert "placed.nc was not written; the search is kept in out" in error
+    assert "arcs_in_planes.nc:10: an arc of G18" in error
+    told = re.search(r"--linearise 0\.01.* would write it in (\d+) lines", error)
+    summary = json.loads(Path("out/placement.json").read_text())
+    assert "an arc of G18" in summary["written"]["refused"]
+    assert not Path("placed.nc").exists()
+    pick = str(summary["chosen"]["number"])
+    assert place("arcs_in_planes.nc", "--write", "placed.nc", "--pick", pick, "--linearise", "0.01") == 0
+    assert told
+    assert int(told[1]) == len(Path("placed.nc").read_text().splitlines())
+
+
 def test_nothing_asked_nothing_written():
     assert place("case_study.nc") == 0
     assert json.loads(Path("out/placement.json").read_text())["written"] is None
@@ -70,7 +86,6 @@ def test_nothing_asked_nothing_written():
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("arcs_in_planes.nc", ["--write", "placed.nc"], "arcs_in_planes.nc:10: an arc of G18"),
         ("pocket.nc", ["--decimals", "5"], "--decimals without --write"),
         ("pocket.nc", ["--linearise", "0.01"], "--linearise without --write"),
         ("pocket.nc", ["--write", "placed.nc", "--decimals", "0"], "0 decimals"),

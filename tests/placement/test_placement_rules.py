@@ -23,7 +23,7 @@ from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program
 from toolpath_stiff.path import place
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, least_costs
-from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.evaluator import Evaluator, Keepout
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.search import NO_FLOORS, SearchRules, search_placements
 from toolpath_stiff.stiffness.model import build_model
@@ -83,7 +83,8 @@ def test_what_must_give_way_is_said_first(tmp_path, capsys):
     assert {row["figure"] for row in summary["worse"]} == {"mean", "range", "weakest"}
     for row, line in zip(summary["worse"], printed, strict=False):
         assert line.startswith("warning         WORSE")
-        assert f"{row['chosen_N_per_mm']:.0f} instead of {row['before_N_per_mm']:.0f} N/mm" in line
+        chosen, before = (f"{row[key]:,.0f}".replace(",", " ") for key in ("chosen_N_per_mm", "before_N_per_mm"))
+        assert f"one, {chosen} instead of {before} N/mm" in line
         sign = -1.0 if row["figure"] == "range" else 1.0
         assert row["worse_by_N_per_mm"] == pytest.approx(sign * (row["before_N_per_mm"] - row["chosen_N_per_mm"]))
     # The present placement lies outside; the hints to widen are options of the command itself.
@@ -182,6 +183,33 @@ def test_a_homing_rapid_that_no_placement_mends_is_named_and_no_constraint(tmp_p
         text.startswith("line 9: no placement within the bounds keeps this rapid") for text in summary["warnings"]
     )
     assert "line 9: no placement" in capsys.readouterr().out
+
+
+def test_a_reference_point_below_reach_is_named_and_left_out(tmp_path):
+    """An ordinary post's program, from a user: G28 to 0, 0, 0 of the machine, whose end alone a tool cannot reach."""
+    tools = tmp_path / "bracket.tbl"
+    tools.write_text("T1 P1 D12 Z120\nT2 P2 D8.5 Z150\n")
+    command = ["place", str(Path(__file__).with_name("bracket.nc")), "--tools", str(tools), "--out", str(tmp_path)]
+    assert main([*command, "--x=-50:50", "--y=-50:50", "--z", "700:900", "--no-plots"]) == 0
+    summary = json.loads((tmp_path / "placement.json").read_text())
+    assert [rapid["line"] for rapid in summary["search"]["rapids_left_out"]] == [14, 149, 150]
+
+
+def test_where_two_rapids_exclude_each_other_the_error_names_what_failed():
+    """One passes a slab where X is above 0, the other where it is below; each can be kept alone."""
+    text = "G21 G90 F500\nG0 X0 Y0 Z50\nG1 Z0\nG1 X20\nG0 X0 Z50\nG53 G0 Z1150\nG53 G0 Z1300\nM2\n"
+
+    def read(origin):
+        return parse_program(text, "slabs.nc", origin=origin)
+
+    slabs = (
+        Keepout("left", (-2.0, -2.0, 1.1), (0.01, 2.0, 1.12)),
+        Keepout("right", (-0.01, -2.0, 1.2), (2.0, 2.0, 1.22)),
+    )
+    path = work_path(read(PRESENT), STEP, TANGENTIAL, PRESENT, read)
+    bounds = Bounds(np.array([-0.2, 0, 0.8, 0, 0, 0]), np.array([0.2, 0, 0.8, 0, 0, 0]))
+    with pytest.raises(UnreachableError, match=r"the rapid of line [67] runs [1-9][\d.]* mm deep into the keep-out"):
+        search_placements(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=slabs), present=np.array(PRESENT))
 
 
 @pytest.mark.parametrize("margin", [0.01, 0.2])

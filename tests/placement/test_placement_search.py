@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from toolpath_stiff.analysis import analyze, parse_load
+from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
@@ -21,7 +22,9 @@ from toolpath_stiff.placement.climb import Bounds, front_rows, thin
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures
 from toolpath_stiff.placement.paths import placed_path, representative_path, work_path
 from toolpath_stiff.placement.search import SearchRules, search_placements
-from toolpath_stiff.stiffness.model import build_model
+from toolpath_stiff.stiffness.effects import find_effect
+from toolpath_stiff.stiffness.model import ActiveEffect, build_model
+from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 ROOT = Path(__file__).parent.parent.parent
 MODEL = build_model(load_machine("nist"))
@@ -241,3 +244,26 @@ def test_what_cannot_be_placed_is_one_error_and_no_file(tmp_path, monkeypatch, c
     assert len([line for line in told.err.splitlines() if "error:" in line]) == 1
     assert "Traceback" not in told.err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "load"),
+    [
+        ("platform_radius_error", {"error": 5e-3}, "tangential"),
+        ("tool_length_error", {"error": -2e-3}, "x"),
+        ("joint_compliance", {"compliance": 2e-9}, "tangential"),
+        ("frame_compliance", {"vertex": 0, "radial": 5e-9, "vertical": 3e-9}, "radial"),
+        ("joint_clearance", {"lost_motion": 2e-6}, "axial"),
+    ],
+)
+def test_effects_ask_no_pivoted_solve_and_the_figures_are_those_of_analyze(monkeypatch, effect, values, load):
+    """Placement on a fitted machine took eleven times the processor time while every pose went the exact route."""
+    model = build_model(load_machine("nist"), extra=[ActiveEffect(find_effect(effect), values)])
+    program, asked, there = program_of("tilted_five_axis"), parse_load(load), (0.05, -0.03, 0.85, 0.0, 0.0, 0.4)
+    analysis = analyze(model, program, origin=there, load=asked, step=5e-3)
+    wanted = stiffness_figures(analysis, analysis.headline)
+    path = work_path(program, 5e-3, asked, there)
+    monkeypatch.setattr("toolpath_stiff.placement.evaluator.evaluate", None)
+    found = Evaluator(model, path, asked, 1000.0).figures(np.array([there]))
+    for name, value in (("mean", found.mean), ("range", found.spread), ("min", found.lowest)):
+        assert n_per_mm_from_n_per_m(value[0]) == pytest.approx(wanted[f"{name}_N_per_mm"], rel=1e-9)

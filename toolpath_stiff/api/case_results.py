@@ -676,10 +676,11 @@ class Findings(Contents):
         name, reason = Path(state.program).name, ""
         try:
             found = place(self.machine, self.program, write=name, progress=progress, **at)
+            content = found.program_bytes
         except InputError as error:
             found, reason = place(self.machine, self.program, progress=progress, **at), str(error)
         found.save(self.folder / result)
-        beside = {"not_written.txt": f"{reason}\n"} if reason else {name: found.program_bytes}
+        beside = {"not_written.txt": f"{reason}\n"} if reason else {name: content}
         write_files(self.folder / result, beside)
         bounds = {key.rpartition("_")[0].replace("_", "-"): f"{value:.10g}" for key, value in at.items()}
         written = None if reason else f"{result}/{name}"

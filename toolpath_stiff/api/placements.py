@@ -84,8 +84,8 @@ class Placement(FolderResult):
     <Placement: slot.nc, X0 Y0 Z800 A0 B0 C0 of 1 placements>
     >>> found.origin_mm_deg, found.worse, found.warnings
     ((0.0, 0.0, 800.0, 0.0, 0.0, 0.0), [], [])
-    >>> print(found.program_bytes.decode().splitlines()[1])
-    G0 X0 Y0 Z5
+    >>> found.refusal, found.program_bytes.decode().splitlines()[1]
+    ('', 'G0 X0 Y0 Z5')
     >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
     (1, ['placements.csv', 'placement.json'], 'balanced')
     >>> type(found.plot()).__name__
@@ -118,10 +118,20 @@ class Placement(FolderResult):
 
     @property
     def program_bytes(self) -> bytes:
-        """The program written for the placement; it was asked for with `write`."""
+        """The program written for the placement; it was asked for with `write`.
+
+        Raises `InputError` where it cannot be written there; the rest of the result stands.
+        """
+        if self.refusal:
+            raise InputError(self.refusal)
         if self.placed.rewritten is None:
             raise InputError("the program was not written for the placement", hint="ask for it with write=FILE")
         return self.placed.rewritten
+
+    @property
+    def refusal(self) -> str:
+        """Why the program could not be written for the placement, "" unless that is so."""
+        return str((self.placed.summary["written"] or {}).get("refused", ""))
 
     @staticmethod
     def _at(row: Mapping[str, Any]) -> tuple[float, ...]:

@@ -32,6 +32,7 @@ from toolpath_stiff.cli.arguments import (
 )
 from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.hints import both_names
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -507,7 +508,13 @@ def place(args: argparse.Namespace) -> int:
             progress=progress,
         )
     keep(replaced, quiet=args.json)
-    return show(args, found, target, {args.write: found.program_bytes} if args.write else {})
+    code = show(args, found, target, {args.write: found.program_bytes} if args.write and not found.refusal else {})
+    if found.refusal:
+        raise InputError(
+            f"{args.write} was not written; the search is kept in {target.folder} "
+            f"({both_names('--pick')} takes it up): {found.refusal}"
+        )
+    return code
 
 
 # -- tps case-study ---------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,7 @@ COLUMNS = (
 )
 SIGNS = {"mean": 1.0, "range": -1.0, "weakest": 1.0}  # more is better; less is better
 ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
+USUAL_CHORD_MM = 0.01  # tried where a program cannot be written without chords
 AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
 NAMES = ("x", "y", "z", "tilt-a", "tilt-b", "rotate")
 
@@ -121,7 +122,7 @@ class Placed:
     program
         As read for the chosen placement.
     rewritten
-        Bytes of the transformed program; None unless asked for.
+        Bytes of the transformed program; None unless asked for, and where it cannot be written (`summary` says why).
     """
 
     task: Task
@@ -260,7 +261,20 @@ def _rewritten(task: Task, program: Program, best: Analysis) -> tuple[bytes | No
     writing = task.rewriting
     if writing is None:
         return None, None
-    rewritten = rewrite_program(
+    try:
+        rewritten = _written_there(task, writing, program, best)
+    except InputError as error:
+        return None, {"file": writing.file, "refused": f"{error}{_linearised_words(task, writing, program, best)}"}
+    return rewritten.content, {
+        "file": writing.file,
+        "analysed_at": placement_row(np.array(task.present)),
+        "relative_difference": rewriting_differences(best, rewritten, task.present, **writing.reading),
+        "notes": list(rewritten.notes),
+    }
+
+
+def _written_there(task: Task, writing: Rewriting, program: Program, best: Analysis) -> Rewritten:
+    return rewrite_program(
         program,
         best.origin,
         task.present,
@@ -268,12 +282,22 @@ def _rewritten(task: Task, program: Program, best: Analysis) -> tuple[bytes | No
         linearise=writing.linearise,
         **writing.reading,
     )
-    return rewritten.content, {
-        "file": writing.file,
-        "analysed_at": placement_row(np.array(task.present)),
-        "relative_difference": rewriting_differences(best, rewritten, task.present, **writing.reading),
-        "notes": list(rewritten.notes),
-    }
+
+
+def _linearised_words(task: Task, writing: Rewriting, program: Program, best: Analysis) -> str:
+    """What a refused program would be with chords; nothing where these were asked for or do not help."""
+    if writing.linearise is not None:
+        return ""
+    try:
+        chords = _written_there(task, replace(writing, linearise=m_from_mm(USUAL_CHORD_MM)), program, best)
+    except InputError:
+        return ""
+    apart = rewriting_differences(best, chords, task.present, **writing.reading)
+    option = both_names("--linearise", f"{USUAL_CHORD_MM:g}")
+    return (
+        f". {option} would write it in {len(chords.text.splitlines())} lines instead of {len(program.source)}; its "
+        f"mean would differ by {apart['mean']:.1e}, its range by {apart['range']:.1e} (relative)"
+    )
 
 
 def fingerprint(task: Task) -> dict[str, Any]:
@@ -557,9 +581,10 @@ def _worse_words(one: dict[str, Any], picked: bool) -> str:
     which = "picked" if picked else "recommended"
     what = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
     share = 100.0 * one["worse_by_N_per_mm"] / max(abs(one["before_N_per_mm"]), 1e-12)
+    chosen, before = (f"{one[key]:,.0f}".replace(",", " ") for key in ("chosen_N_per_mm", "before_N_per_mm"))
     return (
         f"WORSE: at the {which} placement {what[one['figure']]} than at the present one, "
-        f"{one['chosen_N_per_mm']:.0f} instead of {one['before_N_per_mm']:.0f} N/mm ({share:.1f} % worse)"
+        f"{chosen} instead of {before} N/mm ({share:.1f} % worse)"
     )
 
 

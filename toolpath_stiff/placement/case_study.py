@@ -205,6 +205,8 @@ def read_regions(file: str) -> dict[str, Region]:
             raise TableError(f"region {name} stands twice", file=file, line=line)
         try:
             x, y, z, turn = (float(row.get(column) or 0.0) for column in REGION_COLUMNS)
+            if not np.isfinite((x, y, z, turn)).all():
+                raise ValueError("a cell is no finite number")
         except ValueError as error:
             raise TableError(
                 f"region {name}: {error}", expected="numbers in mm and degrees", file=file, line=line

@@ -2,7 +2,8 @@
 
 The path is sampled once, in the set-up frame; a placement turns and moves the samples rigidly. Limits come from strut
 lengths and determinants that the closed form computes on its way; so does the stiffness of linear struts on a rigid
-platform under a load that the geometry alone directs. Everything else asks `analysis.poses.evaluate` for the stiffness.
+platform under a load that the geometry alone directs. Effects add to the strut forces of the closed form; a load whose
+direction asks the compliance, and what is near singular, goes to `analysis.poses.evaluate`.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 POSES_AT_A_TIME = 30_000  # fits the processor's cache
+COMPLIANCE_DECIDES = ("softest", "normal")  # loads whose direction asks the compliance, the second at plunges
 
 
 @dataclass(frozen=True)
@@ -125,8 +127,7 @@ class Evaluator:
     ) -> None:
         self.model, self.path, self.load, self.force, self.keepouts = model, path, load, force, keepouts
         self.poses = 0
-        # These two ask the compliance for a direction, the second at plunges.
-        self.direct = core.is_closed_form(model) and load.kind not in ("softest", "normal")
+        self.direct = core.is_closed_form(model) and load.kind not in COMPLIANCE_DECIDES
         # A still sample has no direction; none of them is a headline sample, so any direction does.
         still = ~np.asarray(path.tangent.any(axis=1))
         tangent = np.where(still[:, None], np.array([0.0, 0.0, 1.0]), path.tangent)
@@ -267,7 +268,7 @@ class Evaluator:
     def _asked(
         self, position: FloatArray, motion: FloatArray, rotation: FloatArray | None, margin: FloatArray
     ) -> FloatArray:
-        """(k, h) stiffness at the headline samples by `analysis.poses.evaluate`, where all cuts are within reach."""
+        """(k, h) stiffness at the headline samples where all cuts are within reach."""
         path = self.path
         head = np.flatnonzero(path.headline)
         found = np.full((len(margin), len(head)), np.nan)
@@ -278,11 +279,28 @@ class Evaluator:
                 """Rows of the headline samples at the possible placements."""
                 return columns[:, possible][:, :, head].reshape(len(columns), -1).T
 
-            turns = None if rotation is None else some(rotation).reshape(-1, 3, 3)
+            turns = None if rotation is None else some(rotation)
             tools = np.tile(path.tool_length[head], len(possible))
             tip, towards = some(position), some(motion)
-            found[possible] = self._evaluated(tip, towards, turns, tools).reshape(len(possible), -1)
+            found[possible] = self._with_effects(tip, towards, turns, tools).reshape(len(possible), -1)
         return found
+
+    def _with_effects(
+        self, tip: FloatArray, motion: FloatArray, rotation: FloatArray | None, tools: FloatArray
+    ) -> FloatArray:
+        """(n,) N/m at poses (n, 3) with motions (n, 3) and rotations (n, 9), by the closed form where it can be had."""
+        turns = None if rotation is None else rotation.reshape(-1, 3, 3)
+        stiffness = np.full(len(tip), np.nan)
+        direction, known = geometric_directions(self.load, tip, turns, motion)
+        for rows, tool in _groups(tools) if self.load.kind not in COMPLIANCE_DECIDES else []:
+            turn = None if rotation is None else np.ascontiguousarray(rotation[rows].T)
+            there, along = (np.ascontiguousarray(values[rows].T) for values in (tip, direction))
+            stiffness[rows] = 1.0 / core.compliance_with_effects(self.model, there, along, turn, tool, self.force)
+        left = np.flatnonzero(~(known & (stiffness > 0.0) & (stiffness < np.inf)))
+        if len(left):
+            turns = None if turns is None else turns[left]
+            stiffness[left] = self._evaluated(tip[left], motion[left], turns, tools[left])
+        return stiffness
 
     def _evaluated(
         self, tip: FloatArray, motion: FloatArray, rotation: FloatArray | None, tool: FloatArray | float

@@ -14,12 +14,12 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.analysis.poses import evaluate
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.machine.limits import Reach, reach
+from toolpath_stiff.path import place_orientations
 from toolpath_stiff.placement.climb import Bounds, Climber, Goal, Rules, apart, front_rows, thin
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures, clearances
 from toolpath_stiff.placement.paths import WorkPath, placed_path, representative_path, with_rows
@@ -37,6 +37,7 @@ HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 10, 6
 APART = 0.1  # of each range, where they start
 BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
 FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
+SCOUTS_AT_A_TIME = 50  # until one keeps an anchored rapid within reach
 SHORT = 3000  # samples of a path that is climbed on as a whole; of a longer one, on what stands for it
 ROUNDS, STRETCHES = 2, 120  # of that: how often it is told anew, and stretches whose extremes join it
 WHOLE_POSES = 2_000_000  # about, of the whole path to which the front's candidates are thinned
@@ -246,42 +247,61 @@ def _let_go(search: _Search, scouts: FloatArray) -> tuple[PlacementFigures, tupl
 
     Returns the figures of the scouts on few samples, and the lines of these rapids and why.
     """
-    few = search.evaluators["few"]
-    m, rule, anchored = len(few.path), search.rules.margin, few.path.anchored
-    found = [(few.summary(rows), np.minimum(rows.margin - rule, rows.clearance)) for rows in few.groups(scouts)]
+    few, whole = search.evaluators["few"], search.path.anchored
+    found = [
+        (few.summary(rows), np.minimum(rows.margin - search.rules.margin, rows.clearance))
+        for rows in few.groups(scouts)
+    ]
     figures, room = PlacementFigures.joined([part for part, _ in found]), np.concatenate([part for _, part in found])
-    cuts = room[:, :m][:, few.path.cutting].min(axis=1, initial=np.inf)
-    possible = np.flatnonzero(cuts >= 0.0) if (cuts >= 0.0).any() else np.arange(len(scouts))
+    cuts = room[:, : len(few.path)][:, few.path.cutting].min(axis=1, initial=np.inf)
+    possible = scouts[cuts >= 0.0] if (cuts >= 0.0).any() else scouts
     gone, told = [], []
-    for move in np.unique(anchored.move):
-        rows = np.flatnonzero(anchored.move == move)
-        room_of_move = room[possible][:, m + rows]
-        if room_of_move.min(axis=1).max() >= 0.0:
-            continue
-        best = int(possible[np.argmax(room_of_move.min(axis=1))])
-        told.append((int(anchored.line[rows[0]]), _breaks(search, few.path, scouts[best], m + rows)))
-        gone.append(move)
+    for move in np.unique(whole.move):
+        rapid = whole.take(whole.move == move)
+        alone = search.evaluator(replace(few.path.take(np.arange(0)), anchored=rapid))
+        best, most = _roomiest(search, alone, possible)
+        few.poses += alone.poses
+        if most < 0.0:
+            told.append((int(rapid.line[0]), _breaks(search, alone.path, best)))
+            gone.append(move)
     if gone:
-        kept = ~np.isin(search.path.anchored.move, gone)
-        search.sampled(replace(search.path, anchored=search.path.anchored.take(kept)))
+        search.sampled(replace(search.path, anchored=whole.take(~np.isin(whole.move, gone))))
         figures = search.evaluators["few"].figures(scouts)
     return figures, tuple(told)
 
 
-def _breaks(search: _Search, path: WorkPath, placement: FloatArray, columns: IntArray) -> str:
-    """What the worst of some anchored samples breaks at a placement, in words."""
-    turn = rotation_matrices(placement[None, 3:])
-    rows = columns - len(path)
-    position = path.anchored.placed(turn, placement[None, :3])[0][rows]
-    machine = search.model.machine
-    rotation = rotation_matrices(path.anchored.abc[rows])
-    struts = solve_struts(machine, position, rotation, path.anchored.tool_length[rows])
-    stand = reach(machine, position, struts, rotation)
+def _roomiest(search: _Search, evaluator: Evaluator, placements: FloatArray) -> tuple[FloatArray, float]:
+    """The first placement that keeps the rules at all samples, else the one that misses them least, and its room."""
+    best, most = placements[0], -np.inf
+    for start in range(0, len(placements), SCOUTS_AT_A_TIME):
+        some = placements[start : start + SCOUTS_AT_A_TIME]
+        rows = evaluator.rows(some)
+        room = np.minimum(rows.margin - search.rules.margin, rows.clearance).min(axis=1)
+        if room.max() > most:
+            best, most = some[int(np.argmax(room))], float(room.max())
+        if most >= 0.0:
+            break
+    return best, most
+
+
+def _breaks(search: _Search, rapid: WorkPath, placement: FloatArray) -> str:
+    """What the worst sample of an anchored rapid breaks at a placement, in words."""
+    position, stand = _stand(search, rapid, placement)
     worst = int(np.argmin(stand.margin))
     if stand.margin[worst] >= search.rules.margin:
         boxes = [box.name for box in search.asked.keepouts if clearances(box, position).min() < 0.0]
         return f"it runs through the keep-out {boxes[0]}" if boxes else "it cannot be kept"
     return stand.describe(worst)
+
+
+def _stand(search: _Search, path: WorkPath, placement: FloatArray) -> tuple[FloatArray, Reach]:
+    """(m + q, 3) m of a path at a placement, anchored rapids last, and how these stand to the limits."""
+    anchored, machine = path.anchored, search.model.machine
+    turn = rotation_matrices(placement[None, 3:])
+    position = np.concatenate([placed_path(path, placement)[0], anchored.placed(turn, placement[None, :3])[0]])
+    rotation = rotation_matrices(place_orientations(np.concatenate([path.abc, anchored.abc]), placement))
+    tools = np.concatenate([path.tool_length, anchored.tool_length])
+    return position, reach(machine, position, solve_struts(machine, position, rotation, tools), rotation)
 
 
 def _extrapolation_allowed(
@@ -449,18 +469,25 @@ def _recommended(
 
 def _infeasible(search: _Search, placement: FloatArray) -> UnreachableError:
     """The error that names the rule, the line and by how much, at the least bad placement."""
-    path, model, rules = search.path, search.model, search.rules
-    position, tangent, abc = placed_path(path, placement)
-    found = evaluate(model, position, abc, tangent, path.tool_length, search.load)
-    worst = int(np.argmin(found.margin))
-    x, y, z = (mm_from_m(float(v)) for v in placement[:3])
-    where = f"X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {deg_from_rad(float(placement[5])):.1f} degrees"
-    least = f"no placement is feasible: at the least bad one ({where})"
-    line = f"{'' if path.cutting[worst] else 'the rapid of '}line {int(path.line[worst])}"
+    path, rules = search.path, search.rules
     figures = search.evaluators["whole"].figures(placement[None])
-    if found.margin[worst] < 0.0:
+    position, stand = _stand(search, path, placement)
+    line = np.concatenate([path.line, path.anchored.line])
+    cutting = np.concatenate([path.cutting, np.zeros(len(path.anchored), dtype=bool)])
+
+    def least_bad(row: int) -> str:
+        x, y, z = (mm_from_m(float(v)) for v in placement[:3])
+        where = f"X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {deg_from_rad(float(placement[5])):.1f} degrees"
+        return (
+            f"no placement is feasible: at the least bad one ({where}) "
+            f"{'' if cutting[row] else 'the rapid of '}line {int(line[row])}"
+        )
+
+    worst = int(np.argmin(stand.margin))
+    margin = float(min(figures.margin[0], figures.rapid_margin[0]))
+    if margin < 0.0:
         return UnreachableError(
-            f"{least} {line} breaks a limit: {found.reach.describe(worst)}",
+            f"{least_bad(worst)} breaks a limit: {stand.describe(worst)}",
             hint="widen the bounds, or cut the part in two set-ups",
         )
     if figures.clearance[0] < 0.0:
@@ -468,18 +495,20 @@ def _infeasible(search: _Search, placement: FloatArray) -> UnreachableError:
         deepest = int(np.argmin([depth.min() for depth in depths]))
         row = int(np.argmin(depths[deepest]))
         return UnreachableError(
-            f"{least} line {int(path.line[row])} runs {mm_from_m(-float(depths[deepest][row])):.1f} mm deep into the "
+            f"{least_bad(row)} runs {mm_from_m(-float(depths[deepest][row])):.1f} mm deep into the "
             f"keep-out {search.asked.keepouts[deepest].name}",
             hint="make the keep-out smaller or the bounds wider",
         )
-    if found.margin[worst] < rules.margin:
+    if margin < rules.margin:
         return UnreachableError(
-            f"{least} {line} has a margin of {100.0 * found.margin[worst]:.2f} % of the limit's span: "
-            f"{found.reach.describe(worst)}",
+            f"{least_bad(worst)} has a margin of {100.0 * margin:.2f} % of the limit's span: {stand.describe(worst)}",
             hint=f"widen the bounds, or ask for less than {both_names('--margin', f'{100.0 * rules.margin:g}')}",
         )
+    room = search.evaluators["whole"].rows(placement[None]).law[0]
+    shortest = int(np.argmin(np.where(path.cutting, room, np.inf)))
     return UnreachableError(
-        f"{least} the struts are outside their law at {100.0 * figures.extrapolated[0]:.1f} % of the samples, now at "
-        f"{100.0 * rules.extrapolated:.1f} %",
+        f"{least_bad(shortest)} takes a strut {mm_from_m(-float(room[shortest])):.3g} mm out of the lengths of its "
+        f"law, as {100.0 * figures.extrapolated[0]:.3g} % of the cutting samples do; now "
+        f"{100.0 * rules.extrapolated:.3g} %",
         hint="widen the bounds, or allow it with --allow-extrapolation",
     )

@@ -184,8 +184,8 @@ def text(summary: dict[str, Any]) -> str:
     lines += _plunges_words(best, before)
     for goal, cost in summary["trade_offs"].items():
         lines.append(
-            f"  best {goal:<9} {cost['best_on_front_N_per_mm']:.0f} on the front, "
-            f"{cost['chosen_N_per_mm']:.0f} here, N/mm"
+            f"  best {goal:<9} {number(cost['best_on_front_N_per_mm'])} on the front, "
+            f"{number(cost['chosen_N_per_mm'])} here, N/mm"
         )
     lines.append(f"  margin        {100.0 * _smallest_margin(best):.1f} % of a limit's span at least, rapids included")
     blocks = summary["offset_blocks"]
@@ -193,7 +193,7 @@ def text(summary: dict[str, Any]) -> str:
     fanuc = (blocks["fanuc"] or blocks["fanuc_reason"]).replace("\n", "\n                ")
     lines.append(f"Fanuc-style     {fanuc}")
     evaluated = summary["search"]["pose_evaluations"]
-    lines.append(f"front           {len(summary['front'])} placements, {evaluated} poses evaluated")
+    lines.append(f"front           {len(summary['front'])} placements, {number(evaluated)} poses evaluated")
     lines += _written(summary["written"]) if summary["written"] else []
     lines += [f"warning         {text}" for text in summary["warnings"][first:]]
     return "\n".join(lines)
@@ -201,7 +201,8 @@ def text(summary: dict[str, Any]) -> str:
 
 def _figures_words(row: dict[str, Any]) -> str:
     return (
-        f"mean {row['mean_N_per_mm']:.0f}, range {row['range_N_per_mm']:.0f}, weakest {row['min_N_per_mm']:.0f} N/mm, "
+        f"mean {number(row['mean_N_per_mm'])}, range {number(row['range_N_per_mm'])}, "
+        f"weakest {number(row['min_N_per_mm'])} N/mm, "
         f"deflection {row['mean_deflection_um']:.1f} um"
     )
 
@@ -210,9 +211,9 @@ def _plunges_words(best: dict[str, Any], before: dict[str, Any] | None) -> list[
     """The plunges, where they stand beside the other figures."""
     if best["plunge_mean_N_per_mm"] is None:
         return []
-    now = f", before {before['plunge_mean_N_per_mm']:.0f}" if before else ""
+    now = f", before {number(before['plunge_mean_N_per_mm'])}" if before else ""
     return [
-        f"  plunges       mean {best['plunge_mean_N_per_mm']:.0f}{now} N/mm, along the tool axis, not counted above"
+        f"  plunges       mean {number(best['plunge_mean_N_per_mm'])}{now} N/mm, along the tool axis, not counted above"
     ]
 
 
@@ -222,6 +223,8 @@ def _smallest_margin(row: dict[str, Any]) -> float:
 
 def _written(written: dict[str, Any]) -> list[str]:
     """What became of the transformed program."""
+    if "refused" in written:
+        return [f"not rewritten   {written['file']}: {written['refused']}"]
     at, apart = written["analysed_at"], written["relative_difference"]
     figures = ", ".join(f"{name} {value:.1e}" for name, value in apart.items())
     lines = [
@@ -454,7 +457,7 @@ def _rows(summary: dict[str, Any], best: Analysis) -> list[tuple[str, list[str]]
     heights = mm_from_m(best.samples.position[best.samples.cutting, 2])
     fanuc = blocks["fanuc"] or blocks["fanuc_reason"]
     plunges = row["plunge_mean_N_per_mm"]
-    before = summary["before"]
+    before, written = summary["before"], summary["written"]
     lines = [
         ("program zero (G54)", f"X {row['x_mm']:.4f}   Y {row['y_mm']:.4f}   Z {row['z_mm']:.4f} mm"),
         ("turn of the work about Z", f"{row['rotation_deg']:.4f} degrees"),
@@ -462,7 +465,7 @@ def _rows(summary: dict[str, Any], best: Analysis) -> list[tuple[str, list[str]]
         ("heights of the cut", f"Z {heights.min():.3f} to {heights.max():.3f} mm (machine)"),
         ("LinuxCNC", blocks["linuxcnc"] or blocks["linuxcnc_reason"]),
         ("Fanuc-style", fanuc + (f"\n{G68_NOTE}" if "G68" in (blocks["fanuc"] or "") else "")),
-        *([("program written", summary["written"]["file"])] if summary["written"] else []),
+        *([("program written", written["file"])] if written and "refused" not in written else []),
         ("mean stiffness", _both(row, before, "mean_N_per_mm")),
         ("range", _both(row, before, "range_N_per_mm")),
         ("weakest place", _both(row, before, "min_N_per_mm")),

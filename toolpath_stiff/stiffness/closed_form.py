@@ -22,12 +22,13 @@ from itertools import combinations
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
-from toolpath_stiff.machine.kinematics import solve_struts_at
+from toolpath_stiff.machine.kinematics import LENGTH_TOLERANCE, Struts, solve_struts_at
 from toolpath_stiff.machine.model import Machine, StrutLaw
 
 BLOCK = 2048  # poses; the nine-row work arrays (150 kB each) then stay in a core's second-level cache
 # Determinants of unit directions lie within 0 and 1. At 1e-3 the elimination loses three of sixteen digits.
 SMALL_DETERMINANT = 1e-3
+FOLLOWING_STEPS = 25  # a platform radius 1 mm off takes three
 NEXT, LAST = [1, 2, 0], [2, 0, 1]
 
 
@@ -184,6 +185,86 @@ def compliance_along_columns(
     return compliance if direction.ndim == 3 else compliance[0], determinant, lengths, good
 
 
+def strut_forces_columns(
+    kernel: ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
+) -> tuple[FloatArray, Struts, BoolArray]:
+    """Strut forces (n, 6) N per N along one direction a pose, the struts, and where the forces may be trusted (n,).
+
+    Arguments as of `compliance_along_columns`, with one direction.
+    """
+    n, order = position.shape[1], list(kernel.order)
+    forces, good = np.empty((n, 6)), np.empty(n, dtype=bool)
+    struts = Struts(np.empty((n, 6)), np.empty((n, 6, 3)), np.empty((n, 6, 3)))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for rows, work in _blocks(n):
+            turn = None if rotation is None else rotation[:, rows].reshape(3, 3, -1)
+            first, second = _eliminate(kernel, position[:, rows], turn, work)
+            arms = kernel.platform[:, :, None] if turn is None else work.arms
+            struts.lengths[rows, order] = work.length.T
+            struts.directions[rows, order], struts.arms[rows, order] = work.directions.T, arms.T
+            forces[rows, order] = _forces(work, direction[:, rows]).T
+            good[rows] = well_conditioned(kernel, first, second) & np.isfinite(forces[rows]).all(axis=1)
+    return forces, struts, good
+
+
+def followed_columns(
+    kernel: ClosedForm, control: ClosedForm, position: FloatArray, rotation: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Where a platform goes whose struts get the lengths that a control computes for the poses on its own geometry.
+
+    `control` has the joints of the control's machine in the order of `kernel`; the other arguments as of
+    `compliance_along_columns`. Newton's method with the first inverse throughout: geometries differ by little.
+
+    Returns
+    -------
+    position, rotation, good
+        (3, n) m, (9, n), and (n,) where the lengths are met.
+    """
+    n = position.shape[1]
+    tips, turns, good = position.copy(), np.empty((9, n)), np.empty(n, dtype=bool)
+    turns[:] = np.eye(3).reshape(9, 1) if rotation is None else rotation
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for (rows, first), (_, work) in zip(_blocks(n), _blocks(n), strict=True):
+            tip, turn = tips[:, rows], turns[:, rows].reshape(3, 3, -1)
+            _strut_lengths(control, tip, None if rotation is None else turn, work)
+            wanted, left = work.length.copy(), np.full(tip.shape[1], np.inf)
+            _eliminate(kernel, tip, None if rotation is None else turn, first)
+            missing, before = wanted - first.length, np.array(kernel.arm)
+            for _ in range(FOLLOWING_STEPS):
+                shift, spin = _twist(first, missing)
+                tip, turn = tip + shift, _spun(spin, turn)
+                error = np.abs(missing).max(axis=0)
+                left = error * error / before  # a step shortens what is missing as the one before it did
+                if not (left > LENGTH_TOLERANCE).any():
+                    break
+                _strut_lengths(kernel, tip, turn, work)
+                missing, before = wanted - work.length, np.maximum(error, LENGTH_TOLERANCE)
+            tips[:, rows], turns[:, rows] = tip, turn.reshape(9, -1)
+            good[rows] = left <= LENGTH_TOLERANCE
+    return tips, turns, good
+
+
+def _twist(work: _Work, missing: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Shift (3, m) and turn (3, m) of the tip that lengthen the struts by (6, m), after `_eliminate`."""
+    a, b = missing[:3], missing[3:]
+    spin = (work.q * (b - (work.t * a[:, None]).sum(axis=0))[None]).sum(axis=1)
+    rest = a - (work.moments[:, :3] * spin[:, None]).sum(axis=0)
+    return (work.w * rest[None]).sum(axis=1), spin
+
+
+def _spun(spin: FloatArray, turn: FloatArray) -> FloatArray:
+    """Orientations (3, 3, m) turned further by small vectors (3, m), by Cayley's formula: a rotation to all digits."""
+    half = 0.5 * spin
+    scale = 2.0 / (1.0 + (half * half).sum(axis=0))
+    across = _crossed(half, turn)
+    return np.asarray(turn + scale * (across + _crossed(half, across)))
+
+
+def _crossed(vector: FloatArray, columns: FloatArray) -> FloatArray:
+    """Cross products of vectors (3, m) with each column of (3, 3, m)."""
+    return np.asarray(vector[NEXT, None] * columns[LAST] - vector[LAST, None] * columns[NEXT])
+
+
 def well_conditioned(kernel: ClosedForm, first: FloatArray, second: FloatArray) -> BoolArray:
     """Where neither of the determinants that the elimination divides by is small."""
     small = SMALL_DETERMINANT
@@ -273,7 +354,19 @@ def _strut_compliances(kernel: ClosedForm, work: _Work) -> BoolArray:
 
 def _strut_geometry(kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None, work: _Work) -> None:
     """Arms r, directions u, moments r x u and lengths of the block."""
-    arms, u, m, six = work.arms, work.directions, work.moments, work.six
+    arms = _strut_lengths(kernel, position, rotation, work)
+    u, m, six = work.directions, work.moments, work.six
+    np.divide(1.0, work.length, out=work.inverse_length)
+    u *= work.inverse_length
+    for c in range(3):
+        np.multiply(arms[NEXT[c]], u[LAST[c]], out=m[c])
+        np.multiply(arms[LAST[c]], u[NEXT[c]], out=six)
+        m[c] -= six
+
+
+def _strut_lengths(kernel: ClosedForm, position: FloatArray, rotation: FloatArray | None, work: _Work) -> FloatArray:
+    """Lengths of the block, and the struts as vectors in `work.directions`; returns the arms."""
+    arms, u, six = work.arms, work.directions, work.six
     if rotation is None:
         arms = kernel.platform[:, :, None]
         np.add(position[:, None], (kernel.platform - kernel.frame)[:, :, None], out=u)
@@ -290,12 +383,7 @@ def _strut_geometry(kernel: ClosedForm, position: FloatArray, rotation: FloatArr
         np.multiply(u[c], u[c], out=six)
         work.length += six
     np.sqrt(work.length, out=work.length)
-    np.divide(1.0, work.length, out=work.inverse_length)
-    u *= work.inverse_length
-    for c in range(3):
-        np.multiply(arms[NEXT[c]], u[LAST[c]], out=m[c])
-        np.multiply(arms[LAST[c]], u[NEXT[c]], out=six)
-        m[c] -= six
+    return arms
 
 
 def _inverse_columns(matrix: FloatArray, out: FloatArray, spare: FloatArray) -> FloatArray:

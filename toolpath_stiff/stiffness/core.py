@@ -9,7 +9,8 @@ depends on the load. With gaps and contacts there is no tensor: the compliance a
 under the load in that direction, and its extremes are searched on the half sphere. Gaps give it kinks, where
 derivatives say nothing, so the search compares values alone. Where a strut's force changes its sign its gap costs
 least: the stiffest direction tends to lie in such a plane, or where two of them meet, and that valley is too narrow for
-steps in any direction. So the stiffest one is looked for in the planes as well, by steps that stay in them.
+steps in any direction. So the stiffest one is looked for in the planes as well, by steps that stay in them. The softest
+one never lies there: the planes part its basins, and climbs begin in different ones.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.stiffness import closed_form, exact
 from toolpath_stiff.stiffness.effects import guard
-from toolpath_stiff.stiffness.effects.contract import LoadPath
-from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
+from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
+from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, acting_effects, load_path
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
 CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2 ms a call is not earned back
@@ -36,7 +37,7 @@ ROUTES = ("exact", "closed_form", "compiled")
 Along = Callable[[FloatArray, IntArray], FloatArray]
 
 DIRECTIONS = 60  # over half a sphere: neighbours some 15 degrees apart
-CLIMBS, CLIMBS_IN_PLANES = 3, 6  # from so many of the best; kinks make more basins
+CLIMBS = 6  # from so many of the best; kinks make more basins
 FIRST_STEP, LAST_STEP = 0.13, 1e-4  # rad; half the distance of neighbours; the compliance is then certain to 1e-6
 AROUND = 6  # directions tried about the best one at each step
 IN_PLANE = 12  # over half a circle of the directions in which one strut is idle
@@ -152,6 +153,64 @@ def compliance_along_columns(
     return closed_form.compliance_along_columns(kernel, position, direction, rotation)
 
 
+def compliance_with_effects(
+    model: StiffnessModel,
+    position: FloatArray,
+    direction: FloatArray,
+    rotation: FloatArray | None,
+    tool_length: float,
+    force: float,
+) -> FloatArray:
+    """Compliance along one direction a pose of one tool, effects included, without a pivoted solve.
+
+    The struts are statically determinate: their forces are the closed form's, whatever gives way. Where the control
+    knows the geometry less well, the closed form also says where the platform goes.
+
+    Returns
+    -------
+    (n,) m/N; nan where the exact route must be asked. Columns as of `compliance_along_columns`.
+    """
+    kernel, n = closed_form.prepare(model.machine, tool_length), position.shape[1]
+    sure = np.ones(n, dtype=bool)
+    if model.control is not None:
+        order = list(kernel.order)
+        platform = np.ascontiguousarray(model.control.platform_joints_for(tool_length)[order].T)
+        frame = np.ascontiguousarray(model.control.frame_joints[order].T)
+        control = replace(kernel, frame=frame, platform=platform)
+        position, rotation, sure = closed_form.followed_columns(kernel, control, position, rotation)
+    if not any(map(_gives_way, acting_effects(model))):
+        found, _, _, good = closed_form.compliance_along_columns(kernel, position, direction, rotation)
+        found[~(sure & good)] = np.nan
+        return found
+    found = np.full(n, np.nan)
+    extension = 0.0 if np.isnan(tool_length) else tool_length - model.machine.reference_tool_length
+    for start in range(0, n, BLOCK):
+        rows = slice(start, start + BLOCK)
+        turn = None if rotation is None else rotation[:, rows]
+        forces, struts, good = closed_form.strut_forces_columns(kernel, position[:, rows], direction[:, rows], turn)
+        turns = np.broadcast_to(np.eye(3), (len(forces), 3, 3)) if turn is None else turn.T.reshape(-1, 3, 3)
+        path = LoadPath(
+            machine=model.machine,
+            position=position[:, rows].T,
+            rotation=turns,
+            struts=struts,
+            tool_extension=np.full(len(forces), extension),
+            force=np.full(len(forces), force),
+            **model.conditions.columns(len(forces)),
+        )
+        some = np.flatnonzero(good & sure[rows])
+        path = path if len(some) == len(forces) else path.take(some)
+        found[start + some] = exact.compliance_along(model, path, direction[:, rows].T[some], forces[some])
+    return found
+
+
+def _gives_way(active: ActiveEffect) -> bool:
+    """Whether an effect does more than change the geometry."""
+    kind = type(active.effect)
+    hooks = ("strut_compliance", "load_compliance", "parallel_stiffness")
+    return any(getattr(kind, hook) is not getattr(Effect, hook) for hook in hooks)
+
+
 def _exact(
     model: StiffnessModel,
     position: FloatArray,
@@ -221,8 +280,8 @@ def extreme_directions(
             return exact.compliance_along(model, path.take(poses), directions)
 
         normals = None if across is None else across[rows]
-        idle = None if softest else exact.strut_forces(model, path)
-        result[rows] = searched_directions(along, exact.tip_compliance(model, path), softest, normals, idle)
+        forces = exact.strut_forces(model, path)
+        result[rows] = searched_directions(along, exact.tip_compliance(model, path), forces, softest, normals)
     return result
 
 
@@ -237,9 +296,9 @@ def half_sphere(count: int) -> FloatArray:
 def searched_directions(
     along: Along,
     tensor: FloatArray,
+    forces: FloatArray,
     softest: bool = True,
     across: FloatArray | None = None,
-    idle: FloatArray | None = None,
 ) -> FloatArray:
     """Directions in which the tip gives way most, or least.
 
@@ -249,20 +308,20 @@ def searched_directions(
         Unit vectors (k, 3) and the poses (k,) at which they are meant, to compliances (k,) m/N.
     tensor
         (n, 3, 3) m/N, the compliance without what depends on the load; its eigenvectors are tried as well.
+    forces
+        (n, 6, 3) N per N in the struts under loads along the axes: across its row a strut is idle. Kinks in these
+        planes may hold the stiffest direction, and part the basins of the softest.
     softest
         The softest, else the stiffest direction.
     across
         (n, 3) unit vectors; only directions across these are looked at.
-    idle
-        (n, 6, 3) N per N, the forces of the struts under loads along the axes: across its row a strut is idle. Where
-        kinks in these planes may hold the extreme.
 
     Returns
     -------
     (n, 3) unit vectors whose largest component is positive.
     """
     n, sign = len(tensor), 1.0 if softest else -1.0
-    climbs = CLIMBS if idle is None else CLIMBS_IN_PLANES
+    idle = None if softest else forces / np.linalg.norm(forces, axis=-1, keepdims=True)
 
     def value(directions: FloatArray) -> FloatArray:
         """(n, m) of directions (n, m, 3), to be made large."""
@@ -272,11 +331,11 @@ def searched_directions(
     spread = np.broadcast_to(half_sphere(DIRECTIONS), (n, DIRECTIONS, 3))
     tried = np.concatenate([spread, np.swapaxes(np.linalg.eigh(tensor)[1], 1, 2)], axis=1)
     if idle is not None:
-        idle = idle / np.linalg.norm(idle, axis=-1, keepdims=True)
         tried = np.concatenate([tried, _in_planes(idle)], axis=1)
     tried = tried if across is None else _flattened(tried, across)
     found = value(tried)
-    best = np.argsort(-found, axis=1, kind="stable")[:, :climbs]
+    best = np.argsort(-found, axis=1, kind="stable")
+    best = (_best_of_each_cell(best, tried, forces) if softest else best)[:, :CLIMBS]
     directions = np.take_along_axis(tried, best[..., None], axis=1)
     reached = np.take_along_axis(found, best, axis=1)
     step = np.full(reached.shape, FIRST_STEP)
@@ -284,7 +343,7 @@ def searched_directions(
         around = _around(directions, step)
         around = around if idle is None else np.concatenate([around, _turned_about(directions, idle, step)], axis=2)
         around = around if across is None else _flattened(around, across)
-        values = value(around.reshape(n, -1, 3)).reshape(n, climbs, -1)
+        values = value(around.reshape(n, -1, 3)).reshape(n, CLIMBS, -1)
         better = values.argmax(axis=-1)
         top = np.take_along_axis(values, better[..., None], axis=-1)[..., 0]
         risen = top > reached
@@ -294,6 +353,15 @@ def searched_directions(
         step = np.where(risen, step, 0.5 * step)
     last = reached.argmax(axis=1)
     return signed(directions[np.arange(n), last])
+
+
+def _best_of_each_cell(best: IntArray, tried: FloatArray, forces: FloatArray) -> IntArray:
+    """(n, m) directions, best first: of each set in which the same struts pull and push the best, then the others."""
+    pulls = np.einsum("nij,nmj->nmi", forces, tried) > 0.0
+    cell = (pulls ^ pulls[..., :1]) @ (1 << np.arange(6))  # a direction and its opposite are one
+    ranked = np.take_along_axis(cell, best, axis=1)
+    again = np.tril(ranked[:, :, None] == ranked[:, None, :], -1).any(axis=2)
+    return np.take_along_axis(best, np.argsort(again, axis=1, kind="stable"), axis=1)
 
 
 def _around(directions: FloatArray, step: FloatArray) -> FloatArray:

@@ -66,7 +66,8 @@ class FrameCompliance(Effect):
             outward = path.struts.directions[:, pair] @ radial
             upward = path.struts.directions[:, pair, 2]
             own = p["radial"] * _outer(outward) + p["vertical"] * _outer(upward)
-            form[np.ix_(range(len(path)), pair, pair)] += own
+            first, last = pair
+            form[:, first : last + 1 : last - first, first : last + 1 : last - first] += own
         return form
 
     def vertex_displacement(
