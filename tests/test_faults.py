@@ -13,7 +13,7 @@ from tests.faults import FAULTS, count_points, fail_at, killed, points
 from toolpath_stiff import results_folder
 from toolpath_stiff.errors import FileError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.results_folder import MANIFEST, Rules, clear_up, write_folder
+from toolpath_stiff.results_folder import INCOMPLETE, MANIFEST, Rules, clear_up, incomplete, write_folder
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and counts the calls of Linux")
 
@@ -47,6 +47,11 @@ def old_results_and_a_folder(out):
     (out / "my folder/part.step").write_text("mine")
 
 
+def an_exercise_that_is_replaced(out):
+    """All files of the tool's own, each to be kept."""
+    old_results(out)
+
+
 def a_file_in_the_way(out):
     old_results(out)
     (out / "samples.csv").write_text("filled in by hand")
@@ -58,7 +63,8 @@ class Case:
     def __init__(self, place, prepare, exchanges):
         self.place, self.out, self.template = place, place / "out", place.with_name("template")
         self.prepare, self.exchanges = prepare, exchanges
-        self.rules = Rules(replace=prepare is a_file_in_the_way)
+        fresh = prepare is an_exercise_that_is_replaced
+        self.rules = Rules(fresh=fresh, replace=fresh or prepare is a_file_in_the_way)
         self.old = self.fresh()
         self.points = count_points(self.run)
         self.new = tree(self.out)
@@ -83,6 +89,8 @@ CASES = [
     (a_file_in_the_way, True),
     (old_results_and_a_folder, True),
     (a_file_in_the_way, False),
+    (an_exercise_that_is_replaced, True),
+    (an_exercise_that_is_replaced, False),
 ]
 
 
@@ -117,12 +125,13 @@ def test_a_kill_at_any_point_leaves_the_old_files_or_the_new(case):
     for number in range(1, case.points + 1):
         case.fresh()
         assert killed(case.run, number)
-        if case.exchanges:  # at once; else when the next run has looked at it
+        # At once, or when the next run has looked at it; until then every command says so.
+        if case.exchanges or not incomplete(case.out):
             assert tree(case.out) in (case.old, case.new), number
         clear_up([case.out])
         assert tree(case.out) in (case.old, case.new), number
         assert not left(case.place), number
-        if number % 3 == 0:
+        if number % 3 == 0 and not (case.rules.fresh and tree(case.out) == case.new):
             case.run()
             assert tree(case.out) == case.new
 
@@ -163,6 +172,44 @@ def test_a_single_file_is_the_old_or_the_new(tmp_path):
             run()
             assert file.read_text() == "new text"
             assert [path.name for path in place.iterdir()] == [file.name]
+
+
+@pytest.mark.parametrize("prepare", [nothing_there, old_results, old_results_and_a_folder])
+def test_a_file_elsewhere_and_its_folder_are_of_one_run_or_the_folder_says_so(tmp_path, prepare):
+    """`place --write`, `update -o`."""
+    place = tmp_path / "place"
+    out, file = place / "out", place / "machine.toml"
+
+    def fresh():
+        shutil.rmtree(place, ignore_errors=True)
+        prepare(out)
+        write_atomically(file, "old")
+        return tree(out)
+
+    def run():
+        write_folder(out, NEW, command="test", elsewhere={file: "new"})
+
+    before = fresh()
+    total = count_points(run)
+    after = tree(out)
+    assert INCOMPLETE not in after and not incomplete(out)
+    states = set()
+    for number in range(1, total + 1):
+        fresh()
+        assert killed(run, number)
+        whole = tree(out) in ((before, after)[file.read_text() == "new"],)
+        assert whole or incomplete(out), number
+        states.add(whole)
+        for code, lasting in FAULTS.values():
+            fresh()
+            try:
+                with points(fail_at(number, code, lasting)):
+                    run()
+            except FileError:
+                assert incomplete(out) or (tree(out), file.read_text()) in ((before, "old"), (after, "new")), number
+        run()
+        assert tree(out) == after and file.read_text() == "new" and not left(place)
+    assert states == {True, False}
 
 
 def test_what_others_write_at_the_moment_of_the_exchange_stays(tmp_path, monkeypatch):
