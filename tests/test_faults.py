@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+import toolpath_stiff as tps
 from tests.faults import FAULTS, count_points, fail_at, killed, points
 from toolpath_stiff import results_folder
+from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import FileError
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.results_folder import INCOMPLETE, MANIFEST, Rules, clear_up, incomplete, write_folder
@@ -252,3 +254,100 @@ def test_the_current_folder_stays_itself(tmp_path, monkeypatch):
         write_folder(".", {"a": content}, command="test")
         assert Path(tmp_path).stat().st_ino == before and Path("a").read_text() == content
     assert not left(tmp_path)
+
+
+def test_many_programs_killed_leave_no_overview_of_another_run(tmp_path):
+    programs = [tps.Program.from_text(f"G21 G90\nG0 Z5\nG1 Z0 F300\nG1 X{x}\nM2", name=f"{x}.nc") for x in (10, 20)]
+    out, template = tmp_path / "out", tmp_path / "template"
+
+    def run(folder, step):
+        tps.analyze_many("nist", programs, folder, jobs=1, plots=False, step_mm=step)
+
+    run(template, 5.0)
+    before = tree(template)
+
+    def fresh():
+        shutil.rmtree(out, ignore_errors=True)
+        shutil.copytree(template, out)
+
+    fresh()
+    total = count_points(lambda: run(out, 2.0))
+    after = tree(out)
+    assert not incomplete(out) and {name for name in before if before[name] != after[name]} > {"summary.csv"}
+    stopped = 0
+    for number in range(1, total + 1, 4):
+        fresh()
+        assert killed(lambda: run(out, 2.0), number)
+        if not incomplete(out):
+            assert tree(out) in (before, after), number
+        else:
+            stopped += 1
+            halves = tree(out)
+            assert halves.get("summary.csv") != before["summary.csv"] or halves == before
+    assert stopped
+
+
+def test_every_command_that_reads_an_incomplete_folder_says_so(tmp_path, capsys):
+    """The process that writes a file elsewhere dies between the folder and that file."""
+    out, file = tmp_path / "out", tmp_path / "part.nc"
+    command = ["machine", "check", str(out / "machine.toml"), "--json"]
+
+    def run():
+        write_folder(out, {"machine.toml": text}, command="test", elsewhere={file: "new"})
+
+    text = tps.Machine.load("nist").save(tmp_path / "nist.toml").read_text()
+    run()
+    assert main(command) == 0 and not capsys.readouterr().err
+    number = count_points(run)
+    while not incomplete(out):
+        assert killed(run, number)
+        number -= 1
+    assert main(command) == 0
+    assert "is incomplete: the run that wrote it has not come to its end" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["data", "machine", "program", "exercise"])
+def test_a_case_that_is_killed_while_it_adds_a_file_keeps_no_orphan(tmp_path, kind):
+    place, template, slot = tmp_path / "case", tmp_path / "template", tmp_path / "slot.nc"
+    slot.write_text("G21 G90\nG1 X40 F300\nM2\n")
+    tps.Case.open(template)
+    (template / "data").mkdir()
+    (template / "data/mine.csv").write_text("a user's own")
+
+    def fresh():
+        shutil.rmtree(place, ignore_errors=True)
+        shutil.copytree(template, place)
+
+    def run():
+        case = tps.Case.open(place)
+        add = {"data": case.add_data, "machine": case.set_machine, "program": case.add_program}
+        if kind == "exercise":
+            case.start_exercise(9006, layout="paper")
+        else:
+            add[kind]({"data": "nist-table1", "machine": "genhexkins", "program": slot}[kind])
+
+    fresh()
+    total = count_points(run)
+    before, after = tree(template), tree(place)
+    for number in range(1, total + 1, 1 + (kind == "exercise")):
+        fresh()
+        assert killed(run, number)
+        tps.Case.open(place)
+        files = {name: text for name, text in tree(place).items() if text is not None}
+        assert files in ({n: t for n, t in one.items() if t is not None} for one in (before, after)), number
+        assert not left(place)
+
+
+def test_a_journal_of_somebody_else_reaches_nothing_outside_the_rooms_of_a_case(tmp_path):
+    case, mine = tmp_path / "case", tmp_path / "mine"
+    tps.Case.open(case)
+    mine.mkdir()
+    (mine / "x.csv").write_text("mine")
+    (case / "data").symlink_to(mine)
+    names = ["../mine/x.csv", "data/x.csv", "data/../case.toml", "machines", "case.toml", "", str(mine / "x.csv")]
+    (case / ".tps-adding").write_text("\n".join([*names, "machines/nist.toml", ""]))
+    before = tree(tmp_path)
+    tps.Case.open(case)
+    assert {name: text for name, text in tree(tmp_path).items() if "tps-adding" not in name} == {
+        name: text for name, text in before.items() if "tps-adding" not in name
+    }

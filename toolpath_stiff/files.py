@@ -334,6 +334,32 @@ def _holder(handle: int) -> str:
         return "another run"
 
 
+_JOURNALS: dict[Path, int] = {}  # those that this process holds
+
+
+def announce(journal: Path, name: str) -> None:
+    """Note in a journal that something is about to be written; held until `forget`, or its process ends.
+
+    Raises `InputError`.
+    """
+    with _errors_of(journal):
+        handle = _JOURNALS.get(journal)
+        if handle is None or not _is_at(journal, handle):
+            journal.parent.mkdir(parents=True, exist_ok=True)
+            handle = _JOURNALS[journal] = os.open(journal, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+            hold(handle)
+        os.write(handle, f"{name}\n".encode())
+        os.fsync(handle)
+
+
+def forget(journal: Path) -> None:
+    """Take a journal away: what it announced is there."""
+    journal.unlink(missing_ok=True)
+    handle = _JOURNALS.pop(journal, None)
+    if handle is not None:
+        os.close(handle)
+
+
 @contextmanager
 def temporary_folder(prefix: str) -> Iterator[Path]:
     """A new folder among the system's temporary ones, removed at the end; those of killed runs are removed as well."""

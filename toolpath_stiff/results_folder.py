@@ -46,6 +46,7 @@ from toolpath_stiff.hints import both_names
 MANIFEST = ".tps-files.json"
 INCOMPLETE = "INCOMPLETE.txt"  # a file of the run like the others, until it comes to its end
 SHA256 = re.compile(r"[0-9a-f]{64}")  # what earlier versions recorded
+STAGE = ".tps-stage"  # the temporary folder of a run, where it lies in the folder itself
 # In the temporary folder of a run: files that are being written; the same when all are there and nothing is left but
 # to move them to their places; what was moved out of their way.
 NEW, WHOLE, GONE = "new", "whole", "gone"
@@ -135,7 +136,7 @@ def write_folder(
     Returns
     -------
     list of Path
-        The files written, those elsewhere first, the manifest left out.
+        The files written to it, the manifest left out.
 
     Raises
     ------
@@ -169,7 +170,7 @@ def write_folder(
     for name, kept_as in kept.items():
         if rules.kept is not None:
             rules.kept(Path(folder) / name, Path(folder) / kept_as)
-    return [*map(Path, elsewhere), *(Path(folder) / name for name in contents)]
+    return [Path(folder) / name for name in contents]
 
 
 def _incomplete_text(command: str, elsewhere: Iterable[str | Path]) -> str:
@@ -180,7 +181,7 @@ def _incomplete_text(command: str, elsewhere: Iterable[str | Path]) -> str:
 def incomplete(folder: str | Path) -> str:
     """Why the results in a folder are not those of one whole run, a sentence; "" where nothing says so."""
     place = Path(folder)
-    if (place / INCOMPLETE).is_file() or (place / _stages(place)[1].name / WHOLE / MANIFEST).is_file():
+    if (place / INCOMPLETE).is_file() or (place / STAGE / WHOLE / MANIFEST).is_file():
         return f"{str(folder)!r} is incomplete: the run that wrote it has not come to its end; run it again"
     return ""
 
@@ -292,7 +293,7 @@ def _lock(folder: Path) -> Path:
 
 def _stages(folder: Path) -> tuple[Path, Path]:
     """Where the temporary folder of a run may be: beside the folder, or in it."""
-    return beside(folder, "stage"), folder / ".tps-stage"
+    return beside(folder, "stage"), folder / STAGE
 
 
 def _stage(folder: Path) -> Path:

@@ -13,7 +13,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any
 from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM
 from toolpath_stiff.defaults import FORCE, LOAD, MACHINE
 from toolpath_stiff.errors import InputError, harmless
-from toolpath_stiff.files import Content, check_outputs, encoded, is_file, keep_old, read_bytes, write_atomically
-from toolpath_stiff.results_folder import Rules, check_folder, write_folder
+from toolpath_stiff.files import Content, check_outputs, encoded, is_file, keep_old, read_bytes
+from toolpath_stiff.results_folder import Rules, check_folder, incomplete, write_folder
 from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
@@ -304,6 +304,21 @@ def inputs_of(args: argparse.Namespace) -> Iterator[str]:
             yield from (split_name(one)[0] for one in named)
 
 
+def tell_incomplete(folders: Iterable[Path]) -> None:
+    """Say which of these folders hold the results of a run that was stopped."""
+    for told in filter(None, map(incomplete, dict.fromkeys(folders))):
+        print(f"tps: warning: {told}", file=sys.stderr)
+
+
+def read_folders(args: argparse.Namespace) -> list[Path]:
+    """The folders that a command reads from."""
+    found = []
+    for name in inputs_of(args):
+        with suppress(OSError, ValueError):  # no file can have that name
+            found += [Path(name) if Path(name).is_dir() else Path(name).parent] if Path(name).exists() else []
+    return found
+
+
 def check_written(
     args: argparse.Namespace, files: Iterable[str | Path | None], more_inputs: Iterable[str | Path] = ()
 ) -> list[Path]:
@@ -382,21 +397,25 @@ class Destination:
         check_folder(self.folder, names, self.rules)
         return self
 
-    def write(self, contents: Mapping[str, Content | Callable[[], Content]]) -> list[Path]:
-        """Write the files, all or none; see `write_folder`."""
-        return write_folder(self.folder, contents, command=self.command, rules=self.rules)
+    def write(
+        self,
+        contents: Mapping[str, Content | Callable[[], Content]],
+        elsewhere: Mapping[str | Path, Content] = MappingProxyType({}),
+    ) -> list[Path]:
+        """Write the files, all or none, and those elsewhere; see `write_folder`."""
+        return write_folder(self.folder, contents, command=self.command, rules=self.rules, elsewhere=elsewhere)
 
 
 def show(
     args: argparse.Namespace,
     result: FolderResult,
     target: Destination,
-    also: Mapping[str, Content] = MappingProxyType({}),
+    also: Mapping[str | Path, Content] = MappingProxyType({}),
     **options: Any,
 ) -> int:
-    """Save a result, then the files `also`, print it as text or as JSON; the exit code of success."""
-    written = result.save(target.folder, plots=not args.no_plots, rules=target.rules, **options)
-    written += [write_atomically(file, content) for file, content in also.items()]
+    """Save a result and the files `also`, print it as text or as JSON; the exit code of success."""
+    files = result.files(plots=not args.no_plots, **options)
+    written = [*target.write(files, also), *map(Path, also)]
     if args.json:
         sys.stdout.write(result.to_json())
     else:

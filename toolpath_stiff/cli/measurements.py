@@ -362,9 +362,8 @@ def update(args: argparse.Namespace) -> int:
         )
         files = found.files(plots=not args.no_plots, machine=args.output is None)
     keep(replaced, quiet=args.json)
-    # The machine file first: update.json names it.
-    written = [found.save_machine(args.output)] if args.output and found.accepted else []
-    written += target.write(files)
+    machine_file = {args.output: found.machine_text()} if args.output and found.accepted else {}
+    written = [*map(Path, machine_file), *target.write(files, machine_file)]
     if args.json:
         sys.stdout.write(found.to_json())
     else:
