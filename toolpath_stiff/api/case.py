@@ -21,6 +21,7 @@ from toolpath_stiff.api.case_results import (
     CASE_FILE,
     Findings,
     copied,
+    drop,
     first_name,
     free_name,
     machine_bytes,
@@ -132,7 +133,7 @@ class Case(Findings):
         try:
             Machine.load(self.path(name), effects=[self.path(one) for one in self.state.effects])
         except TpsError:
-            (self.folder / name).unlink()
+            drop(self.folder, name)
             raise
         python = f"case.set_machine({str(machine)!r})"
         if not self.history:
@@ -177,7 +178,7 @@ class Case(Findings):
         try:
             Machine.load(self.path(self.state.machine), effects=[self.path(one) for one in (*others, new)])
         except TpsError:
-            (self.folder / new).unlink()
+            drop(self.folder, new)
             raise
         names = {effect.name for effect in effects([self.path(one) for one in (*others, new)]).effects}
         change = {
@@ -207,8 +208,7 @@ class Case(Findings):
         try:
             count = len(Measurements([self.path(name) for name in after]).on(self.machine))
         except TpsError:
-            for name in names:
-                (self.folder / name).unlink()
+            drop(self.folder, *names)
             raise
         text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
         self.record(
@@ -332,7 +332,7 @@ class Case(Findings):
         try:
             Program.read(self.path(name)).moves()
         except TpsError:
-            (self.folder / name).unlink()
+            drop(self.folder, name)
             raise
         self.record(
             "program",

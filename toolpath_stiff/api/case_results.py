@@ -305,6 +305,15 @@ def free_name(folder: Path, name: str) -> str:
     return name
 
 
+def drop(folder: Path, *names: str) -> None:
+    """Take files away again that turned out to be of no use."""
+    from toolpath_stiff.files import forget
+
+    for name in names:
+        (folder / name).unlink()
+    forget(folder / JOURNAL)
+
+
 def _room(name: str) -> str:
     """The room of a case that a file is in; "exercise" and "exercise-2" are one."""
     return name.partition("/")[0].partition("-")[0]

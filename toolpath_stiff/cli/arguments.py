@@ -23,7 +23,7 @@ from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM
 from toolpath_stiff.defaults import FORCE, LOAD, MACHINE
 from toolpath_stiff.errors import InputError, harmless
 from toolpath_stiff.files import Content, check_outputs, encoded, is_file, keep_old, read_bytes
-from toolpath_stiff.results_folder import Rules, check_folder, incomplete, write_folder
+from toolpath_stiff.results_folder import Rules, check_folder, holds_others, incomplete, write_folder
 from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
@@ -197,6 +197,7 @@ def add_machine_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--effects", action="append", default=[], metavar="FILE.py", help="file with your own physical effects"
     )
+    add_unchecked_option(group)
     group.add_argument(
         "--force",
         type=positive_number("N", 1e6),
@@ -205,6 +206,15 @@ def add_machine_options(parser: argparse.ArgumentParser) -> None:
         help=f"load at the tool tip, for deflections and load-dependent effects (default: {FORCE:g})",
     )
     add_condition_options(group)
+
+
+def add_unchecked_option(group: argparse._ActionsContainer) -> None:
+    """`--allow-unchecked-effects`, beside `--effects`."""
+    group.add_argument(
+        "--allow-unchecked-effects",
+        action="store_true",
+        help="compute even with own effects that fail `tps effects check`; every result says so",
+    )
 
 
 def add_condition_options(group: argparse._ActionsContainer) -> None:
@@ -239,9 +249,14 @@ def _temperature(text: str) -> float:
 
 def machine_for(args: argparse.Namespace) -> Machine:
     """The machine that the options of `add_machine_options` describe. Raises `InputError`."""
+    return loaded_machine(args).under(args.setup, args.temperature)
+
+
+def loaded_machine(args: argparse.Namespace) -> Machine:
+    """The machine of --machine with its effects. Raises `InputError`."""
     from toolpath_stiff.api.machines import Machine
 
-    return Machine.load(args.machine, effects=args.effects).under(args.setup, args.temperature)
+    return Machine.load(args.machine, effects=args.effects, allow_unchecked_effects=args.allow_unchecked_effects)
 
 
 def add_load_options(parser: argparse.ArgumentParser) -> None:
@@ -431,14 +446,28 @@ def written_text(files: Iterable[Path]) -> str:
 
 
 def destination(args: argparse.Namespace, command: str, sources: Sequence[str], suffix: str = "") -> Destination:
-    """The folder of --out, else `reports/<sources><suffix>`, which then belongs to these sources."""
+    """The folder of --out, else `reports/<sources><suffix>` or a longer name, which then belongs to these sources."""
     rules = Rules(
         inputs=tuple(inputs_of(args)),
         of=() if args.out else tuple(sources),
         replace=args.replace,
         kept=None if args.json else tell_kept,
     )
-    return Destination(Path(args.out or f"reports/{joined_names(sources)}{suffix}"), command, rules)
+    return Destination(Path(args.out) if args.out else _default_folder(sources, suffix), command, rules)
+
+
+def _default_folder(sources: Sequence[str], suffix: str) -> Path:
+    """`reports/NAME`; where that holds results of another file of the name, the folder above stands before it."""
+    from toolpath_stiff.tables import split_name
+
+    name = joined_names(sources)
+    default = folder = Path(f"reports/{name}{suffix}")
+    for above in Path(split_name(sources[0])[0]).absolute().parents:
+        if not holds_others(folder, sources):
+            return folder
+        name = f"{above.name}-{name}"
+        folder = Path(f"reports/{name}{suffix}")
+    return default
 
 
 def joined_names(sources: Sequence[str]) -> str:

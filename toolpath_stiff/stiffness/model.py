@@ -93,6 +93,8 @@ class StiffnessModel:
         The machine as it was loaded, before geometry effects; None for a model that `build_model` did not make.
     conditions
         Under what programs run; measurements bring their own. `acting_effects` says which effects that leaves.
+    unchecked
+        What every result says of effects that fail `effects check` and were allowed all the same.
     """
 
     machine: Machine
@@ -101,6 +103,7 @@ class StiffnessModel:
     control: Machine | None = None
     given: Machine | None = None
     conditions: Conditions = field(default_factory=Conditions)
+    unchecked: tuple[str, ...] = ()
 
     @property
     def load_dependent(self) -> bool:
@@ -367,7 +370,8 @@ def condition_warnings(model: StiffnessModel, tool_given: bool = False) -> list[
     `tool_given`: whether the length of the tool is known; else it is the reference tool's.
     """
     names = ", ".join(active.effect.name for active in model.instruments)
-    found = [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
+    found = list(model.unchecked)
+    found += [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
     found += [str(one) for one in idle_effects(model) if one.waiting]
     length = mm_from_m(model.machine.reference_tool_length)
     if not tool_given:
