@@ -169,7 +169,7 @@ def test_the_picture_goes_to_a_folder_or_a_png(tmp_path, monkeypatch, capsys, ou
     monkeypatch.chdir(tmp_path)
     assert main(["machine", "new", "mine.toml"]) == 0
     code = main(["machine", "check", "mine.toml", "--out", out])
-    written = sorted(str(path) for path in Path().rglob("*") if path.is_file())
+    written = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
     if out == "mc.svg":
         assert code == 2 and written == ["mine.toml"] and "expected FILE.png or a folder" in capsys.readouterr().err
     else:
