@@ -368,3 +368,7 @@ def test_place_names_the_program_that_it_wrote_among_the_files(here, capsys):
     assert written == ["out/placements.csv", "out/placement.json", "placed.nc"]
     again = tps.place("nist", "slot.nc", **PLACE, write="placed.nc")
     assert Path("placed.nc").read_bytes() == again.program_bytes
+
+
+def test_a_machine_may_be_named_after_the_data():
+    assert str(tps.compare("nist-table1", machine="genhexkins")) == str(tps.compare("genhexkins", "nist-table1"))

@@ -148,3 +148,57 @@ def test_the_walk_through_of_the_documentation_works(tmp_path, capsys):
     assert added[0] * 1e9 == pytest.approx(np.diag([5.0, 5.0, 2.0]), abs=1e-9)
     assert main(["effects", "show", "spindle", "--effects", str(file)]) == 0
     assert "radial_nm_per_N" in capsys.readouterr().out
+
+
+# Bodies of strut_compliance that must not pass a gate: the first three were sent in by somebody who tried.
+FAILING = {
+    "np.random.rand(len(path), 6) * 1e-8": "neutral value",
+    "None": "size",
+    "np.full((len(path), 6), -2e-8)": "no positive stiffness",
+    "np.full((len(path), 6), -p['size'])": "sign",
+}
+
+
+@pytest.fixture(params=FAILING)
+def failing(request, tmp_path, monkeypatch):
+    """An effect file, the options that bring it in, and what is wrong with it."""
+    monkeypatch.chdir(tmp_path)
+    Path("part.nc").write_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n")
+    Path("own.py").write_text(f"""import numpy as np
+from toolpath_stiff.stiffness.effects import Effect, Parameter
+class F(Effect):
+    name = "f_x"; title = "t"; link = "tool"; equation = "-"; source = "-"
+    parameters = (Parameter("size", "nm/N", 1e-9, (0.0, 100.0), (1.0, 2.0), "-", meaning="m"),)
+    def strut_compliance(self, path, p): return {request.param}
+""")
+    text = (resources.files("toolpath_stiff") / "data/machines/nist.toml").read_text()
+    Path("mine.toml").write_text(text + '\n[[effect]]\nname = "f_x"\nsize_nm_per_N = 2.0\n')
+    return ["--machine", "mine.toml", "--effects", "own.py"], FAILING[request.param]
+
+
+COMPUTING = {
+    "analyze": ["analyze", "part.nc", "--require", "60000", "--no-plots"],
+    "pose": ["pose", "0", "0", "800"],
+    "compare": ["compare", "nist-table1", "--no-plots"],
+}
+
+
+@pytest.mark.parametrize("command", COMPUTING)
+def test_no_command_computes_with_an_effect_that_fails_its_check(failing, command, capsys):
+    options, wrong = failing
+    assert main(["effects", "check", "own.py"]) == 1
+    capsys.readouterr()
+    assert main([*COMPUTING[command], *options]) == 2
+    told = capsys.readouterr().err
+    assert "own.py: effect f_x fails the check" in told and wrong in told and "--allow-unchecked-effects" in told
+    assert told.count("\n") == 1 and not Path("reports").exists()
+
+
+def test_an_effect_that_fails_is_used_when_told_to_and_every_result_says_so(failing, capsys):
+    options, wrong = failing
+    if wrong == "no positive stiffness":
+        pytest.skip("nothing can be computed with it at all poses")
+    for command in COMPUTING.values():
+        assert main([*command, *options, "--allow-unchecked-effects", "--json"]) in (0, 1, 3)
+        found = capsys.readouterr()
+        assert "UNCHECKED effect f_x" in found.out, command

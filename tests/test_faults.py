@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
+import toolpath_stiff as tps
 from tests.faults import FAULTS, count_points, fail_at, killed, points
 from toolpath_stiff import results_folder
+from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import FileError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.results_folder import MANIFEST, Rules, clear_up, write_folder
+from toolpath_stiff.results_folder import INCOMPLETE, MANIFEST, Rules, clear_up, incomplete, write_folder
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and counts the calls of Linux")
 
@@ -47,6 +49,11 @@ def old_results_and_a_folder(out):
     (out / "my folder/part.step").write_text("mine")
 
 
+def an_exercise_that_is_replaced(out):
+    """All files of the tool's own, each to be kept."""
+    old_results(out)
+
+
 def a_file_in_the_way(out):
     old_results(out)
     (out / "samples.csv").write_text("filled in by hand")
@@ -58,7 +65,8 @@ class Case:
     def __init__(self, place, prepare, exchanges):
         self.place, self.out, self.template = place, place / "out", place.with_name("template")
         self.prepare, self.exchanges = prepare, exchanges
-        self.rules = Rules(replace=prepare is a_file_in_the_way)
+        fresh = prepare is an_exercise_that_is_replaced
+        self.rules = Rules(fresh=fresh, replace=fresh or prepare is a_file_in_the_way)
         self.old = self.fresh()
         self.points = count_points(self.run)
         self.new = tree(self.out)
@@ -83,6 +91,8 @@ CASES = [
     (a_file_in_the_way, True),
     (old_results_and_a_folder, True),
     (a_file_in_the_way, False),
+    (an_exercise_that_is_replaced, True),
+    (an_exercise_that_is_replaced, False),
 ]
 
 
@@ -117,12 +127,13 @@ def test_a_kill_at_any_point_leaves_the_old_files_or_the_new(case):
     for number in range(1, case.points + 1):
         case.fresh()
         assert killed(case.run, number)
-        if case.exchanges:  # at once; else when the next run has looked at it
+        # At once, or when the next run has looked at it; until then every command says so.
+        if case.exchanges or not incomplete(case.out):
             assert tree(case.out) in (case.old, case.new), number
         clear_up([case.out])
         assert tree(case.out) in (case.old, case.new), number
         assert not left(case.place), number
-        if number % 3 == 0:
+        if number % 3 == 0 and not (case.rules.fresh and tree(case.out) == case.new):
             case.run()
             assert tree(case.out) == case.new
 
@@ -165,6 +176,44 @@ def test_a_single_file_is_the_old_or_the_new(tmp_path):
             assert [path.name for path in place.iterdir()] == [file.name]
 
 
+@pytest.mark.parametrize("prepare", [nothing_there, old_results, old_results_and_a_folder])
+def test_a_file_elsewhere_and_its_folder_are_of_one_run_or_the_folder_says_so(tmp_path, prepare):
+    """`place --write`, `update -o`."""
+    place = tmp_path / "place"
+    out, file = place / "out", place / "machine.toml"
+
+    def fresh():
+        shutil.rmtree(place, ignore_errors=True)
+        prepare(out)
+        write_atomically(file, "old")
+        return tree(out)
+
+    def run():
+        write_folder(out, NEW, command="test", elsewhere={file: "new"})
+
+    before = fresh()
+    total = count_points(run)
+    after = tree(out)
+    assert INCOMPLETE not in after and not incomplete(out)
+    states = set()
+    for number in range(1, total + 1):
+        fresh()
+        assert killed(run, number)
+        whole = tree(out) in ((before, after)[file.read_text() == "new"],)
+        assert whole or incomplete(out), number
+        states.add(whole)
+        for code, lasting in FAULTS.values():
+            fresh()
+            try:
+                with points(fail_at(number, code, lasting)):
+                    run()
+            except FileError:
+                assert incomplete(out) or (tree(out), file.read_text()) in ((before, "old"), (after, "new")), number
+        run()
+        assert tree(out) == after and file.read_text() == "new" and not left(place)
+    assert states == {True, False}
+
+
 def test_what_others_write_at_the_moment_of_the_exchange_stays(tmp_path, monkeypatch):
     out = tmp_path / "out"
     old_results(out)
@@ -205,3 +254,100 @@ def test_the_current_folder_stays_itself(tmp_path, monkeypatch):
         write_folder(".", {"a": content}, command="test")
         assert Path(tmp_path).stat().st_ino == before and Path("a").read_text() == content
     assert not left(tmp_path)
+
+
+def test_many_programs_killed_leave_no_overview_of_another_run(tmp_path):
+    programs = [tps.Program.from_text(f"G21 G90\nG0 Z5\nG1 Z0 F300\nG1 X{x}\nM2", name=f"{x}.nc") for x in (10, 20)]
+    out, template = tmp_path / "out", tmp_path / "template"
+
+    def run(folder, step):
+        tps.analyze_many("nist", programs, folder, jobs=1, plots=False, step_mm=step)
+
+    run(template, 5.0)
+    before = tree(template)
+
+    def fresh():
+        shutil.rmtree(out, ignore_errors=True)
+        shutil.copytree(template, out)
+
+    fresh()
+    total = count_points(lambda: run(out, 2.0))
+    after = tree(out)
+    assert not incomplete(out) and {name for name in before if before[name] != after[name]} > {"summary.csv"}
+    stopped = 0
+    for number in range(1, total + 1, 4):
+        fresh()
+        assert killed(lambda: run(out, 2.0), number)
+        if not incomplete(out):
+            assert tree(out) in (before, after), number
+        else:
+            stopped += 1
+            halves = tree(out)
+            assert halves.get("summary.csv") != before["summary.csv"] or halves == before
+    assert stopped
+
+
+def test_every_command_that_reads_an_incomplete_folder_says_so(tmp_path, capsys):
+    """The process that writes a file elsewhere dies between the folder and that file."""
+    out, file = tmp_path / "out", tmp_path / "part.nc"
+    command = ["machine", "check", str(out / "machine.toml"), "--json"]
+
+    def run():
+        write_folder(out, {"machine.toml": text}, command="test", elsewhere={file: "new"})
+
+    text = tps.Machine.load("nist").save(tmp_path / "nist.toml").read_text()
+    run()
+    assert main(command) == 0 and not capsys.readouterr().err
+    number = count_points(run)
+    while not incomplete(out):
+        assert killed(run, number)
+        number -= 1
+    assert main(command) == 0
+    assert "is incomplete: the run that wrote it has not come to its end" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["data", "machine", "program", "exercise"])
+def test_a_case_that_is_killed_while_it_adds_a_file_keeps_no_orphan(tmp_path, kind):
+    place, template, slot = tmp_path / "case", tmp_path / "template", tmp_path / "slot.nc"
+    slot.write_text("G21 G90\nG1 X40 F300\nM2\n")
+    tps.Case.open(template)
+    (template / "data").mkdir()
+    (template / "data/mine.csv").write_text("a user's own")
+
+    def fresh():
+        shutil.rmtree(place, ignore_errors=True)
+        shutil.copytree(template, place)
+
+    def run():
+        case = tps.Case.open(place)
+        add = {"data": case.add_data, "machine": case.set_machine, "program": case.add_program}
+        if kind == "exercise":
+            case.start_exercise(9006, layout="paper")
+        else:
+            add[kind]({"data": "nist-table1", "machine": "genhexkins", "program": slot}[kind])
+
+    fresh()
+    total = count_points(run)
+    before, after = tree(template), tree(place)
+    for number in range(1, total + 1, 1 + (kind == "exercise")):
+        fresh()
+        assert killed(run, number)
+        tps.Case.open(place)
+        files = {name: text for name, text in tree(place).items() if text is not None}
+        assert files in ({n: t for n, t in one.items() if t is not None} for one in (before, after)), number
+        assert not left(place)
+
+
+def test_a_journal_of_somebody_else_reaches_nothing_outside_the_rooms_of_a_case(tmp_path):
+    case, mine = tmp_path / "case", tmp_path / "mine"
+    tps.Case.open(case)
+    mine.mkdir()
+    (mine / "x.csv").write_text("mine")
+    (case / "data").symlink_to(mine)
+    names = ["../mine/x.csv", "data/x.csv", "data/../case.toml", "machines", "case.toml", "", str(mine / "x.csv")]
+    (case / ".tps-adding").write_text("\n".join([*names, "machines/nist.toml", ""]))
+    before = tree(tmp_path)
+    tps.Case.open(case)
+    assert {name: text for name, text in tree(tmp_path).items() if "tps-adding" not in name} == {
+        name: text for name, text in before.items() if "tps-adding" not in name
+    }

@@ -251,11 +251,14 @@ def test_every_command_names_its_folder_after_its_data_and_keeps_to_the_rules(co
     assert main([*arguments, "--no-plots", "--out", "other"]) == 2
     assert "was changed since tps wrote it" in capsys.readouterr().err
     assert tree(shop) == before
-    # Data of the same name elsewhere do not take the folder.
+    # Data of the same name elsewhere do not take the folder, but one with their own folder's name.
     if arguments[1:2] and "one." in arguments[1]:
-        assert main([arguments[0], f"deep/{arguments[1]}", *arguments[2:], "--no-plots"]) == 2
-        assert "holds the results of" in capsys.readouterr().err
-        assert tree(shop) == before
+        for _ in range(2):  # the second time it is theirs
+            assert main([arguments[0], f"deep/{arguments[1]}", *arguments[2:], "--no-plots"]) == 0
+            deep = str(Path(folder).with_name(f"deep-{Path(folder).name}"))
+            after = tree(shop)
+            assert {name: after[name] for name in before} == before
+            assert {str(Path(name).parent) for name in after.keys() - before.keys()} == {deep}
 
 
 def test_an_output_that_is_an_input_is_refused(shop, capsys):

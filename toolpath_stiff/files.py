@@ -17,8 +17,8 @@ import stat
 import sys
 import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -55,36 +55,75 @@ def write_atomically(path: str | Path, content: Content) -> Path:
     InputError
         The file cannot be written.
     """
-    target = Path(path)
+    with written_beside({path: content}) as put:
+        put()
+    return Path(path)
+
+
+@contextmanager
+def written_beside(contents: Mapping[str | Path, Content]) -> Iterator[Callable[[], None]]:
+    """Write files beside their places; what is yielded puts all of them there. Rules and errors: `write_atomically`."""
+    with ExitStack() as stack:
+        steps = []
+        for path, content in contents.items():
+            with _errors_of(path):
+                steps.append(stack.enter_context(_beside_its_place(Path(path), content)))
+
+        def put() -> None:
+            for path, step in zip(contents, steps, strict=True):
+                with _errors_of(path):
+                    step()
+
+        yield put
+
+
+@contextmanager
+def _errors_of(path: str | Path) -> Iterator[None]:
     try:
-        if target.exists() and not target.is_file() and not target.is_dir():
-            with target.open("wb") as stream:
-                stream.writelines(encoded(content))
-        else:
-            _write_then_rename(Path(os.path.realpath(target)), content)
+        yield
     except OSError as error:
         raise FileError(f"cannot write {str(path)!r}: {reason(error)}") from None
-    return target
 
 
-def _write_then_rename(target: Path, content: Content) -> None:
-    if target.is_symlink():  # realpath leaves nothing else a link
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+@contextmanager
+def _beside_its_place(path: Path, content: Content) -> Iterator[Callable[[], None]]:
+    if path.exists() and not path.is_file() and not path.is_dir():
+        yield lambda: _to_device(path, content)
+        return
+    target = Path(os.path.realpath(path))
+    if target.is_symlink() or target.is_dir():  # realpath leaves nothing else a link
+        code = errno.ELOOP if target.is_symlink() else errno.EISDIR
+        raise OSError(code, os.strerror(code))
     target.parent.mkdir(parents=True, exist_ok=True)
     prefix = beside(target, "part-")
-    for left in target.parent.iterdir():
-        if left.name.startswith(prefix.name):
-            _remove_if_left(left)
+    remove_parts(prefix)
     handle, temporary = _new_file(prefix)
-    try:
+    with os.fdopen(handle, "wb") as held:
         try:
             _write(handle, content)
+            yield lambda: _put(held, temporary, target)
         finally:
-            os.close(handle)
-        temporary.replace(target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+            if temporary.exists():
+                with suppress(OSError):  # the next run takes it away
+                    temporary.unlink()
+
+
+def remove_parts(prefix: Path) -> None:
+    """Take away what killed runs left of files that they wrote: `beside(file, "part-")` and more letters."""
+    for left in prefix.parent.iterdir():
+        if left.name.startswith(prefix.name):
+            _remove_if_left(left)
+
+
+def _to_device(path: Path, content: Content) -> None:
+    with path.open("wb") as stream:
+        stream.writelines(encoded(content))
+
+
+def _put(held: BinaryIO, temporary: Path, target: Path) -> None:
+    if sys.platform == "win32":  # where an open file cannot be renamed
+        held.close()
+    temporary.replace(target)
     sync_folder(target.parent)
 
 
@@ -293,6 +332,32 @@ def _holder(handle: int) -> str:
         return f"another run: {told['command']} (process {told['process']} on {told['host']})"
     except (OSError, ValueError, KeyError, TypeError, RecursionError):  # it has not written its name yet
         return "another run"
+
+
+_JOURNALS: dict[Path, int] = {}  # those that this process holds
+
+
+def announce(journal: Path, name: str) -> None:
+    """Note in a journal that something is about to be written; held until `forget`, or its process ends.
+
+    Raises `InputError`.
+    """
+    with _errors_of(journal):
+        handle = _JOURNALS.get(journal)
+        if handle is None or not _is_at(journal, handle):
+            journal.parent.mkdir(parents=True, exist_ok=True)
+            handle = _JOURNALS[journal] = os.open(journal, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+            hold(handle)
+        os.write(handle, f"{name}\n".encode())
+        os.fsync(handle)
+
+
+def forget(journal: Path) -> None:
+    """Take a journal away: what it announced is there."""
+    journal.unlink(missing_ok=True)
+    handle = _JOURNALS.pop(journal, None)
+    if handle is not None:
+        os.close(handle)
 
 
 @contextmanager

@@ -9,6 +9,9 @@ The new files are written into a folder beside it and flushed to the disk. Then 
 one step: whatever stops a run, the folder holds the old files or the new. A folder that cannot be exchanged (it has
 folders in it, it is the current one, the file system does not do it) gets its files one by one: an error takes all of
 them back, and what a kill cuts off there the next run carries to its end.
+
+What one exchange cannot hold (reports of many programs, a file elsewhere) is bracketed: the folder holds
+`INCOMPLETE.txt` from before the first of it until after the last, and every command that reads there says so.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 
 from toolpath_stiff.errors import FileError
 from toolpath_stiff.files import (
@@ -35,14 +39,18 @@ from toolpath_stiff.files import (
     reason,
     sync_folder,
     write_file,
+    written_beside,
 )
 from toolpath_stiff.hints import both_names
 
 MANIFEST = ".tps-files.json"
+INCOMPLETE = "INCOMPLETE.txt"  # a file of the run like the others, until it comes to its end
 SHA256 = re.compile(r"[0-9a-f]{64}")  # what earlier versions recorded
+STAGE = ".tps-stage"  # the temporary folder of a run, where it lies in the folder itself
 # In the temporary folder of a run: files that are being written; the same when all are there and nothing is left but
 # to move them to their places; what was moved out of their way.
 NEW, WHOLE, GONE = "new", "whole", "gone"
+KEPT = "kept.json"  # beside them: what was in the way -> the name that it gets
 _OTHER_FOLDER = f"choose another folder with {both_names('--out')}"
 ELSEWHERE = f"{_OTHER_FOLDER}, or say --replace (replace=True): the old file is kept beside the new one"
 
@@ -105,6 +113,8 @@ def write_folder(
     *,
     command: str,
     rules: Rules = Rules(),
+    elsewhere: Mapping[str | Path, Content] = MappingProxyType({}),
+    unfinished: bool = False,
 ) -> list[Path]:
     """Write the files of one run, all or none, and clear those of an earlier run; the folder is made if need be.
 
@@ -118,11 +128,15 @@ def write_folder(
         Name of the command, for the manifest.
     rules
         What must not be replaced, and what to do about it.
+    elsewhere
+        Files of the same run in other folders: made before the folder changes, put in their places right after.
+    unfinished
+        Whether the run goes on to write: the folder is marked as incomplete until its next files.
 
     Returns
     -------
     list of Path
-        The files written, the manifest left out.
+        The files written to it, the manifest left out.
 
     Raises
     ------
@@ -130,18 +144,25 @@ def write_folder(
         A file of such a name is not the tool's, is an input, or the folder cannot be written. Nothing is changed then.
     """
     target = Path(os.path.realpath(folder))
+    marked: Mapping[str, Content | Callable[[], Content]] = {}
+    if elsewhere or unfinished:
+        marked = {INCOMPLETE: _incomplete_text(command, elsewhere)}
     with _errors_of(folder), _folders_above(target), locked(_lock(target), repr(str(folder))):
         _clear_up_held(target)
-        in_the_way = _refused(Path(folder), contents, rules)
+        in_the_way = _refused(Path(folder), [*marked, *contents], rules)
         old = read_manifest(target)
         stage = _stage(target)
         try:
             new = stage / NEW
             new.mkdir(parents=True)
-            hashes = {name: write_file(new / name, _made(content)) for name, content in contents.items()}
+            hashes = {name: write_file(new / name, _made(one)) for name, one in {**marked, **contents}.items()}
             manifest = Manifest(command, _relative(target, rules.of), {name: (sha,) for name, sha in hashes.items()})
             write_file(new / MANIFEST, manifest.text())
-            kept = _put(target, stage, old, [file.name for file in in_the_way])
+            with written_beside(elsewhere) as put_elsewhere:
+                kept = _put(target, stage, old, [file.name for file in in_the_way])
+                put_elsewhere()
+            if elsewhere and not unfinished:
+                (target / INCOMPLETE).unlink()
         finally:
             for one in _stages(target):
                 if not (one / WHOLE / MANIFEST).exists():  # else it could not be taken back: the next run carries it on
@@ -150,6 +171,19 @@ def write_folder(
         if rules.kept is not None:
             rules.kept(Path(folder) / name, Path(folder) / kept_as)
     return [Path(folder) / name for name in contents]
+
+
+def _incomplete_text(command: str, elsewhere: Iterable[str | Path]) -> str:
+    files = "".join(f", with {file}" for file in elsewhere)
+    return f"`tps {command}` writes here{files}. While this file is here, it has not come to its end: run it again.\n"
+
+
+def incomplete(folder: str | Path) -> str:
+    """Why the results in a folder are not those of one whole run, a sentence; "" where nothing says so."""
+    place = Path(folder)
+    if (place / INCOMPLETE).is_file() or (place / STAGE / WHOLE / MANIFEST).is_file():
+        return f"{str(folder)!r} is incomplete: the run that wrote it has not come to its end; run it again"
+    return ""
 
 
 def _made(content: Content | Callable[[], Content]) -> Content:
@@ -179,7 +213,7 @@ def _refused(target: Path, names: Iterable[str], rules: Rules) -> list[Path]:
     in_the_way = check_outputs(touched, rules.inputs, rules.replace)
     if rules.replace:
         return list(dict.fromkeys([*in_the_way, *(target / name for name in names if _told(target, name, old, rules))]))
-    if rules.of and old.of and old.of != _relative(target, rules.of):
+    if holds_others(target, rules.of):
         raise FileError(
             f"{str(target)!r} holds the results of {', '.join(map(repr, old.of))} (seen from there)",
             hint=_OTHER_FOLDER,
@@ -188,6 +222,12 @@ def _refused(target: Path, names: Iterable[str], rules: Rules) -> list[Path]:
         if told := _told(target, name, old, rules):
             raise FileError(f"{str(target / name)!r} {told}", hint=ELSEWHERE)
     return []
+
+
+def holds_others(folder: Path, of: Sequence[str]) -> bool:
+    """Whether a folder that was named by default holds the results of something else."""
+    old = read_manifest(folder)
+    return bool(of and old.of and old.of != _relative(folder, of))
 
 
 def _told(folder: Path, name: str, old: Manifest, rules: Rules) -> str:
@@ -253,7 +293,7 @@ def _lock(folder: Path) -> Path:
 
 def _stages(folder: Path) -> tuple[Path, Path]:
     """Where the temporary folder of a run may be: beside the folder, or in it."""
-    return beside(folder, "stage"), folder / ".tps-stage"
+    return beside(folder, "stage"), folder / STAGE
 
 
 def _stage(folder: Path) -> Path:
@@ -287,6 +327,7 @@ def _put(folder: Path, stage: Path, old: Manifest, in_the_way: Iterable[str]) ->
         inside.mkdir()
         new.rename(inside / NEW)
         stage = inside
+    write_file(stage / KEPT, json.dumps(kept))
     (stage / NEW).rename(stage / WHOLE)
     sync_folder(stage)
     _move_in(folder, stage, old, kept)
@@ -346,11 +387,15 @@ def _move_in(folder: Path, stage: Path, old: Manifest, kept: Mapping[str, str], 
     try:
         gone.mkdir(exist_ok=True)
         new = read_manifest(whole)
+        # What is in its place already arrived before the kill that this run makes good.
+        arrived = {name for name in new.files if not (whole / name).exists()}
         for name, becomes in kept.items():
-            move(folder / name, folder / becomes)
+            if name not in arrived and os.path.lexists(folder / name):
+                move(folder / name, folder / becomes)
         for name in (MANIFEST, *old.files):
-            arrived = name in new.files and not (whole / name).exists()  # before the kill that this run makes good
-            if not arrived and (_is_ours(folder, name, old) if name != MANIFEST else (folder / name).exists()):
+            if name in arrived:
+                continue
+            if _is_ours(folder, name, old) if name != MANIFEST else (folder / name).exists():
                 move(folder / name, gone / name)
         for name in (*new.files, MANIFEST):
             if (whole / name).exists():
@@ -385,7 +430,8 @@ def _clear_up_held(folder: Path) -> None:
     outside, inside = _stages(folder)
     if (inside / WHOLE / MANIFEST).exists():
         began = (inside / GONE / MANIFEST).exists()
-        _move_in(folder, inside, read_manifest(inside / GONE if began else folder), {}, again=True)
+        kept = json.loads((inside / KEPT).read_bytes()) if (inside / KEPT).exists() else {}  # an earlier version's
+        _move_in(folder, inside, read_manifest(inside / GONE if began else folder), kept, again=True)
     for stage in (outside, inside):
         shutil.rmtree(stage, ignore_errors=True)
 

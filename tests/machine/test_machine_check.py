@@ -46,7 +46,12 @@ def test_the_template_is_neutral(tmp_path, monkeypatch, capsys):
     capsys.readouterr()
     assert main(["machine", "check", "mine.toml"]) == 0
     told = capsys.readouterr().out
-    assert "still the template's: [frame_joints]" in told and "[setup]" in told and "WRONG" not in told
+    assert (
+        "the remark of [frame_joints]" in told
+        and "still says 'value of the template" in told
+        and "[setup]" in told
+        and "WRONG" not in told
+    )
     assert (tmp_path / "reports/mine_machine.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -157,3 +162,15 @@ def test_entries_from_no_file_still_say_whose_they_are():
     machine = parse_machine(NIST).with_changes(effects=(EffectEntry("joint_compliance", {"x": 1.0}),))
     with pytest.raises(InputError, match=r"machine nist, \[\[effect\]\]: effect joint_compliance: unknown key x"):
         build_model(machine)
+
+
+@pytest.mark.parametrize("out", ["mc", "mc/fine.png", "mc.svg"])
+def test_the_picture_goes_to_a_folder_or_a_png(tmp_path, monkeypatch, capsys, out):
+    monkeypatch.chdir(tmp_path)
+    assert main(["machine", "new", "mine.toml"]) == 0
+    code = main(["machine", "check", "mine.toml", "--out", out])
+    written = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
+    if out == "mc.svg":
+        assert code == 2 and written == ["mine.toml"] and "expected FILE.png or a folder" in capsys.readouterr().err
+    else:
+        assert written == [out if out.endswith(".png") else "mc/mine_machine.png", "mine.toml"]

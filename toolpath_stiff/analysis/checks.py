@@ -420,7 +420,8 @@ def check_machine(model: StiffnessModel) -> MachineCheck:
         doubtful.append(f"at the neutral pose the struts ({lengths} mm) lie outside the lengths of [strut_law]")
     same = [section for section, remark in machine.remarks.items() if remark == TEMPLATE_REMARK]
     if same:
-        doubtful.append(f"still the template's: {', '.join(f'[{section}]' for section in same)}")
+        sections = ", ".join(f"[{section}]" for section in same)
+        doubtful.append(f"the remark of {sections} still says {TEMPLATE_REMARK!r}: say where its figures are from")
     return MachineCheck(tuple(wrong), tuple(doubtful), neutral, origin, symmetry)
 
 

@@ -23,6 +23,7 @@ from toolpath_stiff.api.case_results import (
     TABLES,
     Findings,
     copied,
+    drop,
     first_name,
     free_name,
     machine_bytes,
@@ -144,7 +145,7 @@ class Case(Findings):
         try:
             Machine.load(self.path(name), effects=[self.path(one) for one in self.state.effects])
         except TpsError:
-            (self.folder / name).unlink()
+            drop(self.folder, name)
             raise
         python = f"case.set_machine({str(machine)!r})"
         if not self.history:
@@ -226,7 +227,7 @@ class Case(Findings):
             Machine.load(self.path(state.machine), effects=[self.path(one) for one in files])
             agree((self.folder / new).read_bytes(), new)
         except TpsError:
-            (self.folder / new).unlink()
+            drop(self.folder, new)
             raise
         lost = set(state.on) - set(self._known(state.on, files)) if old else set()
         change = {
@@ -256,8 +257,7 @@ class Case(Findings):
         try:
             count = len(Measurements([self.path(name) for name in after]).on(self.machine))
         except TpsError:
-            for name in names:
-                (self.folder / name).unlink()
+            drop(self.folder, *names)
             raise
         text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
         self.record(
@@ -425,8 +425,7 @@ class Case(Findings):
             else:
                 Program.from_text("M2", **reading_arguments(self.folder, reading))
         except TpsError:
-            for name in files:
-                (self.folder / name).unlink()
+            drop(self.folder, *files)
             raise
         change: dict[str, Any] = {"reading": reading} if reading != state.reading else {}
         if program != state.program:

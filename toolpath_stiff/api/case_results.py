@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     from toolpath_stiff.api.programs import Analysis
 
 CASE_FILE = "case.toml"
+JOURNAL = ".tps-adding"  # what a step is about to bring into these rooms, until case.toml names it
+EXERCISE = "exercise"  # a folder; the other rooms hold files
+ROOMS = ("machines", "data", "programs", "effects", EXERCISE)
 FORMAT = 1
 HEADING = "# A case of toolpath_stiff: the steps in their order; `done` of them hold, the others were undone.\n"
 UNSAFE = re.compile(r"[^\w.+-]+", re.ASCII)
@@ -215,6 +219,32 @@ class History:
     def __init__(self, folder: Path, steps: Sequence[Step], done: int, text: str) -> None:
         self.folder, self._steps, self._done, self._written = folder, list(steps), done, text
         self.sent_to = ""
+        self._clear_up()
+
+    def _clear_up(self) -> None:
+        """Take away what a killed step brought, and no step names."""
+        from toolpath_stiff.files import beside, forget, is_left, read_text, remove_parts
+        from toolpath_stiff.results_folder import clear_up
+
+        journal = self.folder / JOURNAL
+        if not is_left(journal):
+            return
+        remove_parts(beside(self.folder / CASE_FILE, "part-"))
+        known = {name for step in self._steps for name in (*step.files, step.change.get("exercise"))}
+        here = self.folder.resolve()
+        for name in read_text(journal, "journal").splitlines():
+            file = self.folder / name
+            # A case may come from somebody else: nothing outside its rooms is touched.
+            inside = file.parent.is_dir() and file.parent.resolve().is_relative_to(here) and ".." not in file.parts
+            if not inside or _room(name) not in ROOMS:
+                continue
+            remove_parts(beside(file, "part-"))
+            if name not in known and file.is_file():
+                file.unlink()
+            elif name not in known and _room(name) == EXERCISE and file.parent == self.folder:
+                clear_up([file])
+                shutil.rmtree(file, ignore_errors=True)
+        forget(journal)
 
     @property
     def history(self) -> list[Step]:
@@ -330,7 +360,7 @@ class History:
             write_files(self.folder, {used_name(file): without_lines(self.folder / file, lines)})
 
     def _save(self) -> None:
-        from toolpath_stiff.files import write_atomically
+        from toolpath_stiff.files import forget, write_atomically
 
         file = self.folder / CASE_FILE
         if file.is_file() and file.read_text("utf-8") != self._written:
@@ -340,6 +370,7 @@ class History:
         self._rewrite_used()
         self._written = case_text(self._steps, self._done)
         write_atomically(file, self._written)
+        forget(self.folder / JOURNAL)
 
 
 def reading_words(reading: Mapping[str, Any]) -> list[str]:
@@ -356,12 +387,30 @@ def reading_arguments(folder: Path, reading: Mapping[str, Any]) -> Reading:
 
 
 def free_name(folder: Path, name: str) -> str:
-    """The name, or the next one with a number that the folder does not have yet."""
+    """The name, or the next one with a number that the folder does not have yet; noted, where it is of a room."""
+    from toolpath_stiff.files import announce
+
     path, number = Path(name), 1
     while (folder / name).exists():
         number += 1
         name = str(path.with_name(f"{path.stem}-{number}{path.suffix}"))
+    if _room(name) in ROOMS:
+        announce(folder / JOURNAL, name)
     return name
+
+
+def drop(folder: Path, *names: str) -> None:
+    """Take files away again that turned out to be of no use."""
+    from toolpath_stiff.files import forget
+
+    for name in names:
+        (folder / name).unlink()
+    forget(folder / JOURNAL)
+
+
+def _room(name: str) -> str:
+    """The room of a case that a file is in; "exercise" and "exercise-2" are one."""
+    return name.partition("/")[0].partition("-")[0]
 
 
 def first_name(name: str) -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import FolderResult, Progress, Result, one_of, teller
+from toolpath_stiff.api import FolderResult, Progress, Result, machine_by_name, one_of, teller
 from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
 from toolpath_stiff.api.inputs import FARTHEST_MM, positive
 from toolpath_stiff.api.machines import Machine
@@ -223,8 +224,9 @@ class Update(FolderResult):
                 f"the update was refused: {self._document['text']}",
                 hint="" if worse else "force=True keeps it all the same",
             )
-        files = self._asked.on.effect_files
-        return Machine(build_model(self.correction.machine, files), self._asked.on.asked, files)
+        on = self._asked.on
+        model = replace(build_model(self.correction.machine, on.effect_files), unchecked=on.model.unchecked)
+        return Machine(model, on.asked, on.effect_files, allow_unchecked_effects=on.allow_unchecked_effects)
 
     @property
     def next(self) -> list[str]:
@@ -280,6 +282,7 @@ class Update(FolderResult):
         )
 
 
+@machine_by_name
 def update(
     machine: Machine | str | Path,
     data: Data,
@@ -405,6 +408,7 @@ class Plan(FolderResult):
         return files(self.proposal, self._document, plots=plots)
 
 
+@machine_by_name
 def plan(
     machine: Machine | str | Path,
     data: Data | None = None,

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import FolderResult, Progress, Result, teller
+from toolpath_stiff.api import FolderResult, Progress, Result, machine_by_name, teller
 from toolpath_stiff.api.inputs import Program, origin_word, pose_si, program_from, whole
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import MACHINE
@@ -256,6 +256,7 @@ class Comparison(FolderResult):
         return files(self.compared, plots=plots)
 
 
+@machine_by_name
 def compare(
     machine: Machine | str | Path,
     data: Data,
@@ -363,6 +364,7 @@ class Diagnosis(FolderResult):
         return files(self.diagnosed, self._document, plots=plots)
 
 
+@machine_by_name
 def diagnose(
     machine: Machine | str | Path,
     data: Data,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.api import Progress, Result, teller
+from toolpath_stiff.api import Progress, Result, machine_by_name, teller
 from toolpath_stiff.api.diagnosis import Data, Diagnosis, Noise, Question
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
@@ -286,6 +286,7 @@ def effect_template(name: str) -> EffectFile:
     return EffectFile(name, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
 
 
+@machine_by_name
 def draft_effect(
     machine: Machine | str | Path,
     data: Data,
@@ -460,7 +461,8 @@ def with_effects(
         effects=(*given.effects, *(one for one in entries if one not in read)),
         instruments=(*given.instruments, *read),
     )
-    return replace(machine, model=build_model(added, machine.effect_files, conditions=machine.model.conditions))
+    model = build_model(added, machine.effect_files, conditions=machine.model.conditions)
+    return replace(machine, model=replace(model, unchecked=machine.model.unchecked))
 
 
 def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:
@@ -470,6 +472,7 @@ def _entries(effects: Mapping[str, Mapping[str, Any]]) -> list[EffectEntry]:
     return [EffectEntry(name, dict(keys)) for name, keys in effects.items()]
 
 
+@machine_by_name
 def preview(
     machine: Machine | str | Path, data: Data, *, noise_percent: Noise = None, strut_spread_percent: float = 1.0
 ) -> Preview:

@@ -43,6 +43,8 @@ class Machine:
         Python files with effects of one's own.
     setup, temperature_C
         As `load` was told; None: as the controller file or the machine file says.
+    allow_unchecked_effects
+        As `load` was told.
 
     Examples
     --------
@@ -67,6 +69,7 @@ class Machine:
     effect_files: tuple[str, ...] = ()
     setup: str | None = None
     temperature_C: float | None = None  # noqa: N815  (degrees Celsius)
+    allow_unchecked_effects: bool = False
 
     @classmethod
     def load(
@@ -76,6 +79,7 @@ class Machine:
         effects: Iterable[str | Path] = (),
         setup: str | None = None,
         temperature_C: float | None = None,
+        allow_unchecked_effects: bool = False,
     ) -> Machine:
         """Load a packaged machine by name, or a machine file.
 
@@ -89,11 +93,13 @@ class Machine:
             The set-up that is on the machine, for effects that belong to one; "none": none that has a name.
         temperature_C
             Degrees Celsius, for effects that need it.
+        allow_unchecked_effects
+            Compute even with effects of one's own that fail `check_effects`; every result says so.
 
         Raises
         ------
         InputError
-            There is no such machine, the file is wrong, an effect is unknown, or no effect knows the set-up.
+            There is no such machine, the file is wrong, an effect is unknown or fails, or no effect knows the set-up.
 
         Examples
         --------
@@ -101,12 +107,10 @@ class Machine:
         >>> tps.Machine.load("nist", temperature_C=22)
         <Machine nist: 6 struts, no effects>
         """
-        from toolpath_stiff.machine import load_machine
-        from toolpath_stiff.stiffness.model import build_model
-
         files = tuple(map(str, effects))
-        model = build_model(load_machine(machine), files)
-        found = cls(model, str(machine), files).under(setup, temperature_C)
+        model = _checked_model(str(machine), files, allow_unchecked_effects)
+        found = cls(model, str(machine), files, allow_unchecked_effects=allow_unchecked_effects)
+        found = found.under(setup, temperature_C)
         found.running()
         return found
 
@@ -131,7 +135,7 @@ class Machine:
         """For another process: effects of one's own travel as their files, a class of such a file cannot."""
         files = tuple(str(Path(file).absolute()) for file in self.effect_files)
         built_from = (self.model.given or self.model.machine, files, self.model.conditions)
-        return _machine_again, (*built_from, self.asked, self.setup, self.temperature_C)
+        return _machine_again, (*built_from, self.asked, self.setup, self.temperature_C, self.model.unchecked)
 
     @staticmethod
     def names() -> list[str]:
@@ -220,10 +224,7 @@ class Machine:
         >>> machine.like("genhexkins").name
         'genhexkins'
         """
-        from toolpath_stiff.machine import load_machine
-        from toolpath_stiff.stiffness.model import build_model
-
-        model = build_model(load_machine(str(machine)), self.effect_files)
+        model = _checked_model(str(machine), self.effect_files, self.allow_unchecked_effects)
         return replace(self, model=model, asked=str(machine))
 
     @property
@@ -419,11 +420,27 @@ def _machine_again(
     asked: str,
     setup: str | None,
     temperature_C: float | None,
+    unchecked: tuple[str, ...],
 ) -> Machine:
     """A machine in another process."""
     from toolpath_stiff.stiffness.model import build_model
 
-    return Machine(build_model(given, files, conditions=conditions), asked, files, setup, temperature_C)
+    model = replace(build_model(given, files, conditions=conditions), unchecked=unchecked)
+    return Machine(model, asked, files, setup, temperature_C, bool(unchecked))
+
+
+def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects: bool) -> StiffnessModel:
+    """The model of a machine; raises `InputError` for effects that fail, unless they are allowed."""
+    from toolpath_stiff.machine import load_machine
+    from toolpath_stiff.stiffness.effects.trial import failures, own_effects, refuse_failing
+    from toolpath_stiff.stiffness.model import build_model
+
+    given = load_machine(machine)
+    model = build_model(given, files)
+    effects = own_effects(model, files)
+    if not allow_unchecked_effects:
+        refuse_failing(effects, given, machine)
+    return replace(model, unchecked=tuple(failures(effects, given)))
 
 
 def machine_from(machine: Machine | str | Path) -> Machine:

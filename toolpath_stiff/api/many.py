@@ -217,6 +217,8 @@ def analyze_many(
     check_folder(run.out, names(), run.rules)
     listed = report_folders(found)
     with _folders_for(run.out, listed):
+        # The overview of an earlier run goes, as its reports do from now on, one after the other.
+        write_folder(run.out, {}, command="analyze", rules=run.rules, unfinished=True)
         tasks = _tasks(run, listed, given, example)
         outcomes = _outcomes(tasks, run, executor, jobs, progress)
         written = write_folder(run.out, files(outcomes), command="analyze", rules=run.rules)

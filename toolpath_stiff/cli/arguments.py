@@ -13,7 +13,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any, cast
 from toolpath_stiff.api.inputs import FARTHEST_DEG, FARTHEST_MM, finite
 from toolpath_stiff.defaults import FORCE, LOAD, MACHINE
 from toolpath_stiff.errors import InputError, harmless
-from toolpath_stiff.files import Content, check_outputs, encoded, is_file, keep_old, read_bytes, write_atomically
-from toolpath_stiff.results_folder import Rules, check_folder, write_folder
+from toolpath_stiff.files import Content, check_outputs, encoded, is_file, keep_old, read_bytes
+from toolpath_stiff.results_folder import Rules, check_folder, holds_others, incomplete, write_folder
 from toolpath_stiff.units import ShopPose
 
 if TYPE_CHECKING:
@@ -199,6 +199,7 @@ def add_machine_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--effects", action="append", default=[], metavar="FILE.py", help="file with your own physical effects"
     )
+    add_unchecked_option(group)
     group.add_argument(
         "--force",
         type=positive_number("N", 1e6),
@@ -207,6 +208,15 @@ def add_machine_options(parser: argparse.ArgumentParser) -> None:
         help=f"load at the tool tip, for deflections and load-dependent effects (default: {FORCE:g})",
     )
     add_condition_options(group)
+
+
+def add_unchecked_option(group: argparse._ActionsContainer) -> None:
+    """`--allow-unchecked-effects`, beside `--effects`."""
+    group.add_argument(
+        "--allow-unchecked-effects",
+        action="store_true",
+        help="compute even with own effects that fail `tps effects check`; every result says so",
+    )
 
 
 def add_condition_options(group: argparse._ActionsContainer) -> None:
@@ -241,9 +251,14 @@ def _temperature(text: str) -> float:
 
 def machine_for(args: argparse.Namespace) -> Machine:
     """The machine that the options of `add_machine_options` describe. Raises `InputError`."""
+    return loaded_machine(args).under(args.setup, args.temperature)
+
+
+def loaded_machine(args: argparse.Namespace) -> Machine:
+    """The machine of --machine with its effects. Raises `InputError`."""
     from toolpath_stiff.api.machines import Machine
 
-    return Machine.load(args.machine, effects=args.effects).under(args.setup, args.temperature)
+    return Machine.load(args.machine, effects=args.effects, allow_unchecked_effects=args.allow_unchecked_effects)
 
 
 def add_load_options(parser: argparse.ArgumentParser) -> None:
@@ -311,6 +326,21 @@ def inputs_of(args: argparse.Namespace) -> Iterator[str]:
         if name not in DESTINATIONS:
             named = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, str) and one]
             yield from (split_name(one)[0] for one in named)
+
+
+def tell_incomplete(folders: Iterable[Path]) -> None:
+    """Say which of these folders hold the results of a run that was stopped."""
+    for told in filter(None, map(incomplete, dict.fromkeys(folders))):
+        print(f"tps: warning: {told}", file=sys.stderr)
+
+
+def read_folders(args: argparse.Namespace) -> list[Path]:
+    """The folders that a command reads from."""
+    found = []
+    for name in inputs_of(args):
+        with suppress(OSError, ValueError):  # no file can have that name
+            found += [Path(name) if Path(name).is_dir() else Path(name).parent] if Path(name).exists() else []
+    return found
 
 
 def check_written(
@@ -391,21 +421,25 @@ class Destination:
         check_folder(self.folder, names, self.rules)
         return self
 
-    def write(self, contents: Mapping[str, Content | Callable[[], Content]]) -> list[Path]:
-        """Write the files, all or none; see `write_folder`."""
-        return write_folder(self.folder, contents, command=self.command, rules=self.rules)
+    def write(
+        self,
+        contents: Mapping[str, Content | Callable[[], Content]],
+        elsewhere: Mapping[str | Path, Content] = MappingProxyType({}),
+    ) -> list[Path]:
+        """Write the files, all or none, and those elsewhere; see `write_folder`."""
+        return write_folder(self.folder, contents, command=self.command, rules=self.rules, elsewhere=elsewhere)
 
 
 def show(
     args: argparse.Namespace,
     result: FolderResult,
     target: Destination,
-    also: Mapping[str, Content] = MappingProxyType({}),
+    also: Mapping[str | Path, Content] = MappingProxyType({}),
     **options: Any,
 ) -> int:
-    """Save a result, then the files `also`, print it as text or as JSON; the exit code of success."""
-    written = result.save(target.folder, plots=not args.no_plots, rules=target.rules, **options)
-    written += [write_atomically(file, content) for file, content in also.items()]
+    """Save a result and the files `also`, print it as text or as JSON; the exit code of success."""
+    files = result.files(plots=not args.no_plots, **options)
+    written = [*target.write(files, also), *map(Path, also)]
     if args.json:
         sys.stdout.write(result.to_json())
     else:
@@ -421,14 +455,28 @@ def written_text(files: Iterable[Path]) -> str:
 
 
 def destination(args: argparse.Namespace, command: str, sources: Sequence[str], suffix: str = "") -> Destination:
-    """The folder of --out, else `reports/<sources><suffix>`, which then belongs to these sources."""
+    """The folder of --out, else `reports/<sources><suffix>` or a longer name, which then belongs to these sources."""
     rules = Rules(
         inputs=tuple(inputs_of(args)),
         of=() if args.out else tuple(sources),
         replace=args.replace,
         kept=None if args.json else tell_kept,
     )
-    return Destination(Path(args.out or f"reports/{joined_names(sources)}{suffix}"), command, rules)
+    return Destination(Path(args.out) if args.out else _default_folder(sources, suffix), command, rules)
+
+
+def _default_folder(sources: Sequence[str], suffix: str) -> Path:
+    """`reports/NAME`; where that holds results of another file of the name, the folder above stands before it."""
+    from toolpath_stiff.tables import split_name
+
+    name = joined_names(sources)
+    default = folder = Path(f"reports/{name}{suffix}")
+    for above in Path(split_name(sources[0])[0]).absolute().parents:
+        if not holds_others(folder, sources):
+            return folder
+        name = f"{above.name}-{name}"
+        folder = Path(f"reports/{name}{suffix}")
+    return default
 
 
 def joined_names(sources: Sequence[str]) -> str:

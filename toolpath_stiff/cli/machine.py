@@ -11,6 +11,7 @@ from toolpath_stiff.cli.arguments import (
     add_machine_options,
     add_reading_options,
     add_replace_option,
+    add_unchecked_option,
     case_reading,
     check_made,
     check_new,
@@ -192,7 +193,7 @@ def machine_arguments(parser: argparse.ArgumentParser) -> None:
     show = actions.add_parser("show", help="figures of a machine with their origin, and a picture of it")
     show.add_argument("machine", metavar="NAME|FILE", nargs="?", default="nist")
     show.add_argument("--pose", type=pose_argument, metavar="X,Y,Z[,A,B,C]", help="pose of the picture, mm and degrees")
-    show.add_argument("--out", metavar="FILE.png", help="the picture (default: reports/<name>.png)")
+    show.add_argument("--out", metavar="FILE.png|DIR", help="the picture, or its folder (default: reports)")
     add_replace_option(show)
     show.add_argument("--json", action="store_true", help="print JSON, draw nothing unless --out is given")
     check = actions.add_parser(
@@ -202,7 +203,8 @@ def machine_arguments(parser: argparse.ArgumentParser) -> None:
     check.add_argument(
         "--effects", action="append", default=[], metavar="FILE.py", help="your own physical effects that it names"
     )
-    check.add_argument("--out", metavar="FILE.png", help="the picture (default: reports/<file>_machine.png)")
+    add_unchecked_option(check)
+    check.add_argument("--out", metavar="FILE.png|DIR", help="the picture, or its folder (default: reports)")
     add_replace_option(check)
     check.add_argument("--json", action="store_true", help="print JSON, draw nothing unless --out is given")
     new = actions.add_parser("new", help="write a commented template")
@@ -257,7 +259,7 @@ def _machine_show(args: argparse.Namespace) -> int:
     else:
         print(machine.text(args.pose))
     if args.out or not args.json:
-        target = Path(args.out or f"reports/{machine.name}.png")
+        target = _picture_file(args.out, machine.name)
         check_written(args, [target])
         picture = machine.picture(args.pose)
         keep(check_made(args, {target: picture}), quiet=args.json)
@@ -265,6 +267,16 @@ def _machine_show(args: argparse.Namespace) -> int:
         if not args.json:
             print(written_text([written]))
     return 0 if machine.standing(args.pose)[2].reachable[0] else MACHINE_OUT_OF_REACH
+
+
+def _picture_file(out: str | None, name: str) -> Path:
+    """Where a picture goes: the file of --out, or the folder, as of every other command. Raises `InputError`."""
+    place = Path(out or "reports")
+    if place.suffix.lower() == ".png" and not place.is_dir():
+        return place
+    if place.suffix and not place.is_dir():
+        raise InputError(f"--out {out}: {place.suffix} is no picture's ending here", expected="FILE.png or a folder")
+    return place / f"{name}.png"
 
 
 def _machine_check(args: argparse.Namespace) -> int:
@@ -275,10 +287,12 @@ def _machine_check(args: argparse.Namespace) -> int:
     if not Path(args.file).is_file():
         new = command_line("machine", "new", args.file)
         raise InputError(f"cannot read machine file {args.file!r}", hint=f"`{new}` writes a template")
-    target = Path(args.out or f"reports/{Path(args.file).stem}_machine.png")
+    target = _picture_file(args.out, f"{Path(args.file).stem}_machine")
     drawn = bool(args.out) or not args.json
     check_written(args, [target] if drawn else [])
-    found = Machine.load(Path(args.file), effects=args.effects).check()
+    found = Machine.load(
+        Path(args.file), effects=args.effects, allow_unchecked_effects=args.allow_unchecked_effects
+    ).check()
     files = {target: found.picture()} if drawn else {}
     keep(check_made(args, files), quiet=args.json)
     written = [write_atomically(file, content) for file, content in files.items()]

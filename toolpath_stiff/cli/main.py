@@ -20,7 +20,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, TextIO
 
-from toolpath_stiff.cli.arguments import whole_options
+from toolpath_stiff.cli.arguments import read_folders, tell_incomplete, whole_options
 from toolpath_stiff.defaults import THREADS, VERSION
 from toolpath_stiff.errors import FileError, TpsError, harmless
 
@@ -217,6 +217,7 @@ def _run(arguments: Sequence[str]) -> int:
     if args.command is None:
         parser.print_help()
         return 2
+    tell_incomplete(read_folders(args))
     return next(c for c in COMMANDS if c.name == args.command).parts[1](args)
 
 

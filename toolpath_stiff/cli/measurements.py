@@ -14,6 +14,7 @@ from toolpath_stiff.cli.arguments import (
     add_json_option,
     add_program_options,
     add_replace_option,
+    add_unchecked_option,
     check_made,
     check_single,
     check_written,
@@ -21,6 +22,7 @@ from toolpath_stiff.cli.arguments import (
     finite_number,
     inputs_of,
     keep,
+    loaded_machine,
     positive_number,
     program_for,
     progress_line,
@@ -67,6 +69,7 @@ def add_data_arguments(parser: argparse.ArgumentParser, nargs: str = "+", otherw
         metavar="FILE.py",
         help="file with your own physical effects, used as well",
     )
+    add_unchecked_option(parser)
 
 
 def add_noise_arguments(parser: argparse.ArgumentParser, guess: str = "a low and a high guess") -> None:
@@ -100,9 +103,8 @@ def add_output_arguments(
 def measured(args: argparse.Namespace) -> tuple[Machine, Measurements]:
     """The machine with its effect files, and the measurements."""
     from toolpath_stiff.api.diagnosis import Measurements
-    from toolpath_stiff.api.machines import Machine
 
-    return Machine.load(args.machine, effects=args.effects), Measurements(args.data)
+    return loaded_machine(args), Measurements(args.data)
 
 
 def noise_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -362,9 +364,8 @@ def update(args: argparse.Namespace) -> int:
         )
         files = found.files(plots=not args.no_plots, machine=args.output is None)
     keep(replaced, quiet=args.json)
-    # The machine file first: update.json names it.
-    written = [found.save_machine(args.output)] if args.output and found.accepted else []
-    written += target.write(files)
+    machine_file = {args.output: found.machine_text()} if args.output and found.accepted else {}
+    written = [*map(Path, machine_file), *target.write(files, machine_file)]
     if args.json:
         sys.stdout.write(found.to_json())
     else:

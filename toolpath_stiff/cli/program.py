@@ -28,6 +28,7 @@ from toolpath_stiff.cli.arguments import (
     reading_options,
     say,
     show,
+    tell_incomplete,
     written_text,
 )
 from toolpath_stiff.defaults import OBJECTIVES
@@ -479,6 +480,8 @@ def place(args: argparse.Namespace) -> int:
 
     replaced = check_single(args, args.write)
     target = destination(args, "place", [args.program], "-place").check(names(not args.no_plots))
+    if args.pick is not None:
+        tell_incomplete([target.folder])
     with progress_line(quiet=args.json) as progress:
         found = place(
             machine_for(args),

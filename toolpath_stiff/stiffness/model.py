@@ -95,6 +95,8 @@ class StiffnessModel:
         Under what programs run; measurements bring their own. `acting_effects` says which effects that leaves.
     withheld
         Effects that the machine should have and that were left out, with the reason.
+    unchecked
+        What every result says of effects that fail `effects check` and were allowed all the same.
     """
 
     machine: Machine
@@ -104,6 +106,7 @@ class StiffnessModel:
     given: Machine | None = None
     conditions: Conditions = field(default_factory=Conditions)
     withheld: tuple[Idle, ...] = ()
+    unchecked: tuple[str, ...] = ()
 
     @property
     def load_dependent(self) -> bool:
@@ -370,7 +373,8 @@ def condition_warnings(model: StiffnessModel, tool_given: bool = False) -> list[
     `tool_given`: whether the length of the tool is known; else it is the reference tool's.
     """
     names = ", ".join(active.effect.name for active in model.instruments)
-    found = [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
+    found = list(model.unchecked)
+    found += [f"instruments set aside, they act on readings and not on the machine: {names}"] if names else []
     found += [str(one) for one in idle_effects(model) if one.waiting]
     length = mm_from_m(model.machine.reference_tool_length)
     if not tool_given:

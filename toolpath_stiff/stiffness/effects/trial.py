@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import EffectFault, InputError
+from toolpath_stiff.errors import EffectError, EffectFault, InputError
+from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Machine
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.effects import effects_from_file, guard
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath, Parameter
-from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, load_path
+from toolpath_stiff.stiffness.effects.guard import is_foreign
+from toolpath_stiff.stiffness.model import TOOL, ActiveEffect, StiffnessModel, build_model, load_path
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
 
 POSES, DRAWN, TIMED = 24, 600, 512
 LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
+LONGER = 0.1  # m, of the longest tool, for effects that ask for it
 SETUPS = ("riser", "table")
+ALLOW = "--allow-unchecked-effects"
 SAME = 1e-9  # relative: of results that must agree
 # SI value of the units that parameters have, with the prefixes below.
 BASE = {"m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": RAD_PER_DEG, "%": 1e-2, "1": 1.0}
@@ -54,7 +62,45 @@ class Trial:
         return all(outcome.passed is not False for outcome in self.outcomes)
 
 
-def try_effect(effect: Effect, machine: Machine, seed: int = 0) -> Trial:
+def own_effects(model: StiffnessModel, effect_files: Iterable[str | Path]) -> list[Effect]:
+    """Effects from outside the package that act in a model, or compete as of a file; each once."""
+    acting = [active.effect for active in (*model.effects, *model.instruments) if is_foreign(active.effect)]
+    return list(dict.fromkeys([*acting, *(one for file in effect_files for one in effects_from_file(file).values())]))
+
+
+def refuse_failing(effects: Iterable[Effect], machine: Machine, machine_name: str) -> None:
+    """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
+    for effect in effects:
+        if told := failure(effect, machine):
+            file = guard.file_of(effect)
+            check = command_line("effects", "check", file, *options(machine=machine_name))
+            raise EffectError(
+                f"effect {effect.name} {told}", file=file,
+                hint=f"`{check}` says more; with {ALLOW} (allow_unchecked_effects=True) it is used all the same",
+            )  # fmt: skip
+
+
+def failures(effects: Iterable[Effect], machine: Machine) -> list[str]:
+    """What results say of effects that were used although they fail."""
+    found = [(effect.name, failure(effect, machine)) for effect in effects]
+    return [f"UNCHECKED effect {name} ({ALLOW}): it {told}" for name, told in dict(found).items() if told]
+
+
+def failure(effect: Effect, machine: Machine) -> str:
+    """What `effects check` finds wrong in an effect, the end of a sentence; "" if nothing."""
+    return _failure(effect, pickle.dumps(machine.with_changes(effects=(), instruments=())))
+
+
+@lru_cache(maxsize=256)
+def _failure(effect: Effect, machine: bytes) -> str:
+    try:
+        trial = try_effect(effect, pickle.loads(machine), timed=False)
+    except InputError as error:
+        return f"cannot be tried: {error}"
+    return "; ".join(f"fails the check of its {one.name}: {one.found}" for one in trial.outcomes if one.passed is False)
+
+
+def try_effect(effect: Effect, machine: Machine, seed: int = 0, timed: bool = True) -> Trial:
     """Try an effect on a machine, by itself: at its neutral value, typical values and finite bounds.
 
     Parameters
@@ -65,9 +111,11 @@ def try_effect(effect: Effect, machine: Machine, seed: int = 0) -> Trial:
         Its own effects are left out.
     seed
         Of the poses, which lie within the machine's reach, tilted up to 10 degrees.
+    timed
+        Whether its speed is taken too, which nothing depends on.
     """
     bare = build_model(machine.with_changes(effects=(), instruments=()))
-    poses = _poses(machine, seed)
+    poses = _with_tools(effect, _poses(machine, seed))
     sets = dict(_parameter_sets(effect))
     outcomes = [*_units(effect)]
     try:
@@ -81,7 +129,8 @@ def try_effect(effect: Effect, machine: Machine, seed: int = 0) -> Trial:
         count = f"{len(acted)} sets of parameters, {len(poses)} poses"
         outcomes.append(Outcome("shapes", True, f"shapes, finite, symmetric, positive definite: {count}"))
         outcomes += [_neutral(acted, plain), _acts(effect, acted, plain), _one_by_one(bare, effect, sets, poses)]
-        outcomes.append(_speed(bare, effect, sets["typical, high"], poses))
+        outcomes += _sign(_with(bare, effect, sets["typical, high"]), effect, poses)
+        outcomes += [_speed(bare, effect, sets["typical, high"], poses)] if timed else []
     except EffectFault as fault:
         outcomes.append(Outcome("shapes", False, str(fault)))
     return Trial(effect, tuple(outcomes))
@@ -102,6 +151,12 @@ def _poses(machine: Machine, seed: int) -> FloatArray:
     stand = reach(machine, drawn[:, :3], solve_struts(machine, drawn[:, :3], turn), turn)
     found = drawn[stand.reachable]
     return found[:POSES] if len(found) else drawn[:1]
+
+
+def _with_tools(effect: Effect, poses: FloatArray) -> FloatArray:
+    """(n, 7) poses and how much longer the tool is: not at all, unless the effect asks for it."""
+    longest = LONGER if TOOL in effect.needs else 0.0
+    return np.column_stack([poses, np.linspace(0.0, longest, len(poses))])
 
 
 def _parameter_sets(effect: Effect) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -134,11 +189,12 @@ def _with(bare: StiffnessModel, effect: Effect, values: Mapping[str, Any]) -> St
 def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
     """Everything that an effect may ask for: half of the poses on the riser, an hour of time, 5 K."""
     n = len(poses)
+    length = np.where(poses[:, 6] > 0.0, model.machine.reference_tool_length + poses[:, 6], np.nan)
     ramp = np.linspace(0.0, 1.0, n)
     setup = np.array([SETUPS[i % 2] for i in range(n)])
     direction = np.eye(3)[np.arange(n) % 3]
     return load_path(
-        model, poses[:, :3], rotation_matrices(poses[:, 3:]), force=defaults.FORCE, setup=setup, time=3600.0 * ramp,
+        model, poses[:, :3], rotation_matrices(poses[:, 3:6]), length, defaults.FORCE, setup, time=3600.0 * ramp,
         temperature=20.0 + 5.0 * ramp, direction=direction,
     )  # fmt: skip
 
@@ -195,8 +251,29 @@ def _one_by_one(
     return Outcome("poses", False, f"alone and together differ by up to {100.0 * gap:.3g} %: the poses mix")
 
 
+def _sign(model: StiffnessModel, effect: Effect, poses: FloatArray) -> list[Outcome]:
+    """A part that gives way can only add compliance, one beside the struts only stiffness.
+
+    Parameters whose neutral value lies between their bounds, and constants drawn from readings, go both ways.
+    """
+    both_ways = any(p.kind == "real" and p.bounds[0] < p.neutral < p.bounds[1] for p in effect.parameters)
+    if both_ways or effect.described_from:
+        return []
+    path, name = _path(model, poses), "sign"
+    for active in model.effects:
+        for hook in guard.SHAPES:
+            added = active.adds(hook, path)
+            if added is None:
+                continue
+            lowest = added if added.ndim == 2 else np.linalg.eigvalsh(added)
+            if lowest.min() < -SAME * np.abs(lowest).max():
+                found = f"{hook} is negative, down to {lowest.min():.3g}"
+                return [Outcome(name, False, f"{found}; if both signs are meant, bound the parameter so")]
+    return []
+
+
 def _speed(bare: StiffnessModel, effect: Effect, values: Mapping[str, Any], poses: FloatArray) -> Outcome:
-    many = np.resize(poses, (TIMED, 6))
+    many = np.resize(poses, (TIMED, poses.shape[1]))
     ratio = _seconds(_with(bare, effect, values), many) / _seconds(bare, many)
     return Outcome("speed", None, f"{ratio:.1f} times the plain model's time for {TIMED} poses")
 

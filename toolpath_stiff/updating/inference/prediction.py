@@ -22,6 +22,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Machine, StrutLaw
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.effects.contract import Effect, LoadPath
+from toolpath_stiff.stiffness.effects.trial import failures, own_effects
 from toolpath_stiff.stiffness.exact import law_products
 from toolpath_stiff.stiffness.model import ActiveEffect, StiffnessModel, build_model, idle_on_readings
 from toolpath_stiff.updating.measurements import Measurements, measured_path, mechanical_stiffness, shown_by
@@ -85,7 +86,9 @@ class Predictor:
         self.machine = machine
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)
-        self.data = replace(data, warnings=tuple(dict.fromkeys((*data.warnings, *idle_on(self.base, data).values()))))
+        own = failures(own_effects(self.base, self.effect_files), machine)
+        told = (*own, *data.warnings, *idle_on(self.base, data).values())
+        self.data = replace(data, warnings=tuple(dict.fromkeys(told)))
         self._timeless = _prepare(self.base, data, timed=False)
         self._timed = _prepare(self.base, data, timed=True)
         self.tables: dict[tuple[Any, ...], Any] = {}
