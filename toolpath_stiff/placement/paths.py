@@ -263,18 +263,29 @@ def _approach(ends: FloatArray, machine: FloatArray, follows: BoolArray, moves: 
 
 
 def representative_path(path: WorkPath, count: int) -> WorkPath:
-    """A path of `count` headline samples that stands for the whole, extremes first.
+    """A path of `count` headline samples that stands for the whole, and of the outermost samples of all cuts.
 
-    A quarter as many of the other samples, and of the anchored ones, stay for the limits.
+    A quarter as many of the other cuts, of the rapids and of the anchored ones stay for the limits.
     """
     if len(path) <= count:
         return path
     rows, weight = _spread(path, np.flatnonzero(path.headline), count)
-    others = _spread(path, np.flatnonzero(~path.headline), count // 4)[0]
-    few = path.take(np.concatenate([rows, others]))
+    beside = [path.cutting & ~path.headline, ~path.cutting]
+    others = [_spread(path, np.flatnonzero(those), count // 4)[0] for those in beside]
+    others += [_outermost(path.position, np.flatnonzero(those)) for those in (path.headline, *beside)]
+    further = np.setdiff1d(np.concatenate(others), rows)
+    few = path.take(np.concatenate([rows, further]))
     q = len(path.anchored)
     anchored = path.anchored.take(np.linspace(0, q - 1, min(q, count // 4)).astype(np.int64))
-    return replace(few, weight=np.concatenate([weight, np.zeros(len(others))]), anchored=anchored)
+    return replace(few, weight=np.concatenate([weight, np.zeros(len(further))]), anchored=anchored)
+
+
+def _outermost(position: FloatArray, rows: IntArray) -> IntArray:
+    """Those of the rows that lie furthest in one of 26 directions: along the axes and halfway between them."""
+    if not len(rows):
+        return rows
+    directions = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
+    return rows[np.unique((position[rows] @ directions.T).argmax(axis=0))]
 
 
 def with_rows(few: WorkPath, whole: WorkPath, rows: IntArray) -> WorkPath:
