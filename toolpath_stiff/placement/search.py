@@ -7,7 +7,7 @@ and the recommendation on the whole path. Every figure that is returned was comp
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,22 +29,23 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
 SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
-LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 12, 60, 120  # after each leg the few samples hear of what they missed
+LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 6, 60, 120  # after each leg the few samples hear of what they missed
 WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last generation
 # Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
-STARTS, FINALISTS = 5, 3
+STARTS, FLOORED_STARTS, FINALISTS = (4, 1, 12, 3), 1, 3  # of each objective; the range has most hills
 HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 6, 6
 APART = 0.1  # of each range, where they start
 BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
 FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
 SHORT = 3000  # samples of a path that is climbed on as a whole; of a longer one, on what stands for it
 ROUNDS, STRETCHES = 2, 120  # of that: how often it is told anew, and stretches whose extremes join it
-HEEDED = 8  # stretches whose extremes join the few samples, for each placement that these are held against
+HEEDED = 4  # stretches whose extremes join the few samples, for each placement that these are held against
 EXCHANGES = 4  # at most, until the samples that stand for the path miss nothing at the finalists
 MISSED = 1e-3  # of the mean: a figure that they put so much too high is missed
 SEARCHES = 3  # with other seeds, while nothing but the present placement is found
 WHOLE_POSES = 2_000_000  # about, of the whole path to which the front's candidates are thinned
 NO_WORSE = 1e-9  # of the mean: what rounding does to a figure that stays as it was
+SAME = 1e-7  # of the mean: figures that differ by less count as equal; the order of the coordinates decides
 NO_FLOORS = np.full(3, -np.inf)
 ENDS = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
 
@@ -226,7 +227,8 @@ def search_placements(
     for searches, seed in enumerate(seeds, start=1):
         candidates, rapids_left_out = _searched(search, np.random.default_rng(seed), start, now, report)
         found = _result(search, candidates, now, rapids_left_out)
-        alone = start is not None and len(found.front) == 1 and bool((found.front[0] == start).all())
+        gain = found.figures.objectives - (NO_FLOORS if now is None or start is None else now.objectives)
+        alone = bool(len(bounds.free) and len(gain) == 1 and (np.abs(gain) <= SAME * found.figures.mean[0]).all())
         if not alone:
             break
     report(4, 4)
@@ -270,6 +272,7 @@ def _result(
     search: _Search, candidates: FloatArray, now: PlacementFigures | None, rapids_left_out: tuple[tuple[int, str], ...]
 ) -> PlacementResult:
     """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
+    candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]
     figures = search.evaluators["whole"].figures(candidates)
     if not search.kept(figures).any():
         raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
@@ -396,16 +399,16 @@ def _climbed(
 
     Whichever objective is asked for, all are climbed to: no answer may be beaten by the end of another one's front.
     """
-    found = _climbed_to(search, candidates, figures, ENDS)
+    found = _climbed_to(search, candidates, figures, ENDS, STARTS)
     if now is not None and search.present is not None:
         floors = now.objectives[0]
         whole = search.evaluators["whole"]
         below = [goal for goal, ends in zip(ENDS, found, strict=True) if _falls(whole, ends, floors)]
         if below:
             goals = [Goal(goal.weights, floors) for goal in below]
-            found += _climbed_to(search, candidates, figures, goals)
+            found += _climbed_to(search, candidates, figures, goals, [FLOORED_STARTS] * len(goals))
             if _falls(whole, np.vstack(found), floors):
-                found += _climbed_to(search, candidates, figures, [Goal(None, floors)])
+                found += _climbed_to(search, candidates, figures, [Goal(None, floors)], STARTS[:1])
     return np.vstack(found)
 
 
@@ -415,7 +418,7 @@ def _falls(whole: Evaluator, placements: FloatArray, floors: FloatArray) -> bool
 
 
 def _climbed_to(
-    search: _Search, candidates: FloatArray, figures: PlacementFigures, goals: list[Goal]
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, goals: list[Goal], starts: Sequence[int]
 ) -> list[FloatArray]:
     """Where climbs from the best candidates to each goal end: many on few samples, few on more, one on the whole path.
 
@@ -423,8 +426,11 @@ def _climbed_to(
     not always the whole path's. All climb together, each to its own goal.
     """
     few, whole = search.climber("few"), search.evaluators["whole"]
-    starts = STARTS * len(search.bounds.free)
-    found = [_best_apart(search, candidates, figures, goal, starts, APART) for goal in goals]
+    free = len(search.bounds.free)
+    found = [
+        _best_apart(search, candidates, figures, goal, count * free, APART)
+        for goal, count in zip(goals, starts, strict=True)
+    ]
     for _ in range(HEATS):  # the better half of the climbs, those up the same hill counted once, goes on
         climbed = _together(few, found, goals, CLIMB_STEPS)
         known = few.evaluator.figures(np.vstack(climbed))
