@@ -17,7 +17,7 @@ import numpy as np
 
 from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.analysis.poses import evaluate
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
@@ -76,7 +76,7 @@ class Anchored:
         """(k, q, 3) m, positions at k placements: turns (k, 3, 3) and program zeros (k, 3)."""
         ends = []
         for work, machine, follows in zip(self.work, self.machine, self.follows, strict=True):
-            moved = work @ np.swapaxes(turn, 1, 2) + zero[:, None]
+            moved = product(work, np.swapaxes(turn, 1, 2)) + zero[:, None]
             ends.append(np.where(follows, moved, machine))
         return np.asarray(ends[0] + self.u[:, None] * (ends[1] - ends[0]))
 
@@ -285,7 +285,7 @@ def _outermost(position: FloatArray, rows: IntArray) -> IntArray:
     if not len(rows):
         return rows
     directions = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
-    return rows[np.unique((position[rows] @ directions.T).argmax(axis=0))]
+    return np.asarray(rows[np.unique(product(position[rows], directions.T).argmax(axis=0))])
 
 
 def with_rows(few: WorkPath, whole: WorkPath, rows: IntArray) -> WorkPath:
@@ -321,7 +321,7 @@ def _spread(path: WorkPath, rows: IntArray, count: int) -> tuple[IntArray, Float
     distance, nearest = np.full(len(rows), np.inf), np.zeros(len(rows), dtype=np.int64)
     for i in range(count):
         step = features - features[chosen[-1]]
-        apart = np.einsum("ij,ij->i", step, step)
+        apart = (step * step).sum(axis=1)
         closer = apart < distance
         distance[closer], nearest[closer] = apart[closer], i
         if i + 1 < count:

@@ -223,13 +223,15 @@ def search_placements(
     if now is not None and now.margin[0] >= 0.0:
         search.present = present
     start = present if present is not None and bounds.holds(present) else None
-    seeds = range(asked.seed, asked.seed + (SEARCHES if len(bounds.free) else 1))
-    for searches, seed in enumerate(seeds, start=1):
-        candidates, rapids_left_out = _searched(search, np.random.default_rng(seed), start, now, report)
+    rapids_left_out: tuple[tuple[int, str], ...] = ()
+    for searches in range(1, SEARCHES + 1):
+        rng = np.random.default_rng(asked.seed + searches - 1)
+        candidates, left_out = _searched(search, rng, start, now, report)
+        rapids_left_out += left_out
         found = _result(search, candidates, now, rapids_left_out)
         gain = found.figures.objectives - (NO_FLOORS if now is None or start is None else now.objectives)
         alone = bool(len(bounds.free) and len(gain) == 1 and (np.abs(gain) <= SAME * found.figures.mean[0]).all())
-        if not alone:
+        if not alone or searches == SEARCHES:
             break
     report(4, 4)
     return replace(found, searches=searches, alone=alone)
@@ -272,12 +274,12 @@ def _result(
     search: _Search, candidates: FloatArray, now: PlacementFigures | None, rapids_left_out: tuple[tuple[int, str], ...]
 ) -> PlacementResult:
     """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
-    candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]
+    candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]  # of equals the first stands
     figures = search.evaluators["whole"].figures(candidates)
     if not search.kept(figures).any():
         raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
     best = _recommended(search, candidates, figures, now)
-    rows = front_rows(figures, search.kept(figures))
+    rows = front_rows(_rounded(figures), search.kept(figures))
     if best not in rows:  # equal to another in all three
         rows = np.append(rows, best)
     rows = rows[np.argsort(figures.mean[rows], kind="stable")]
@@ -522,8 +524,16 @@ def _recommended(
         slack = NO_WORSE * float(now.mean[0])
         least = fall <= slack if (fall <= slack).any() else fall <= fall.min() + slack
         possible = possible[least]
-    ranked = np.lexsort((*(-figures.take(possible).objectives.T), -goal.value(figures.take(possible))))
+    equal = _rounded(figures.take(possible))
+    ranked = np.lexsort((*(-equal.objectives.T), -goal.value(equal)))
     return int(possible[ranked[0]])
+
+
+def _rounded(figures: PlacementFigures) -> PlacementFigures:
+    """Figures of which equal ones compare as equal: symmetric machines have placements that rounding alone parts."""
+    unit = SAME * float(np.nanmax(figures.mean))
+    mean, spread, lowest = (np.round(v / unit) * unit for v in (figures.mean, figures.spread, figures.lowest))
+    return replace(figures, mean=mean, spread=spread, lowest=lowest)
 
 
 def _infeasible(search: _Search, placement: FloatArray) -> UnreachableError:
