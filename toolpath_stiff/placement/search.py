@@ -29,10 +29,10 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
 SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
-LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 6, 60, 120  # after each leg the few samples hear of what they missed
+LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 12, 60, 120  # after each leg the few samples hear of what they missed
 WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last generation
 # Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
-STARTS, FLOORED_STARTS, FINALISTS = (4, 1, 12, 3), 1, 3  # of each objective; the range has most hills
+STARTS, FLOORED_STARTS, FINALISTS = (4, 3, 12, 3), 2, 3  # of each objective; the range has most hills
 HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 6, 6
 APART = 0.1  # of each range, where they start
 BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
