@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.hints import both_names
 from toolpath_stiff.nc.geometry import arc_frame, move_lengths, points_along
@@ -128,7 +128,7 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
 
     def placed(pose: FloatArray) -> FloatArray:
         # Plain addition where nothing turns: a multiplication by the unit matrix would cost the last digit.
-        point = pose[:, :3] @ turn.T if at[3:].any() else pose[:, :3]
+        point = product(pose[:, :3], turn.T) if at[3:].any() else pose[:, :3]
         return np.concatenate([point + at[:3], pose[:, 3:]], axis=1)
 
     placed_moves = replace(moves, start=placed(moves.start), end=placed(moves.end))
@@ -137,8 +137,8 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
     arc = (moves.arc_sweep != 0.0)[:, None]
     return replace(
         placed_moves,
-        arc_center=np.where(arc, moves.arc_center @ turn.T + at[:3], 0.0),
-        arc_normal=moves.arc_normal @ turn.T,
+        arc_center=np.where(arc, product(moves.arc_center, turn.T) + at[:3], 0.0),
+        arc_normal=product(moves.arc_normal, turn.T),
     )
 
 
@@ -157,7 +157,7 @@ def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:
     if not angles[:2].any() and not abc.any():
         return abc  # a vertical platform never yaws
     turn, back = rotation_matrices(angles), rotation_about_z(-angles[2])
-    return roll_pitch_yaw(turn @ rotation_matrices(abc) @ back)
+    return roll_pitch_yaw(product(product(turn, rotation_matrices(abc)), back))
 
 
 # -- sampling ----------------------------------------------------------------------------------------------------------

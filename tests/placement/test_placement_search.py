@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.stats import qmc
 
 from toolpath_stiff.analysis import analyze, parse_load
 from toolpath_stiff.analysis.statistics import stiffness_figures
@@ -18,7 +22,8 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine import load_machine
 from toolpath_stiff.nc import parse_program, read_program
-from toolpath_stiff.placement.climb import Bounds, front_rows, thin
+from toolpath_stiff.placement import nothing_better_words
+from toolpath_stiff.placement.climb import Bounds, Climber, Goal, front_rows, thin
 from toolpath_stiff.placement.evaluator import Evaluator, Keepout, PlacementFigures
 from toolpath_stiff.placement.paths import placed_path, representative_path, work_path
 from toolpath_stiff.placement.search import SearchRules, search_placements
@@ -267,3 +272,76 @@ def test_effects_ask_no_pivoted_solve_and_the_figures_are_those_of_analyze(monke
     found = Evaluator(model, path, asked, 1000.0).figures(np.array([there]))
     for name, value in (("mean", found.mean), ("range", found.spread), ("min", found.lowest)):
         assert n_per_mm_from_n_per_m(value[0]) == pytest.approx(wanted[f"{name}_N_per_mm"], rel=1e-9)
+
+
+PRESENT = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
+WIDE = Bounds(np.array([-0.3, -0.3, 0.4, 0, 0, 0]), np.array([0.3, 0.3, 1.25, 0, 0, 2 * np.pi]))
+PLUNGES = Path(__file__).parent / "plunges.nc"  # of a referee: seven plunges, which leave the strut law first
+
+
+def wide_path(name: str):
+    program = (
+        parse_program(PLUNGES.read_text(), "plunges.nc", origin=PRESENT) if name == "plunges" else program_of(name)
+    )
+    return work_path(program, 4e-3, TANGENTIAL, PRESENT)
+
+
+def test_the_outermost_samples_of_all_cuts_stand_for_the_path():
+    path = wide_path("plunges")
+    few = representative_path(path, 120)
+    for rows, some in (
+        (path.headline, few.headline),
+        (path.cutting & ~path.headline, few.cutting & ~few.headline),
+        (~path.cutting, ~few.cutting),
+    ):
+        assert (few.position[some].max(axis=0) == path.position[rows].max(axis=0)).all()
+        assert (few.position[some].min(axis=0) == path.position[rows].min(axis=0)).all()
+    assert few.weight.sum() == pytest.approx(path.weight[path.headline].sum())
+
+
+def test_objectives_agree_on_one_front_and_its_ends_are_the_ends():
+    """Ends within 0.5 % of the best of 1,024 Sobol points with a local search on the whole path."""
+    path = wide_path("plunges")
+    present = np.array(PRESENT)
+    found = [
+        search_placements(MODEL, path, TANGENTIAL, WIDE, SearchRules(objective=name), present=present)
+        for name in ("balanced", "range")
+    ]
+    one, other = (result.figures.objectives.max(axis=0) for result in found)
+    assert (one == other).all() and len(found[0].front) >= 20
+    whole = Evaluator(MODEL, path, TANGENTIAL, 1000.0)
+    points = WIDE.placements(qmc.Sobol(4, seed=1).random(1024))
+    figures, rules = whole.figures(points), found[0].rules
+    for column, weights in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
+        goal = Goal(weights, np.full(3, -np.inf))
+        first = points[np.lexsort((-goal.value(figures), rules.violation(figures)))[:12]]
+        met = whole.figures(Climber(whole, WIDE, rules).climb(first, goal, 20))
+        best = float(met.objectives[rules.violation(met) == 0.0, column].max())
+        end = float(found[0].figures.objectives[:, column].max())
+        assert end >= best - 0.005 * abs(best)
+        assert end > found[0].present.objectives[0, column]  # the present placement is none of the ends
+
+
+def test_nothing_better_is_said_first_with_how_hard_it_was_looked_for():
+    """Within a tenth of a millimetre of the best placement by the mean alone nothing is better in it."""
+    program = program_of("drilling")
+    here = np.array(PRESENT)
+    path = work_path(program, 4e-3, TANGENTIAL, PRESENT)
+    best = search_placements(MODEL, path, TANGENTIAL, Bounds(here, here + np.array([0, 0, 0.3, 0, 0, 0])))
+    at = best.front[-1]
+    close = Bounds(at, at + np.array([0, 0, 1e-9, 0, 0, 0]))
+    found = search_placements(MODEL, path, TANGENTIAL, close, present=at)
+    assert found.alone and found.searches == 3
+    told = nothing_better_words({"searches": found.searches, "pose_evaluations": found.pose_evaluations})
+    assert f"3 searches from the beginning, {found.pose_evaluations} poses" in told
+
+
+def test_placement_json_is_the_same_on_another_processor(tmp_path):
+    """Symmetric machines have three equal placements: rounding must not choose."""
+    command = [sys.executable, "-W", "ignore", "-m", "toolpath_stiff", "place", str(ROOT / "programs/case_study.nc")]
+    command += ["--x=-200:200", "--y=-200:200", "--z", "400:1250", "--step", "5", "--no-plots"]
+    for core, off in (("Haswell", ""), ("Prescott", "AVX2 FMA3 AVX512F AVX512_SKX")):
+        environment = {**os.environ, "OPENBLAS_CORETYPE": core, "NPY_DISABLE_CPU_FEATURES": off}
+        subprocess.run([*command, "--out", core], cwd=tmp_path, env=environment, check=True, capture_output=True)
+    one, other = ((tmp_path / core / "placement.json").read_bytes() for core in ("Haswell", "Prescott"))
+    assert one == other

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.machine.kinematics import (
     Struts,
     joint_angles,
@@ -353,13 +353,13 @@ class Extremes:
         machine, position, turns = self.gauge.machine, self.position, self.rotation
         arms, frame = machine.platform_joints_for(self.tool), machine.frame_joints
         if turns is None:
-            return np.asarray(axes @ position + np.einsum("id,id->i", arms - frame, axes)[:, None])
+            return np.asarray(product(axes, position) + ((arms - frame) * axes).sum(axis=1)[:, None])
         if of_platform:  # the axes turn with the platform: (R a) . (R p + tip - b)
             local = (turns.reshape(3, 3, -1) * position[:, None]).sum(axis=0)
-            fixed = np.einsum("ic,id->icd", frame, axes).reshape(6, 9) @ turns
-            return np.asarray(axes @ local - fixed + np.einsum("id,id->i", axes, arms)[:, None])
-        turned = np.einsum("ic,id->icd", axes, arms).reshape(6, 9) @ turns
-        return np.asarray(axes @ position + turned - np.einsum("id,id->i", axes, frame)[:, None])
+            fixed = product((frame[:, :, None] * axes[:, None]).reshape(6, 9), turns)
+            return np.asarray(product(axes, local) - fixed + (axes * arms).sum(axis=1)[:, None])
+        turned = product((axes[:, :, None] * arms[:, None]).reshape(6, 9), turns)
+        return np.asarray(product(axes, position) + turned - (axes * frame).sum(axis=1)[:, None])
 
 
 def gauge_of(machine: Machine) -> Gauge:

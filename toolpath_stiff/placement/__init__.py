@@ -179,6 +179,8 @@ def place_program(task: Task, progress: Callable[[int, int], None] | None = None
         "recommended": found.best + 1,
         "rapids_left_out": [{"line": line, "reason": reason} for line, reason in found.rapids_left_out],
         "pose_evaluations": found.pose_evaluations,
+        "searches": found.searches,
+        "nothing_better": found.alone,
     }
     assert found.present is not None
     return _placed(task, rows, search, found.best + 1, found.present)
@@ -557,7 +559,8 @@ def placement_warnings(
         The analysis at the chosen placement.
     """
     picked = chosen["number"] != search["recommended"]
-    found = [_worse_words(one, picked) for one in worse]
+    found = [nothing_better_words(search)] if search.get("nothing_better") else []
+    found += [_worse_words(one, picked) for one in worse]
     if worse and not picked:
         found.append("no placement was found within the bounds that is as good as the present one in all three")
     if before is None:
@@ -575,6 +578,14 @@ def placement_warnings(
     if best.plunging[best.counted].all():
         found.append("the program only plunges along the tool axis: mean, range and weakest are those of plunges")
     return list(dict.fromkeys([*found, *best.warnings]))
+
+
+def nothing_better_words(search: dict[str, Any]) -> str:
+    """That the front is the present placement alone, and how hard another was looked for."""
+    return (
+        f"nothing better than the present placement was found within the bounds, in {search['searches']} searches from "
+        f"the beginning, {search['pose_evaluations']} poses evaluated"
+    )
 
 
 def _worse_words(one: dict[str, Any], picked: bool) -> str:

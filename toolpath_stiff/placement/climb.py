@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.placement.evaluator import Evaluator, PlacedRows, PlacementFigures
 
 DIFFERENCE = 1e-6  # of each range, for the derivatives
@@ -126,7 +126,7 @@ class Goal:
         if self.weights is None:
             value = (figures.objectives - self.floors).min(axis=1)
         else:
-            value = figures.objectives @ np.array(self.weights)
+            value = (figures.objectives * np.array(self.weights)).sum(axis=1)
         return np.asarray(np.where(np.isnan(value), -np.inf, value))
 
     def worsening(self, figures: PlacementFigures) -> FloatArray:
@@ -291,7 +291,7 @@ class Climber:
         k, g, scale = self._stiffness(rows, gradient)
         matrix, right = self._constraints(rows, gradient, k, g, scale, goal, region)
         cost = np.zeros(d + 4)
-        slope = g @ self._weight
+        slope = (g * self._weight).sum(axis=1)
         if goal.weights is None:
             cost[d + 2] = -1.0
         else:
@@ -350,8 +350,8 @@ class Climber:
         soft = (1.0, 0.0) if goal.weights is None else (0.0, -1.0)  # the common surplus t, or the slack
         if np.isfinite(scale):
             if np.isfinite(floors[0]):
-                mean = float(k @ self._weight) - floors[0]
-                blocks.append((-(g @ self._weight)[:, None], (0.0, 0.0, *soft), mean))
+                mean = float((k * self._weight).sum()) - floors[0]
+                blocks.append((-(g * self._weight).sum(axis=1)[:, None], (0.0, 0.0, *soft), mean))
             if np.isfinite(floors[1]):
                 blocks.append((NO_SLOPE, (-1.0, 1.0, *soft), -floors[1]))
             if np.isfinite(floors[2]):
@@ -453,16 +453,16 @@ def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
             break
         if pivot % 20 == 19:  # what the updates have rounded away
             held = np.take_along_axis(rows, working[:, None], axis=2)
-            inverse = np.linalg.inv(held[:, :n].swapaxes(1, 2))
-            state[:, :n, :n], state[:, :n, n] = inverse, -(inverse @ held[:, n, :, None])[..., 0]
-            state[:, n + 1, :n] = -(leaning[:, None] @ inverse)[:, 0]
+            inverse = _inverses(held[:, :n].swapaxes(1, 2))
+            state[:, :n, :n], state[:, :n, n] = inverse, -product(inverse, held[:, n, :, None])[..., 0]
+            state[:, n + 1, :n] = -product(leaning[:, None], inverse)[:, 0]
         each = np.arange(len(going))
-        broken = (state[:, None, : n + 1, n] @ rows)[:, 0]
+        broken = product(state[:, None, : n + 1, n], rows)[:, 0]
         worst = broken.argmax(axis=1)
         done = going & (broken[each, worst] <= TOLERANCE)
         for i in np.flatnonzero(done):
             found[number[i]] = state[i, :n, n].copy()
-        change = (rows[each, :, worst][:, None] @ state[:, : n + 1])[:, 0]
+        change = product(rows[each, :, worst][:, None], state[:, : n + 1])[:, 0]
         share = change[:, :n]
         ratio = np.full(share.shape, np.inf)
         np.divide(np.maximum(state[:, n + 1, :n], 0.0), share, out=ratio, where=share > TOLERANCE)
@@ -473,6 +473,21 @@ def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
         change[each, out] -= 1.0
         state -= column[:, :, None] * change[:, None]
     return found
+
+
+def _inverses(matrices: FloatArray) -> FloatArray:
+    """(k, n, n) inverses by elimination with pivots, the same to the last bit on every processor."""
+    k, n, _ = matrices.shape
+    table = np.concatenate([matrices, np.broadcast_to(np.eye(n), (k, n, n))], axis=2)
+    each = np.arange(k)
+    for column in range(n):
+        pivot = column + np.abs(table[:, column:, column]).argmax(axis=1)
+        table[each, column], table[each, pivot] = table[each, pivot], table[each, column]
+        table[:, column] /= table[:, column, column, None].copy()
+        share = table[:, :, column].copy()
+        share[:, column] = 0.0
+        table -= share[:, :, None] * table[:, None, column]
+    return table[:, :, n:]
 
 
 def _leaning(cost: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 
 from toolpath_stiff.analysis.loads import Load, geometric_directions
 from toolpath_stiff.analysis.poses import evaluate
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import gauge_of, reach
 from toolpath_stiff.placement.paths import WorkPath
@@ -111,7 +111,8 @@ class PlacedRows:
     def less(self, slopes: PlacedRows, step: FloatArray) -> PlacedRows:
         """These less what derivatives (d rows) make of a step (d,)."""
         with np.errstate(invalid="ignore"):
-            return PlacedRows(*(getattr(self, f.name) - step @ getattr(slopes, f.name) for f in fields(PlacedRows)))
+            changes = {f.name: product(step[None], getattr(slopes, f.name)) for f in fields(PlacedRows)}
+            return PlacedRows(**{name: getattr(self, name) - change for name, change in changes.items()})
 
 
 class Evaluator:
@@ -204,9 +205,9 @@ class Evaluator:
         high = values.max(axis=1, initial=-np.inf)
         outside = (rows.law[:, self.cuts] < 0.0).mean(axis=1) if path.cutting.any() else np.zeros(k)
         with np.errstate(divide="ignore", invalid="ignore"):
-            compliance = (1.0 / values) @ weight / length
+            compliance = (weight / values).sum(axis=1) / length
         return PlacementFigures(
-            mean=np.where(within, values @ weight / length, np.nan),
+            mean=np.where(within, (values * weight).sum(axis=1) / length, np.nan),
             spread=np.where(within, high - low, np.nan),
             lowest=np.where(within, low, np.nan),
             compliance=np.where(within, compliance, np.nan),
@@ -232,7 +233,7 @@ class Evaluator:
         if self.turned is None:
             if not placements[:, 3:5].any():
                 return None
-            one = turn @ rotation_about_z(-placements[:, 5])
+            one = product(turn, rotation_about_z(-placements[:, 5]))
             return np.repeat(one.reshape(k, 9).T[:, :, None], n, axis=2)
         found = np.empty((3, 3, k, n))
         first, second, found[:, 2] = (_turned(turn, self.turned[:, column]) for column in range(3))
@@ -312,7 +313,7 @@ class Evaluator:
 def _turned(turn: FloatArray, columns: FloatArray) -> FloatArray:
     """(3, k, n) the columns (3, n) turned by k rotations (k, 3, 3)."""
     k = len(turn)
-    return np.asarray(turn.swapaxes(0, 1).reshape(3 * k, 3) @ columns).reshape(3, k, -1)
+    return product(turn.swapaxes(0, 1).reshape(3 * k, 3), columns).reshape(3, k, -1)
 
 
 def _columns(those: BoolArray) -> IntArray | slice:

@@ -17,7 +17,7 @@ import numpy as np
 
 from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.analysis.poses import evaluate
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, Program
 from toolpath_stiff.path import Samples, place, place_orientations, sample_moves
@@ -76,7 +76,7 @@ class Anchored:
         """(k, q, 3) m, positions at k placements: turns (k, 3, 3) and program zeros (k, 3)."""
         ends = []
         for work, machine, follows in zip(self.work, self.machine, self.follows, strict=True):
-            moved = work @ np.swapaxes(turn, 1, 2) + zero[:, None]
+            moved = product(work, np.swapaxes(turn, 1, 2)) + zero[:, None]
             ends.append(np.where(follows, moved, machine))
         return np.asarray(ends[0] + self.u[:, None] * (ends[1] - ends[0]))
 
@@ -263,18 +263,29 @@ def _approach(ends: FloatArray, machine: FloatArray, follows: BoolArray, moves: 
 
 
 def representative_path(path: WorkPath, count: int) -> WorkPath:
-    """A path of `count` headline samples that stands for the whole, extremes first.
+    """A path of `count` headline samples that stands for the whole, and of the outermost samples of all cuts.
 
-    A quarter as many of the other samples, and of the anchored ones, stay for the limits.
+    A quarter as many of the other cuts, of the rapids and of the anchored ones stay for the limits.
     """
     if len(path) <= count:
         return path
     rows, weight = _spread(path, np.flatnonzero(path.headline), count)
-    others = _spread(path, np.flatnonzero(~path.headline), count // 4)[0]
-    few = path.take(np.concatenate([rows, others]))
+    beside = [path.cutting & ~path.headline, ~path.cutting]
+    others = [_spread(path, np.flatnonzero(those), count // 4)[0] for those in beside]
+    others += [_outermost(path.position, np.flatnonzero(those)) for those in (path.headline, *beside)]
+    further = np.setdiff1d(np.concatenate(others), rows)
+    few = path.take(np.concatenate([rows, further]))
     q = len(path.anchored)
     anchored = path.anchored.take(np.linspace(0, q - 1, min(q, count // 4)).astype(np.int64))
-    return replace(few, weight=np.concatenate([weight, np.zeros(len(others))]), anchored=anchored)
+    return replace(few, weight=np.concatenate([weight, np.zeros(len(further))]), anchored=anchored)
+
+
+def _outermost(position: FloatArray, rows: IntArray) -> IntArray:
+    """Those of the rows that lie furthest in one of 26 directions: along the axes and halfway between them."""
+    if not len(rows):
+        return rows
+    directions = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
+    return np.asarray(rows[np.unique(product(position[rows], directions.T).argmax(axis=0))])
 
 
 def with_rows(few: WorkPath, whole: WorkPath, rows: IntArray) -> WorkPath:
@@ -310,7 +321,7 @@ def _spread(path: WorkPath, rows: IntArray, count: int) -> tuple[IntArray, Float
     distance, nearest = np.full(len(rows), np.inf), np.zeros(len(rows), dtype=np.int64)
     for i in range(count):
         step = features - features[chosen[-1]]
-        apart = np.einsum("ij,ij->i", step, step)
+        apart = (step * step).sum(axis=1)
         closer = apart < distance
         distance[closer], nearest[closer] = apart[closer], i
         if i + 1 < count:

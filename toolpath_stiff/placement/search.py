@@ -7,7 +7,7 @@ and the recommendation on the whole path. Every figure that is returned was comp
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,20 +29,26 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
 SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
-GENERATIONS, CHILDREN, ARCHIVE = 36, 60, 120
+LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 12, 60, 120  # after each leg the few samples hear of what they missed
 WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last generation
 # Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
-STARTS, FINALISTS, END_FINALISTS = 6, 4, 2
-HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 10, 6
+STARTS, FLOORED_STARTS, FINALISTS = (4, 3, 12, 3), 2, 3  # of each objective; the range has most hills
+HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 6, 6
 APART = 0.1  # of each range, where they start
 BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
 FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
 SCOUTS_AT_A_TIME = 50  # until one keeps an anchored rapid within reach
 SHORT = 3000  # samples of a path that is climbed on as a whole; of a longer one, on what stands for it
 ROUNDS, STRETCHES = 2, 120  # of that: how often it is told anew, and stretches whose extremes join it
+HEEDED = 4  # stretches whose extremes join the few samples, for each placement that these are held against
+EXCHANGES = 4  # at most, until the samples that stand for the path miss nothing at the finalists
+MISSED = 1e-3  # of the mean: a figure that they put so much too high is missed
+SEARCHES = 3  # with other seeds, while nothing but the present placement is found
 WHOLE_POSES = 2_000_000  # about, of the whole path to which the front's candidates are thinned
 NO_WORSE = 1e-9  # of the mean: what rounding does to a figure that stays as it was
+SAME = 1e-7  # of the mean: figures that differ by less count as equal; the order of the coordinates decides
 NO_FLOORS = np.full(3, -np.inf)
+ENDS = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
 
 
 @dataclass(frozen=True)
@@ -93,6 +99,10 @@ class PlacementResult:
         (line, what it breaks) of rapids that no placement within the bounds keeps within reach.
     pose_evaluations
         Poses that the search evaluated.
+    searches
+        Searches from the beginning, each with a seed of its own.
+    alone
+        Whether the front is the present placement alone, in spite of all of them.
     """
 
     front: FloatArray
@@ -102,6 +112,8 @@ class PlacementResult:
     rules: Rules
     rapids_left_out: tuple[tuple[int, str], ...] = ()
     pose_evaluations: int = 0
+    searches: int = 1
+    alone: bool = False
 
     @property
     def best_figures(self) -> PlacementFigures:
@@ -119,8 +131,10 @@ class _Search:
     force: float
     bounds: Bounds
     asked: SearchRules
+    present: FloatArray | None = None  # where it is within reach
     evaluators: dict[str, Evaluator] = field(default_factory=dict)
     rules: Rules = field(default_factory=Rules)
+    heeded: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def sampled(self, path: WorkPath) -> None:
         """Evaluators of a path."""
@@ -133,6 +147,19 @@ class _Search:
             for count in (POLISH_SAMPLES, SCOUT_SAMPLES)
         )
         self.evaluators = {"whole": whole, "middle": middle, "few": few}
+        self.heeded = np.zeros(0, dtype=np.int64)
+
+    def heed(self, placements: FloatArray) -> None:
+        """Add to the samples that stand for the path those that decide on the whole of it at some placements."""
+        whole = self.evaluators["whole"]
+        deciding = [whole.deciding_rows(placement, HEEDED) for placement in placements]
+        rows = np.setdiff1d(np.concatenate([self.heeded[:0], *deciding]), self.heeded)
+        self.heeded = np.concatenate([self.heeded, rows])
+        for name in ("middle", "few"):
+            before = self.evaluators[name]
+            if before is not whole:
+                self.evaluators[name] = self.evaluator(with_rows(before.path, self.path, rows))
+                self.evaluators[name].poses = before.poses
 
     def evaluator(self, path: WorkPath) -> Evaluator:
         """An evaluator of a part of the path."""
@@ -143,7 +170,14 @@ class _Search:
         return sum(evaluator.poses for evaluator in set(self.evaluators.values()))
 
     def climber(self, name: str) -> Climber:
-        return Climber(self.evaluators[name], self.bounds, self.rules)
+        return Climber(self.evaluators[name], self.bounds, self.rules_for(name))
+
+    def rules_for(self, name: str) -> Rules:
+        """The rules as some samples see them: of those that stand for the path another share is outside the law."""
+        if name == "whole" or self.present is None or not 0.0 < self.rules.extrapolated < np.inf:
+            return self.rules
+        now = self.evaluators[name].figures(self.present[None])
+        return replace(self.rules, extrapolated=float(now.extrapolated[0]))
 
     def kept(self, figures: PlacementFigures) -> BoolArray:
         return np.asarray(self.rules.violation(figures) == 0.0)
@@ -184,28 +218,47 @@ def search_placements(
     if asked.objective not in defaults.OBJECTIVES:
         raise InputError(f"objective {asked.objective!r}", expected=f"one of {', '.join(defaults.OBJECTIVES)}")
     report = progress or (lambda done, total: None)
-    rng = np.random.default_rng(asked.seed)
     search = _Search(model, path, load, force, bounds, asked, rules=Rules(asked.margin))
     search.sampled(path)
     now = None if present is None else search.evaluators["whole"].figures(present[None])
+    if now is not None and now.margin[0] >= 0.0:
+        search.present = present
+    start = present if present is not None and bounds.holds(present) else None
+    rapids_left_out: tuple[tuple[int, str], ...] = ()
+    for searches in range(1, SEARCHES + 1):
+        rng = np.random.default_rng(asked.seed + searches - 1)
+        candidates, left_out = _searched(search, rng, start, now, report)
+        rapids_left_out += left_out
+        found = _result(search, candidates, now, rapids_left_out)
+        gain = found.figures.objectives - (NO_FLOORS if now is None or start is None else now.objectives)
+        alone = bool(len(bounds.free) and len(gain) == 1 and (np.abs(gain) <= SAME * found.figures.mean[0]).all())
+        if not alone or searches == SEARCHES:
+            break
+    report(4, 4)
+    return replace(found, searches=searches, alone=alone)
+
+
+def _searched(
+    search: _Search,
+    rng: np.random.Generator,
+    start: FloatArray | None,
+    now: PlacementFigures | None,
+    report: Callable[[int, int], None],
+) -> tuple[FloatArray, tuple[tuple[int, str], ...]]:
+    """Candidates for the front (k, 6), the present placement first where it may be one; rapids that were left out."""
+    bounds = search.bounds
+    present = np.zeros((0, 6)) if start is None else start[None]
     unit = rng.uniform(size=(max(SCOUTS * len(bounds.free), 1), len(bounds.free)))
-    scouts = bounds.placements(unit)
-    held = present is not None and bounds.holds(present)
-    if present is not None and held:
-        scouts = np.vstack([present, scouts])
+    scouts = np.vstack([present, bounds.placements(unit)])
     known, rapids_left_out = _let_go(search, scouts)
-    search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, known, now))
+    allowed = _extrapolation_allowed(search, scouts, known, now)
+    search.rules = replace(search.rules, extrapolated=allowed)
     report(1, 4)
     archive, figures = _evolved(search, scouts, known, rng)
     report(2, 4)
     ends = _climbed(search, np.vstack([archive, scouts]), PlacementFigures.joined([figures, known]), now)
     report(3, 4)
-    candidates = np.vstack(
-        [_for_the_front(search, archive), ends] + ([present[None]] if present is not None and held else [])
-    )
-    found = _result(search, candidates, now, rapids_left_out)
-    report(4, 4)
-    return found
+    return np.vstack([present, _for_the_front(search, archive), ends]), rapids_left_out
 
 
 def _for_the_front(search: _Search, candidates: FloatArray) -> FloatArray:
@@ -214,7 +267,7 @@ def _for_the_front(search: _Search, candidates: FloatArray) -> FloatArray:
     if len(candidates) <= most:
         return candidates
     figures = search.evaluators["middle"].figures(candidates)
-    rows = front_rows(figures, search.kept(figures))
+    rows = front_rows(figures, search.rules_for("middle").violation(figures) == 0.0)
     return candidates[thin(figures.take(rows).objectives, rows, most) if len(rows) else slice(0, most)]
 
 
@@ -222,11 +275,12 @@ def _result(
     search: _Search, candidates: FloatArray, now: PlacementFigures | None, rapids_left_out: tuple[tuple[int, str], ...]
 ) -> PlacementResult:
     """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
+    candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]  # of equals the first stands
     figures = search.evaluators["whole"].figures(candidates)
     if not search.kept(figures).any():
         raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
     best = _recommended(search, candidates, figures, now)
-    rows = front_rows(figures, search.kept(figures))
+    rows = front_rows(_rounded(figures), search.kept(figures))
     if best not in rows:  # equal to another in all three
         rows = np.append(rows, best)
     rows = rows[np.argsort(figures.mean[rows], kind="stable")]
@@ -331,17 +385,19 @@ def _evolved(
     and along the difference of two others, as differential evolution does; what is dominated goes, and so does what is
     crowded.
     """
-    few, bounds = search.evaluators["few"], search.bounds
+    bounds = search.bounds
     archive, figures = _survivors(search, scouts, known)
-    if not len(bounds.free):
-        return archive, figures
-    for spread in np.geomspace(WIDE, NARROW, GENERATIONS):
+    spreads = np.geomspace(WIDE, NARROW, LEGS * GENERATIONS) if len(bounds.free) else np.zeros(0)
+    for generation, spread in enumerate(spreads):
+        if generation % GENERATIONS == 0:
+            search.heed(np.vstack([archive[_ranked(search, goal, figures)[:1]] for goal in ENDS]))
+            archive, figures = _survivors(search, archive, search.evaluators["few"].figures(archive))
         parents, one, other = (bounds.unit(archive[rng.integers(len(archive), size=CHILDREN)]) for _ in range(3))
         step = spread * rng.normal(size=parents.shape) * (rng.uniform(size=parents.shape) < 0.7)
         along = np.where(rng.uniform(size=(CHILDREN, 1)) < 0.5, 0.5, 0.0)
         children = bounds.placements(parents + step + along * (one - other))
-        found = PlacementFigures.joined([figures, few.figures(children)])
-        archive, figures = _survivors(search, np.vstack([archive, children]), found)
+        met = PlacementFigures.joined([figures, search.evaluators["few"].figures(children)])
+        archive, figures = _survivors(search, np.vstack([archive, children]), met)
     return archive, figures
 
 
@@ -349,7 +405,7 @@ def _survivors(
     search: _Search, placements: FloatArray, figures: PlacementFigures
 ) -> tuple[FloatArray, PlacementFigures]:
     """What nothing dominates, thinned; where too little keeps the rules, the nearest to keeping them as well."""
-    violation = search.rules.violation(figures)
+    violation = search.rules_for("few").violation(figures)
     rows = front_rows(figures, violation == 0.0)
     rows = thin(figures.take(rows).objectives, rows, ARCHIVE) if len(rows) else rows
     if len(rows) < CHILDREN // 3:
@@ -361,31 +417,41 @@ def _survivors(
 def _climbed(
     search: _Search, candidates: FloatArray, figures: PlacementFigures, now: PlacementFigures | None
 ) -> FloatArray:
-    """The recommendation and the ends of the front, climbed to from several candidates with figures on few samples."""
-    held = now is not None and bool(now.margin[0] >= 0.0)
-    floors = now.objectives[0] if now is not None and held else NO_FLOORS
-    goal = Goal(defaults.OBJECTIVES[search.asked.objective], floors)
-    ends = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
-    found = _climbed_to(search, candidates, figures, [goal, *ends])
-    if held and goal.worsening(search.evaluators["whole"].figures(found[0])).min() > 0.0:
-        found[1:1] = _climbed_to(search, candidates, figures, [Goal(None, floors)])
+    """The ends of the front and what each objective recommends, climbed to from candidates with figures on few samples.
+
+    Whichever objective is asked for, all are climbed to: no answer may be beaten by the end of another one's front.
+    """
+    found = _climbed_to(search, candidates, figures, ENDS, STARTS)
+    if now is not None and search.present is not None:
+        floors = now.objectives[0]
+        whole = search.evaluators["whole"]
+        below = [goal for goal, ends in zip(ENDS, found, strict=True) if _falls(whole, ends, floors)]
+        if below:
+            goals = [Goal(goal.weights, floors) for goal in below]
+            found += _climbed_to(search, candidates, figures, goals, [FLOORED_STARTS] * len(goals))
+            if _falls(whole, np.vstack(found), floors):
+                found += _climbed_to(search, candidates, figures, [Goal(None, floors)], STARTS[:1])
     return np.vstack(found)
 
 
+def _falls(whole: Evaluator, placements: FloatArray, floors: FloatArray) -> bool:
+    """Whether each of some placements is worse in something than the floors."""
+    return bool((Goal(ENDS[0].weights, floors).worsening(whole.figures(placements)) > 0.0).all())
+
+
 def _climbed_to(
-    search: _Search, candidates: FloatArray, figures: PlacementFigures, goals: list[Goal]
+    search: _Search, candidates: FloatArray, figures: PlacementFigures, goals: list[Goal], starts: Sequence[int]
 ) -> list[FloatArray]:
     """Where climbs from the best candidates to each goal end: many on few samples, few on more, one on the whole path.
 
     `figures` are those of the candidates on few samples. There are several hills, and a slope that few samples show is
-    not always the whole path's. The first goal, the recommendation, is worth more climbs than the others, the ends of
-    the front. All climb together, each to its own goal.
+    not always the whole path's. All climb together, each to its own goal.
     """
-    few, middle, whole = (search.climber(name) for name in ("few", "middle", "whole"))
+    few, whole = search.climber("few"), search.evaluators["whole"]
     free = len(search.bounds.free)
-    starts, finalists = [STARTS * free, *[free] * len(goals[1:])], [FINALISTS, *[END_FINALISTS] * len(goals[1:])]
     found = [
-        _best_apart(search, candidates, figures, goal, count, APART) for goal, count in zip(goals, starts, strict=True)
+        _best_apart(search, candidates, figures, goal, count * free, APART)
+        for goal, count in zip(goals, starts, strict=True)
     ]
     for _ in range(HEATS):  # the better half of the climbs, those up the same hill counted once, goes on
         climbed = _together(few, found, goals, CLIMB_STEPS)
@@ -394,17 +460,32 @@ def _climbed_to(
         found = [
             _best_apart(search, climbed[i], known.take(slice(ends[i], ends[i + 1])), goal, count, BASIN)
             for i, goal in enumerate(goals)
-            for count in (max((len(climbed[i]) + 1) // 2, finalists[i]),)
+            for count in (max((len(climbed[i]) + 1) // 2, FINALISTS),)
         ]
-    if middle.evaluator is not few.evaluator:
-        some = [placements[:count] for placements, count in zip(found, finalists, strict=True)]
-        found = _together(middle, some, goals, POLISH_STEPS)
+    found = [placements[:FINALISTS] for placements in found]
+    if search.evaluators["middle"] is not whole:
+        found = _exchanged(search, found, goals)
     best = [
-        placements[_ranked(search, goal, whole.evaluator.figures(placements))[0]]
+        placements[_ranked(search, goal, whole.figures(placements))[0]]
         for placements, goal in zip(found, goals, strict=True)
     ]
     last = _finished(search, best, goals)
     return [np.vstack(pair) for pair in zip(found, last, strict=True)]
+
+
+def _exchanged(search: _Search, found: list[FloatArray], goals: list[Goal]) -> list[FloatArray]:
+    """Where climbs on more samples end, to which what decides at their ends is added until they miss nothing there."""
+    whole = search.evaluators["whole"]
+    for _ in range(EXCHANGES):
+        search.heed(np.vstack([placements[:1] for placements in found]))
+        climber = search.climber("middle")
+        found = _together(climber, found, goals, POLISH_STEPS)
+        tops = np.vstack([placements[:1] for placements in found])
+        seen, true = climber.evaluator.figures(tops), whole.figures(tops)
+        missed = (seen.objectives - true.objectives > MISSED * true.mean[:, None]).any(axis=1) | ~search.kept(true)
+        if not missed.any():
+            break
+    return found
 
 
 def _together(climber: Climber, first: list[FloatArray], goals: list[Goal], steps: int) -> list[FloatArray]:
@@ -463,8 +544,16 @@ def _recommended(
         slack = NO_WORSE * float(now.mean[0])
         least = fall <= slack if (fall <= slack).any() else fall <= fall.min() + slack
         possible = possible[least]
-    ranked = np.lexsort((*(-figures.take(possible).objectives.T), -goal.value(figures.take(possible))))
+    equal = _rounded(figures.take(possible))
+    ranked = np.lexsort((*(-equal.objectives.T), -goal.value(equal)))
     return int(possible[ranked[0]])
+
+
+def _rounded(figures: PlacementFigures) -> PlacementFigures:
+    """Figures of which equal ones compare as equal: symmetric machines have placements that rounding alone parts."""
+    unit = SAME * float(np.nanmax(figures.mean))
+    mean, spread, lowest = (np.round(v / unit) * unit for v in (figures.mean, figures.spread, figures.lowest))
+    return replace(figures, mean=mean, spread=spread, lowest=lowest)
 
 
 def _infeasible(search: _Search, placement: FloatArray) -> UnreachableError:

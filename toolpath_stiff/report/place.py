@@ -168,7 +168,7 @@ def _note(path: DrawnPath) -> str:
 def text(summary: dict[str, Any]) -> str:
     """What got worse, the placement, what it brings, what it costs; `summary` as in `placement.json`."""
     best, before = summary["chosen"], summary["before"]
-    first = len(summary["worse"])
+    first = len(summary["worse"]) + bool(summary["search"].get("nothing_better"))
     which = f"placement {best['number']} of {len(summary['front'])}, picked" if summary["picked"] else "recommended"
     lines = [
         *(f"warning         {text}" for text in summary["warnings"][:first]),

@@ -396,7 +396,7 @@ def _inverse_columns(matrix: FloatArray, out: FloatArray, spare: FloatArray) -> 
             np.multiply(matrix[NEXT[c], NEXT[k]], matrix[LAST[c], LAST[k]], out=out[c, k])
             np.multiply(matrix[LAST[c], NEXT[k]], matrix[NEXT[c], LAST[k]], out=spare[c, k])
     out -= spare
-    determinant = np.einsum("cm,cm->m", matrix[:, 0], out[:, 0])
+    determinant = (matrix[:, 0] * out[:, 0]).sum(axis=0)
     out /= determinant
     return np.asarray(determinant)
 
