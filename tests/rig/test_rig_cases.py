@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from tests.conftest import seeds
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig import CATALOGUE, OUTSIDE, Nuisances, csv_text, draw_case, effects_of_layout, make_case
 from toolpath_stiff.rig.case import clamp_of, rows_of
@@ -67,7 +68,7 @@ def test_every_effect_shows_at_the_size_asked_for(name):
 
 
 def test_blind_sizes_reach_from_just_detectable_to_30_percent():
-    found = [make_case(seed, "paper", "table_compliance")[1]["effects"][0] for seed in range(60)]
+    found = [make_case(seed, "paper", "table_compliance")[1]["effects"][0] for seed in seeds(0, 60)]
     sizes, seen = (np.array([effect[key] for effect in found]) for key in ("size", "detectability"))
     assert sizes.max() <= 0.30 * 1.03
     assert sizes.max() > 0.2
@@ -85,7 +86,7 @@ def test_a_strength_that_grows_faster_than_in_proportion_still_ends_at_30_percen
 def test_two_effects_and_blind_draws():
     _, truth = make_case(11, "tilted", "two")
     assert len(set(truth["hidden"])) == 2
-    kinds = [make_case(seed, "paper")[1]["kind"] for seed in range(20)]
+    kinds = [make_case(seed, "paper")[1]["kind"] for seed in seeds(0, 20)]
     assert set(kinds) == {"none", "one", "two", "outside"}
 
 
@@ -128,7 +129,7 @@ def test_whitened_length_against_the_dense_covariance():
 
 
 def test_strut_spread_and_joint_errors_over_many_machines():
-    cases = [draw_case(seed, "paper", "none") for seed in range(150)]
+    cases = [draw_case(seed, "paper", "none") for seed in seeds(0, 150)]
     factors = np.array([case.machine.strut_factors for case in cases])
     errors = np.array([case.machine.frame_errors for case in cases])
     # Three sampling errors of a standard deviation, 1 / sqrt(2 m).
@@ -139,7 +140,9 @@ def test_strut_spread_and_joint_errors_over_many_machines():
 def test_readings_scatter_about_the_model_as_the_nuisances_say():
     """Whole cases: variance of ln k over seeds is repeat, outliers, clamping and strut spread together."""
     exact = make_case(0, "paper", "none", nuisances=Nuisances.none())[0]["stiffness_N_per_mm"]
-    logs = np.array([np.log(make_case(seed, "paper", "none")[0]["stiffness_N_per_mm"] / exact) for seed in range(200)])
+    logs = np.array(
+        [np.log(make_case(seed, "paper", "none")[0]["stiffness_N_per_mm"] / exact) for seed in seeds(0, 200)]
+    )
     # Strut spread reaches the tip as 1 % times the root of the summed squared energy shares: between 1/sqrt(6) and 1.
     own = 0.02**2 * (0.98 + 0.02 * 16.0) + 0.01**2
     low, high = own + 0.01**2 / 6.0, own + 0.01**2

@@ -36,7 +36,6 @@ FloatArray = NDArray[np.float64]
 COUNT = 24
 DIRECTION = oblique_directions(COUNT, seed=3)
 SHARED = np.random.default_rng(8).normal(size=(COUNT, 3)) * 0.01  # scatter that readings have in common
-SCATTER = correlated_covariance(np.full(COUNT, 0.02**2), SHARED)
 COVARIANCE = np.diag(np.full(COUNT, 0.02**2)) + SHARED @ SHARED.T
 
 
@@ -46,16 +45,17 @@ def logs_by_hand(first: float = 0.0, second: float = 0.0, joint: float = 0.0, ta
 
 
 def scatter(seed: int) -> FloatArray:
-    return np.random.default_rng(seed).multivariate_normal(np.zeros(COUNT), COVARIANCE)
+    return np.random.default_rng(seed).multivariate_normal(np.zeros(COUNT), COVARIANCE, method="cholesky")
 
 
-def by_hand(logs: FloatArray, outliers: float = 0.0) -> Problem:
-    """The problem of explaining readings (24,) of ln k."""
+def by_hand(logs: FloatArray, outliers: float = 0.0, scale: float = 1.0) -> Problem:
+    """The problem of explaining readings (24,) of ln k; `scale`: of the scatter that it reckons with."""
     from toolpath_stiff.updating.inference.noise import Scatter
     from toolpath_stiff.updating.inference.prediction import Predictor
 
     predictor = Predictor(orthogonal_hexapod(), readings_by_hand(np.exp(logs), direction=DIRECTION))
-    return Problem(predictor, Scatter.of(simple_noise(COUNT, 0.02, outliers=outliers), SCATTER))
+    spread = correlated_covariance(np.full(COUNT, (scale * 0.02) ** 2), scale * SHARED)
+    return Problem(predictor, Scatter.of(simple_noise(COUNT, scale * 0.02, outliers=outliers), spread))
 
 
 def table_of(problem: Problem, name: str) -> Table:

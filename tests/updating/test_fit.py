@@ -44,7 +44,9 @@ def logs_with(*effects: ActiveEffect, law=(0.0, 0.0), seed: int | None = None) -
     """What the model with these effects shows, scattered as the noise model says."""
     logs = MODEL.log_stiffness(law, effects)
     if seed is not None:
-        logs = logs + np.random.default_rng(seed).multivariate_normal(np.zeros(len(logs)), COVARIANCE)
+        logs = logs + np.random.default_rng(seed).multivariate_normal(
+            np.zeros(len(logs)), COVARIANCE, method="cholesky"
+        )
     return logs
 
 

@@ -63,7 +63,7 @@ def null_logs(seed: int) -> FloatArray:
     """Ln k of a campaign to which the noise model applies exactly."""
     problem, spread, _ = setting()
     return problem.predictor.log_stiffness() + np.random.default_rng([seed, 77]).multivariate_normal(
-        np.zeros(N), spread
+        np.zeros(N), spread, method="cholesky"
     )
 
 
@@ -132,7 +132,10 @@ def test_a_reading_set_aside_is_as_if_it_had_never_been_taken():
     """Against the pulls of the readings that stay, their own sub-matrix inverted."""
     problem, spread, _ = setting()
     law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
-    projected, residual = problem.projected(law), np.random.default_rng(1).multivariate_normal(np.zeros(N), spread)
+    projected, residual = (
+        problem.projected(law),
+        np.random.default_rng(1).multivariate_normal(np.zeros(N), spread, method="cholesky"),
+    )
     residual[9] += 0.12  # six standard deviations
     found = set_wild_aside(projected.times(residual[None]), projected)
     out = found.pulls

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
 from toolpath_stiff.updating.diagnosis import common_verdict
@@ -31,7 +32,7 @@ from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_g
 from toolpath_stiff.updating.inference.noise import Scatter, covariance
 
 STRONG = 0.1
-SEEDS = tuple(range(100, 104))
+SEEDS = seeds(100, 104)
 
 
 def naive_gate(seed: int) -> float:
@@ -62,7 +63,7 @@ def test_where_nothing_is_hidden_nothing_is_found():
 
 
 def test_a_sparse_campaign_without_anything_hidden_is_adequate_too():
-    verdicts = [judged(seed, "paper").verdict for seed in range(100, 108)]
+    verdicts = [judged(seed, "paper").verdict for seed in seeds(100, 108)]
     assert verdicts.count("adequate") >= 5  # of 8 at 90 %: fewer once in 200 times
 
 
