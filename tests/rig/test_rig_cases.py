@@ -86,7 +86,8 @@ def test_a_strength_that_grows_faster_than_in_proportion_still_ends_at_30_percen
 def test_two_effects_and_blind_draws():
     _, truth = make_case(11, "tilted", "two")
     assert len(set(truth["hidden"])) == 2
-    kinds = [make_case(seed, "paper")[1]["kind"] for seed in seeds(0, 20)]
+    # The rarest, 15 %, is not among 60 once in 17,000 times.
+    kinds = [make_case(seed, "paper")[1]["kind"] for seed in seeds(0, 60)]
     assert set(kinds) == {"none", "one", "two", "outside"}
 
 

@@ -10,6 +10,7 @@ import pytest
 from openpyxl import Workbook
 
 import toolpath_stiff as tps
+from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, InputErrors
@@ -151,7 +152,7 @@ def bench(stiffness, *, soft: float = 1.0, forces=FORCES, heading: str = "strut,
     return "\n".join(lines) + "\n"
 
 
-SCATTER = 0.003 * np.random.default_rng(4).standard_normal((4, len(DATES)))
+SCATTER = 0.003 * as_written(4).standard_normal((4, len(DATES)))
 
 
 def weakened(strut: int, i: int) -> float:

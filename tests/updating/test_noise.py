@@ -74,7 +74,9 @@ def test_no_clamping_is_found_where_there_is_none():
 def test_wild_readings_and_a_drift_are_not_taken_for_noise():
     calm = mean_of_estimates(count=20)
     repeat, clamping, _ = mean_of_estimates(count=20, wild=2)
-    assert repeat < 1.25 * calm[0] and clamping < 1.35 * calm[1]
+    # Taken for noise they would make it 2.5 times as large. Where both are of one point they cannot all be told: 1.3
+    # times on the average of 120 campaigns, and 20 of them have a sampling error of 5 % of that; four of them.
+    assert repeat < 1.5 * calm[0] and clamping < 1.35 * calm[1]
     # 2 um in all, on deflections of 12 to 50 um: 4 to 16 %, half of it between repeats.
     drifting = mean_of_estimates(count=20, drift=2e-8)
     assert drifting[:2] == pytest.approx(calm[:2], rel=0.10)
