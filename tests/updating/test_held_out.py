@@ -81,7 +81,7 @@ def test_more_parameters_look_better_fitted_than_held_out():
         assert weighed[1] <= weighed[0] + 0.1
         before, after = held_out(base, data.point), held_out(more, data.point)
         better.append(gain_in_standard_errors(before, after))
-    assert np.mean(np.array(better) > 1.0) <= 0.4
+    assert sum(np.array(better) > 1.0) <= 4  # by chance one in six: 5 of 6 once in 2,000 times
 
 
 def test_products_of_what_stays_are_those_of_its_own_covariance():

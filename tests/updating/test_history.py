@@ -42,8 +42,8 @@ def changes(found):
 
 
 def test_quiet_series_raise_few_alarms():
-    """5 %, all struts and places counted: of 60 sets 8 or more would come once in 90 times."""
-    assert sum(bool(changes(series(seed, dates=8, struts=3)[0])) for seed in range(60)) <= 7
+    """5 %, all struts and places counted: of 60 sets 12 or more would come once in 18,000 times."""
+    assert sum(bool(changes(series(seed, dates=8, struts=3)[0])) for seed in range(60)) <= 11
 
 
 def test_a_step_is_found_where_it_is():

@@ -50,10 +50,10 @@ def naive_gate(seed: int) -> float:
 
 
 def test_where_nothing_is_hidden_nothing_is_found():
-    """4 dense campaigns; 10 % of false alarms make more than 1 of 4 once in 19 times. The benchmark draws hundreds."""
+    """4 dense campaigns; 10 % of false alarms make more than 2 of 4 once in 270 times. The benchmark draws hundreds."""
     alarms = [judged(seed).verdict != "adequate" for seed in SEEDS]
-    assert binom.sf(1, len(SEEDS), 0.10) < 0.053
-    assert sum(alarms) <= 1
+    assert binom.sf(2, len(SEEDS), 0.10) < 0.004
+    assert sum(alarms) <= 2
     for seed in SEEDS:
         if judged(seed).verdict == "adequate":
             assert NONE in judged(seed).plausible
@@ -64,7 +64,7 @@ def test_where_nothing_is_hidden_nothing_is_found():
 
 def test_a_sparse_campaign_without_anything_hidden_is_adequate_too():
     verdicts = [judged(seed, "paper").verdict for seed in seeds(100, 108)]
-    assert verdicts.count("adequate") >= 5  # of 8 at 90 %: fewer once in 200 times
+    assert verdicts.count("adequate") >= 4  # of 8 at 90 %: fewer once in 2,300 times
 
 
 @pytest.mark.parametrize(
