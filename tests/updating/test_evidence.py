@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
 from scipy.special import logsumexp
 
+from tests.conftest import as_written
 from tests.stiffness.cases import nist, orthogonal_hexapod
 from tests.updating.cases import (
     campaign,
@@ -35,7 +36,7 @@ FloatArray = NDArray[np.float64]
 
 COUNT = 24
 DIRECTION = oblique_directions(COUNT, seed=3)
-SHARED = np.random.default_rng(8).normal(size=(COUNT, 3)) * 0.01  # scatter that readings have in common
+SHARED = as_written(8).normal(size=(COUNT, 3)) * 0.01  # scatter that readings have in common
 COVARIANCE = np.diag(np.full(COUNT, 0.02**2)) + SHARED @ SHARED.T
 
 
