@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -29,6 +30,25 @@ if TYPE_CHECKING:
 # 50 examples unless a test asks for more.
 settings.register_profile("suite", deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("suite")
+
+# `TPS_TEST_SEED=3 pytest ...`: what tests draw comes from another stream than the seed that they write. What the tool
+# draws stays; campaigns of the rig are named by their seed, those that are only counted by `seeds`.
+# An example, of which more is said than holds for most draws, keeps its stream by `as_written`.
+SEED = int(os.environ.get("TPS_TEST_SEED", "0"))
+as_written = np.random.default_rng
+if SEED:
+
+    def another_stream(seed: int | list[int] | None = None) -> np.random.Generator:
+        drawn_by_test = sys._getframe(1).f_globals["__name__"].startswith("tests.")
+        return as_written([*np.atleast_1d(seed).tolist(), SEED] if drawn_by_test else seed)
+
+    np.random.default_rng = another_stream
+
+
+def seeds(start: int, stop: int) -> range:
+    """Of campaigns that a test only counts."""
+    return range(start + 100_000 * SEED, stop + 100_000 * SEED)
+
 
 # Whatever the environment says, compiled modules are kept: without them each process that a test starts compiles the
 # whole package again, 0.6 s, and each run rewrites the asserts of 200 modules, 10 s. It holds for collecting only, so

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from tests.conftest import seeds
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig import CATALOGUE, OUTSIDE, Nuisances, csv_text, draw_case, effects_of_layout, make_case
 from toolpath_stiff.rig.case import clamp_of, rows_of
@@ -67,7 +68,7 @@ def test_every_effect_shows_at_the_size_asked_for(name):
 
 
 def test_blind_sizes_reach_from_just_detectable_to_30_percent():
-    found = [make_case(seed, "paper", "table_compliance")[1]["effects"][0] for seed in range(60)]
+    found = [make_case(seed, "paper", "table_compliance")[1]["effects"][0] for seed in seeds(0, 60)]
     sizes, seen = (np.array([effect[key] for effect in found]) for key in ("size", "detectability"))
     assert sizes.max() <= 0.30 * 1.03
     assert sizes.max() > 0.2
@@ -85,7 +86,8 @@ def test_a_strength_that_grows_faster_than_in_proportion_still_ends_at_30_percen
 def test_two_effects_and_blind_draws():
     _, truth = make_case(11, "tilted", "two")
     assert len(set(truth["hidden"])) == 2
-    kinds = [make_case(seed, "paper")[1]["kind"] for seed in range(20)]
+    # The rarest, 15 %, is not among 60 once in 17,000 times.
+    kinds = [make_case(seed, "paper")[1]["kind"] for seed in seeds(0, 60)]
     assert set(kinds) == {"none", "one", "two", "outside"}
 
 
@@ -103,18 +105,18 @@ def test_nuisances_estimated_back_from_repeated_readings():
     logs = np.log(shown / 5e7).reshape(4000, 10)
     within = logs.std(axis=1, ddof=1) ** 2
     between = logs.mean(axis=1).var(ddof=1) - within.mean() / 10.0
-    # Sampling error of a variance from m values: sqrt(2 / m) of it; three of them.
-    assert within.mean() == pytest.approx(0.02**2, rel=3.0 * np.sqrt(2.0 / 36_000))
-    assert between == pytest.approx(0.01**2, rel=3.0 * np.sqrt(2.0 / 4000) * (0.01**2 + 0.02**2 / 10.0) / 0.01**2)
+    # Sampling error of a variance from m values: sqrt(2 / m) of it; four of them.
+    assert within.mean() == pytest.approx(0.02**2, rel=4.0 * np.sqrt(2.0 / 36_000))
+    assert between == pytest.approx(0.01**2, rel=4.0 * np.sqrt(2.0 / 4000) * (0.01**2 + 0.02**2 / 10.0) / 0.01**2)
 
 
 def test_two_percent_of_the_readings_are_outliers():
     clamps = np.arange(100_000)
     nuisances = Nuisances(repeat=0.02, clamping=0.0, rounded=False)
     logs = np.log(disturb_readings(np.ones(100_000), clamps, nuisances, np.random.default_rng(2))) / 0.02
-    # Beyond four standard deviations: 6e-5 of a normal, 2 Q(1) = 31.7 % of the wide ones; three sampling errors.
+    # Beyond four standard deviations: 6e-5 of a normal, 2 Q(1) = 31.7 % of the wide ones; four sampling errors.
     expected = 0.02 * 0.3173 + 0.98 * 6.3e-5
-    assert (np.abs(logs) > 4.0).mean() == pytest.approx(expected, abs=3.0 * np.sqrt(expected / 100_000))
+    assert (np.abs(logs) > 4.0).mean() == pytest.approx(expected, abs=4.0 * np.sqrt(expected / 100_000))
 
 
 def test_whitened_length_against_the_dense_covariance():
@@ -128,18 +130,20 @@ def test_whitened_length_against_the_dense_covariance():
 
 
 def test_strut_spread_and_joint_errors_over_many_machines():
-    cases = [draw_case(seed, "paper", "none") for seed in range(150)]
+    cases = [draw_case(seed, "paper", "none") for seed in seeds(0, 150)]
     factors = np.array([case.machine.strut_factors for case in cases])
     errors = np.array([case.machine.frame_errors for case in cases])
-    # Three sampling errors of a standard deviation, 1 / sqrt(2 m).
-    assert factors.std() == pytest.approx(0.01, rel=3.0 / np.sqrt(2 * factors.size))
-    assert errors.std() == pytest.approx(0.5e-3, rel=3.0 / np.sqrt(2 * errors.size))
+    # Four sampling errors of a standard deviation, 1 / sqrt(2 m).
+    assert factors.std() == pytest.approx(0.01, rel=4.0 / np.sqrt(2 * factors.size))
+    assert errors.std() == pytest.approx(0.5e-3, rel=4.0 / np.sqrt(2 * errors.size))
 
 
 def test_readings_scatter_about_the_model_as_the_nuisances_say():
     """Whole cases: variance of ln k over seeds is repeat, outliers, clamping and strut spread together."""
     exact = make_case(0, "paper", "none", nuisances=Nuisances.none())[0]["stiffness_N_per_mm"]
-    logs = np.array([np.log(make_case(seed, "paper", "none")[0]["stiffness_N_per_mm"] / exact) for seed in range(200)])
+    logs = np.array(
+        [np.log(make_case(seed, "paper", "none")[0]["stiffness_N_per_mm"] / exact) for seed in seeds(0, 200)]
+    )
     # Strut spread reaches the tip as 1 % times the root of the summed squared energy shares: between 1/sqrt(6) and 1.
     own = 0.02**2 * (0.98 + 0.02 * 16.0) + 0.01**2
     low, high = own + 0.01**2 / 6.0, own + 0.01**2

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tests.conftest import as_written
 from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist
 from toolpath_stiff import rig
@@ -112,7 +113,7 @@ def readings_by_hand(
 
 def oblique_directions(n: int, seed: int = 0) -> FloatArray:
     """(n, 3) unit vectors."""
-    found = np.random.default_rng(seed).normal(size=(n, 3))
+    found = as_written(seed).normal(size=(n, 3))
     return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.conftest import seeds
 from tests.stiffness.cases import nist, orthogonal_hexapod
 from tests.updating.cases import active, campaign, read_text, readings_by_hand, table_1
 from toolpath_stiff import rig
@@ -67,7 +68,7 @@ def test_levels_share_the_readings_and_their_errors_out():
 
 
 def test_scatter_explains_all_where_there_is_nothing_else():
-    share = [quick(campaign(seed, layout="paper")[0]).document["baseline"] for seed in range(300, 306)]
+    share = [quick(campaign(seed, layout="paper")[0]).document["baseline"] for seed in seeds(300, 306)]
     explained = np.array([one["explained_by_scatter_percent"]["stated"] for one in share])
     assert np.median(explained) > 70.0
     structured = quick(softened(campaign(300, layout="paper")[0], np.arange(42) % 3 == 2, 0.7)).document
@@ -78,18 +79,18 @@ def test_scatter_explains_all_where_there_is_nothing_else():
 
 
 def test_few_false_findings_in_mere_scatter():
-    """5 % of campaigns without structure may show a finding: 3 or more of 10 has a chance of 1.2 %."""
-    false = sum(bool(quick(campaign(seed, layout="paper")[0]).document["findings"]) for seed in range(9100, 9110))
-    assert false <= 2
+    """5 % of campaigns without structure may show a finding: 5 or more of 10 come once in 16,000 times."""
+    false = sum(bool(quick(campaign(seed, layout="paper")[0]).document["findings"]) for seed in seeds(9100, 9110))
+    assert false <= 4
 
 
 def test_few_false_findings_with_clampings_and_repeats():
     """Dense data with clamping and strut spread, which alone make 40 % of false alarms if they are not modelled.
 
-    3 or more of 10 has a chance of 1.2 % if 5 % is true.
+    4 or more of 10 come once in 970 times if 5 % is true.
     """
-    false = sum(bool(quick(campaign(seed)[0]).document["findings"]) for seed in range(9200, 9210))
-    assert false <= 2
+    false = sum(bool(quick(campaign(seed)[0]).document["findings"]) for seed in seeds(9200, 9210))
+    assert false <= 3
 
 
 def test_guessed_noise_names_only_what_both_guesses_show():

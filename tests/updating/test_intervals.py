@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tests.conftest import seeds
 from tests.updating.cases import campaign, predictor_for
 from toolpath_stiff.stiffness.effects import find_effect
 from toolpath_stiff.updating.diagnosis.document import parameters
@@ -83,7 +84,7 @@ def test_intervals_of_several_components_hold_the_truth():
     held = []
     for name in ("table_compliance", "setup_compliance"):
         effect = find_effect(name)
-        for seed in range(300, 310):
+        for seed in seeds(300, 310):
             data, truth = campaign(seed, "paper", name)
             problem = Problem.of(predictor_for(data), noise_models(data)[0])
             family = score_family(problem, effect, problem.score_base())

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
+from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, correlated_covariance, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.errors import InputError
@@ -73,7 +74,9 @@ def test_no_clamping_is_found_where_there_is_none():
 def test_wild_readings_and_a_drift_are_not_taken_for_noise():
     calm = mean_of_estimates(count=20)
     repeat, clamping, _ = mean_of_estimates(count=20, wild=2)
-    assert repeat < 1.25 * calm[0] and clamping < 1.35 * calm[1]
+    # Taken for noise they would make it 2.5 times as large. Where both are of one point they cannot all be told: 1.3
+    # times on the average of 120 campaigns, and 20 of them have a sampling error of 5 % of that; four of them.
+    assert repeat < 1.5 * calm[0] and clamping < 1.35 * calm[1]
     # 2 um in all, on deflections of 12 to 50 um: 4 to 16 %, half of it between repeats.
     drifting = mean_of_estimates(count=20, drift=2e-8)
     assert drifting[:2] == pytest.approx(calm[:2], rel=0.10)
@@ -92,7 +95,7 @@ def test_a_clamping_that_the_repeats_cannot_tell_is_assumed():
 
 def test_the_rigs_campaign_gives_its_noise_away():
     """2 % a reading, 1 % a clamping, 2 % of readings four times as wide."""
-    found = [noise_models(campaign(seed)[0])[0] for seed in range(10)]
+    found = [noise_models(campaign(seed)[0])[0] for seed in seeds(0, 10)]
     assert {noise.name for noise in found} == {"measured"}
     assert np.mean([noise.repeat[0] for noise in found]) == pytest.approx(0.02, rel=0.08)
     assert np.mean([noise.clamping for noise in found]) == pytest.approx(0.01, rel=0.25)
@@ -141,7 +144,7 @@ def test_covariance_is_that_of_simulated_campaigns():
     root = np.linalg.inv(np.linalg.cholesky(covariance(noise, predictor).dense()))
     model = predictor.log_stiffness()
     count = 60
-    logs = [np.log(campaign(seed, "paper", nuisances=nuisances)[0].stiffness) - model for seed in range(count)]
+    logs = [np.log(campaign(seed, "paper", nuisances=nuisances)[0].stiffness) - model for seed in seeds(0, count)]
     white = np.array(logs) @ root.T
     # The sum of squares of count x 42 standard normal numbers, with room for what is not linear in the nuisances.
     low, high = chi2.ppf([1e-4, 1.0 - 1e-4], white.size) / white.size
@@ -162,7 +165,7 @@ def correlated(n: int = 30, outliers: float = 0.02) -> tuple[Scatter, np.ndarray
     noise = simple_noise(n, 0.02, outliers=outliers)
     shared = rng.normal(size=(n, 5)) * 0.02
     matrix = np.diag(noise.repeat**2) + shared @ shared.T
-    residual = rng.multivariate_normal(np.zeros(n), matrix)
+    residual = rng.multivariate_normal(np.zeros(n), matrix, method="cholesky")
     residual[7] += 0.25
     return Scatter.of(noise, correlated_covariance(noise.repeat**2, shared)), matrix, residual
 
@@ -204,9 +207,16 @@ def test_several_wild_readings_and_an_answer_that_is_known_already():
 
 
 def test_nothing_is_called_wild_without_need():
+    """By as many readings as the price lets through by chance, each under its own scatter beside all others."""
     scatter, matrix, _ = correlated()
-    calm = np.random.default_rng(2).multivariate_normal(np.zeros(len(matrix)), matrix, 200)
-    assert np.mean([len(scatter.with_wild(one).wild) for one in calm]) < 0.03
+    precision, sets = np.diag(np.linalg.inv(matrix)), 1000
+    calm = np.random.default_rng(2).multivariate_normal(np.zeros(len(matrix)), matrix, sets, method="cholesky")
+    more = (4.0**2 - 1.0) * 0.02**2  # variance of a wild reading
+    own = 1.0 + more * precision
+    expected = chi2.sf((np.log(own) + 2.0 * math.log(0.98 / 0.02)) * own / (more * precision), df=1).sum()
+    # Of 1,000 sets some 27: 4 standard deviations of such a count, a fifth each.
+    found = np.mean([len(scatter.with_wild(one).wild) for one in calm])
+    assert found == pytest.approx(expected, abs=4.0 * math.sqrt(expected / sets))
     never, _, residual = correlated(outliers=0.0)
     assert never.with_wild(residual).wild == ()
     everywhere = correlated(n=40)[2] + 0.5 * (-1.0) ** np.arange(40)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, examined, judged, table_1
 from toolpath_stiff.updating.diagnosis import common_verdict
@@ -31,7 +32,7 @@ from toolpath_stiff.updating.inference.gates import Forms, Simulator, absolute_g
 from toolpath_stiff.updating.inference.noise import Scatter, covariance
 
 STRONG = 0.1
-SEEDS = tuple(range(100, 104))
+SEEDS = seeds(100, 104)
 
 
 def naive_gate(seed: int) -> float:
@@ -49,10 +50,10 @@ def naive_gate(seed: int) -> float:
 
 
 def test_where_nothing_is_hidden_nothing_is_found():
-    """4 dense campaigns; 10 % of false alarms make more than 1 of 4 once in 19 times. The benchmark draws hundreds."""
+    """4 dense campaigns; 10 % of false alarms make more than 2 of 4 once in 270 times. The benchmark draws hundreds."""
     alarms = [judged(seed).verdict != "adequate" for seed in SEEDS]
-    assert binom.sf(1, len(SEEDS), 0.10) < 0.053
-    assert sum(alarms) <= 1
+    assert binom.sf(2, len(SEEDS), 0.10) < 0.004
+    assert sum(alarms) <= 2
     for seed in SEEDS:
         if judged(seed).verdict == "adequate":
             assert NONE in judged(seed).plausible
@@ -62,8 +63,8 @@ def test_where_nothing_is_hidden_nothing_is_found():
 
 
 def test_a_sparse_campaign_without_anything_hidden_is_adequate_too():
-    verdicts = [judged(seed, "paper").verdict for seed in range(100, 108)]
-    assert verdicts.count("adequate") >= 5  # of 8 at 90 %: fewer once in 200 times
+    verdicts = [judged(seed, "paper").verdict for seed in seeds(100, 108)]
+    assert verdicts.count("adequate") >= 4  # of 8 at 90 %: fewer once in 2,300 times
 
 
 @pytest.mark.parametrize(

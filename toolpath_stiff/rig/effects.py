@@ -221,7 +221,9 @@ class Scale:
             key: float(f"{value:.4g}") if isinstance(value, float) else value
             for key, value in at_strength(name, shape, strength).items()
         }
-        return parameters, {"size": _rms(change), "detectability": self._detectability(change)}
+        # The digits beyond are the processor's.
+        found = {"size": _rms(change), "detectability": self._detectability(change)}
+        return parameters, {key: float(f"{value:.6g}") for key, value in found.items()}
 
     def _reach(self, name: str, shape: Mapping[str, Any], size: float, start: float = 0.02) -> tuple[float, FloatArray]:
         """Strength in (0, 1] at which the rms change is `size` within 2 %, and that change; 1 if no strength does.

@@ -16,7 +16,13 @@ from toolpath_stiff.updating.correction import Correction, StrutLawSearch
 from toolpath_stiff.updating.correction.ladder import NEEDED, Step, Support, Update
 from toolpath_stiff.updating.diagnosis.document import HeldErrors, RoundedErrors, interval, rounded_errors
 from toolpath_stiff.updating.inference.evidence import Fit
-from toolpath_stiff.updating.inference.fits import LAW_REFITTED, deviation_percent, errors_text, gain_in_standard_errors
+from toolpath_stiff.updating.inference.fits import (
+    LAW_REFITTED,
+    deviation_percent,
+    error_falls,
+    errors_text,
+    gain_in_standard_errors,
+)
 from toolpath_stiff.updating.inference.prediction import scaled_law
 
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
@@ -259,7 +265,7 @@ def _step(update: Update, k: int) -> StepEntry:
     if k:
         before = update.steps[k - 1].held
         gain = gain_in_standard_errors(before, held)
-        fall = before.mean_error - held.mean_error
+        fall = float(error_falls(before, held).mean())
         found["held_out_gain_in_se"] = json_number(gain, 3)
         found["held_out_se_percent"] = json_number(100.0 * abs(fall / gain), 3) if gain else None
     return found

@@ -46,6 +46,7 @@ from toolpath_stiff.updating.inference.fits import (
     HeldOut,
     add_effect,
     base_fit,
+    error_falls,
     gain_in_standard_errors,
     held_out,
     of_readings,
@@ -430,7 +431,7 @@ class _Work:
     def support(self, before: Step, fit: Fit, j: int, candidates: Sequence[Candidate]) -> Support:
         """Judge effect j of a fit against the model with the other effects."""
         name, after = fit.names[j], self.step("", fit)
-        fall = before.held.mean_error - after.held.mean_error
+        fall = float(error_falls(before.held, after.held).mean())
         in_se = gain_in_standard_errors(before.held, after.held)
         field = self.field(before.fit)
         problem, threshold = field.problem, field.threshold

@@ -21,6 +21,7 @@ from toolpath_stiff.updating.inference.noise import NormalEquations, Scatter, ga
 
 STEPS = 8
 TOLERANCE = 1e-3  # of a standard deviation
+SAME_ERROR = 1e-10  # of a stiffness; rounding makes 1e-14
 
 
 def refine(problem: Problem, found: Fit, law_free: bool = True) -> Fit:
@@ -509,10 +510,17 @@ def products_without(
         yield which, out, whole - taken
 
 
+def error_falls(before: HeldOut, after: HeldOut) -> FloatArray:
+    """(n,) fall of each reading's held-out error; 0 where rounding makes it, whose sign is the processor's."""
+    falls = before.errors - after.errors
+    return np.asarray(np.where(np.abs(falls) < SAME_ERROR, 0.0, falls))
+
+
 def gain_in_standard_errors(before: HeldOut, after: HeldOut) -> float:
     """Mean fall of the held-out error over its standard error, paired by point; nan with fewer than three points."""
     labels = np.unique(before.point)
-    falls = np.array([(before.errors - after.errors)[before.point == label].mean() for label in labels])
+    fallen = error_falls(before, after)
+    falls = np.array([fallen[before.point == label].mean() for label in labels])
     if len(labels) < 3 or not np.isfinite(falls).all():
         return float("nan")
     error = float(falls.std(ddof=1)) / np.sqrt(len(falls))
